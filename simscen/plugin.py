@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.trace_signals.estimation_errors import pose_error
     from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
-    from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
+    from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget, SensorSimulator
     from simscen.model.controllers import GoalCheckerSpec
     from simscen.model.localizers import LocalizerSpec
     from simscen.model.planners import PlannerSpec
@@ -113,7 +113,6 @@ __all__ = [
     "CostmapView",
     "Criterion",
     "Decision",
-    "Disturbance",
     "Duration",
     "Effect",
     "ErrorCode",
@@ -122,7 +121,9 @@ __all__ = [
     "EventKind",
     "Evidence",
     "Fault",
+    "FaultEffect",
     "FaultSetting",
+    "FaultTarget",
     "Finding",
     "Footprint",
     "Frequency",
@@ -133,7 +134,6 @@ __all__ = [
     "Image",
     "Imu",
     "InProcessStack",
-    "Instance",
     "Length",
     "Localizer",
     "LocalizerSpec",
@@ -175,10 +175,10 @@ __all__ = [
     "Scan",
     "Sensor",
     "SensorSetting",
+    "SensorSimulator",
     "SensorSpec",
     "SensorView",
     "Setting",
-    "Sight",
     "Situation",
     "Spec",
     "Speed",
@@ -193,7 +193,6 @@ __all__ = [
     "Trace",
     "Twist",
     "Value",
-    "Wheels",
     "ZoneSwitch",
     "Zones",
     "at_least",
@@ -265,12 +264,11 @@ _NAMES_BY_MODULE = {
     ),
     "simscen.criteria.base": ("Criterion", "Measure"),
     "simscen.faults.base": (
-        "Disturbance",
+        "FaultEffect",
         "Fault",
         "FaultSetting",
-        "Instance",
-        "Sight",
-        "Wheels",
+        "FaultTarget",
+        "SensorSimulator",
     ),
     "simscen.triggers.base": ("Condition",),
     "simscen.actions.base": ("Action",),

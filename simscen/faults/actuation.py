@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry.kinematics import Twist
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
 from simscen.faults.common import OdometryDistortion
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAcceleration, PositiveAngularAcceleration, PositiveSpeed, Quantity
@@ -22,18 +22,18 @@ TurnRateLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
 
 
 def side_speeds(motion: Twist, separation: float) -> tuple[float, float]:
-    """Return the speeds in m/s at which the left and the right wheels roll over the ground."""
+    """Return the speeds (left, right) in m/s at which the wheels of each side roll over the ground."""
     half = separation / 2
     return motion.vx - half * motion.wz, motion.vx + half * motion.wz
 
 
 def twist_from_sides(left: float, right: float, lateral: float, separation: float) -> Twist:
-    """Return the velocity of a base from the speeds of its left and right wheels."""
+    """Return the velocity of a base from wheel speeds in m/s and the distance between left and right wheels in m."""
     return Twist((left + right) / 2, lateral, (right - left) / separation)
 
 
-def inapplicable_side(target: Instance, key: str) -> tuple[str, str] | None:
-    """Return the key of a wheel side and a reason if the target has no sides."""
+def inapplicable_side(target: FaultTarget, key: str) -> tuple[str, str] | None:
+    """Return `key`, which belongs to one side, and the reason if the target has no left and right wheels, or None."""
     if target.kind != "Wheels":
         return key, f"`{key}` does not apply there: a command has no sides; set it on `wheels`"
     if target.spec is not None and not getattr(target.spec, "wheel_separation", 0.0):
@@ -42,11 +42,11 @@ def inapplicable_side(target: Instance, key: str) -> tuple[str, str] | None:
 
 
 class Slip(Spec, Fault):
-    """Wheels slip: a share of each meter that a wheel rolls is lost on the ground, but counted by the odometry.
+    """Wheels slip: the robot moves less than its wheels roll, but the odometry counts the full roll of the wheels.
 
     The slip ratio is that of vehicle dynamics for driving wheels, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
     ch. 2). With different values for left and right, the robot also turns without measuring it. On `wheels`, all wheel
-    odometry is affected; on a sensor, only that one.
+    odometry is affected; on an odometry sensor, only that sensor.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """
@@ -58,13 +58,13 @@ class Slip(Spec, Fault):
     right: SlipRatio = 0.0
     """Slip ratio of the right wheels."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Reduce the motion of the robot and increase the reported increments."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to reduce the motion of the robot and to increase the reported increments."""
         return _SlippingWheels(self, setting.separation)
 
 
 class _SlippingWheels(OdometryDistortion):
-    drives = True
+    changes_motion = True
 
     def __init__(self, slip: Slip, separation: float) -> None:
         super().__init__()
@@ -102,23 +102,23 @@ class Gain(Spec, Fault):
     angular: GainFactor = 1.0
     """Driven over commanded angular velocity."""
     left: GainFactor = 1.0
-    """The same for the left wheels; only on `wheels`."""
+    """Driven over commanded speed of the left wheels; only on `wheels`."""
     right: GainFactor = 1.0
-    """The same for the right wheels; only on `wheels`."""
+    """Driven over commanded speed of the right wheels; only on `wheels`."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a side and the reason if the target has no sides, or None."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `left` or `right` and the reason if it is given but the target has no sides, or None."""
         for key in ("left", "right"):
             if key in self.model_fields_set and (finding := inapplicable_side(target, key)):
                 return finding
         return None
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Scale all further commands."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to scale commands."""
         return _ScaledCommands(self, setting.separation)
 
 
-class _ScaledCommands(Disturbance):
+class _ScaledCommands(FaultEffect):
     def __init__(self, gain: Gain, separation: float) -> None:
         self._gain, self._separation = gain, separation
 
@@ -157,19 +157,19 @@ class Saturation(Spec, Fault):
     right: SpeedLimit | None = None
     """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a side and the reason if the target has no sides, or None."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `left` or `right` and the reason if it is given but the target has no sides, or None."""
         for key in ("left", "right"):
             if getattr(self, key) is not None and (finding := inapplicable_side(target, key)):
                 return finding
         return None
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Limit all further commands."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to limit commands."""
         return _LimitedCommands(self, setting)
 
 
-class _LimitedCommands(Disturbance):
+class _LimitedCommands(FaultEffect):
     def __init__(self, spec: Saturation, setting: FaultSetting) -> None:
         self._spec, self._setting = spec, setting
         self._previous: tuple[int, Twist] | None = None
@@ -232,12 +232,12 @@ class LowBattery(Spec, Fault):
             raise ValueError("`end` is above `start`: a battery does not charge itself")
         return self
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to drain the battery."""
         return _DrainingBattery(self, setting)
 
 
-class _DrainingBattery(Disturbance):
+class _DrainingBattery(FaultEffect):
     def __init__(self, spec: LowBattery, setting: FaultSetting) -> None:
         self._spec, self._setting, self._start_tick = spec, setting, setting.now()
 

@@ -1,10 +1,12 @@
-"""Base classes of faults: the specification (`Fault`), the running fault (`Disturbance`), and the choice by key."""
+"""Base classes of faults: the specification in YAML (`Fault`), and what it does while it is active (`FaultEffect`)."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
+
+from pydantic import BaseModel
 
 from simscen.core.clock import Clock
 from simscen.core.records.events import FAULT_TARGET_KINDS
@@ -23,18 +25,11 @@ if TYPE_CHECKING:
     from simscen.core.messages.sensor_data import Image, Reading, Scan
 
 
-@dataclass(frozen=True)
-class Wheels:
-    """Geometry of the drive: distance between left and right wheels in meters, 0 for a drive without sides."""
-
-    separation: float = 0.0
-
-
-class Sight(Protocol):
-    """Simulated measurements for faults: what a sensor would measure from another pose or without some objects."""
+class SensorSimulator(Protocol):
+    """Simulates what the lidar or camera of a fault would measure from another pose or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return true distances (n,) in meters along the beams of the current scan; inf beyond its range.
+        """Return the true distances (n,) in meters along the beams of the current scan; inf beyond twice its range.
 
         `error` is the true pose of the lidar in the frame of its nominal pose; beams that point down end at the floor.
         Beams pass through the objects named in `without`.
@@ -42,7 +37,7 @@ class Sight(Protocol):
         ...
 
     def image(self, error: Pose3) -> Image:
-        """Return the current picture of a camera whose true pose differs from the nominal pose by `error`."""
+        """Return the current image if the true pose of the camera, in the frame of its nominal pose, is `error`."""
         ...
 
 
@@ -51,20 +46,21 @@ def _tick_zero() -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class FaultSetting(Wheels):
-    """Everything that a fault may know besides its specification.
+class FaultSetting:
+    """Everything that a running fault may know besides its specification.
 
     separation:  distance between left and right wheels in meters (0 for a drive without sides)
     clock:       conversion between ticks and seconds
     now:         returns the current tick
     kind:        kind of the target, one of the fault's `affects`
-    sight:       what a lidar or camera would measure otherwise; None for other targets
+    simulator:   simulates readings of the sensor under other conditions; None if the target is no sensor
     """
 
+    separation: float = 0.0
     clock: Clock = field(default_factory=Clock)
     now: Callable[[], int] = _tick_zero
     kind: str = ""
-    sight: Sight | None = None
+    simulator: SensorSimulator | None = None
 
     def seconds_since(self, tick: int) -> float:
         """Return the simulated seconds between `tick` and now."""
@@ -72,8 +68,8 @@ class FaultSetting(Wheels):
 
 
 @dataclass(frozen=True)
-class Instance:
-    """Target of a fault, as far as it is known before the run.
+class FaultTarget:
+    """Target of a fault (a sensor, cmd_vel, the wheels, the localizer, or the map), as it is known before the run.
 
     kind:  one of the fault's `affects`
     rate:  messages per second; 0 if unknown
@@ -85,22 +81,22 @@ class Instance:
     spec: object = None
 
 
-class Disturbance:
-    """A running fault, from its start to its end. The default implementation changes nothing.
+class FaultEffect:
+    """What a fault changes from its start to its end. The default implementation changes nothing.
 
-    *Given* the same readings and generator *then* the results are the same. A disturbance never modifies a reading;
-    it returns another one.
+    *Given* the same readings and generator *then* the results are the same. An effect never modifies a reading; it
+    returns another one.
     """
 
-    drives: ClassVar[bool] = False
+    changes_motion: ClassVar[bool] = False
     """Whether a fault on a sensor also changes the motion of the robot; then `command` is called at each beat."""
 
     def reading(self, reading: Reading) -> Reading | None:
         """Return the reading that the stack receives instead; None to drop or hold it back."""
         return reading
 
-    def arriving(self) -> Sequence[Reading]:
-        """Return held readings that arrive at this beat, oldest first; called before `reading`."""
+    def arriving_readings(self) -> Sequence[Reading]:
+        """Remove and return the held readings that arrive at this beat, oldest first; called before `reading`."""
         return ()
 
     def command(self, command: Twist) -> Twist | None:
@@ -108,7 +104,7 @@ class Disturbance:
         return command
 
     def arriving_command(self) -> Twist | None:
-        """Return the newest held command that arrives at this beat, or None; called before `command`."""
+        """Remove the held commands that arrive at this beat. Return the newest, or None; called before `command`."""
         return None
 
     def belief(self, belief: Belief) -> Belief:
@@ -119,7 +115,7 @@ class Disturbance:
         """Return the map that the stack receives; called before the stack starts."""
         return grid
 
-    def end(self) -> Disturbance | None:
+    def end(self) -> FaultEffect | None:
         """Return what remains in effect after the fault has ended, or None."""
         return None
 
@@ -144,17 +140,27 @@ class Fault(ABC):
         is_valid = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)
         return "" if is_valid else f"its `affects` is not a set of {', '.join(FAULT_TARGET_KINDS)}"
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target ("" for the whole fault) and the reason, or None."""
-        return None
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return a key that does not apply to the target ("" for the whole fault) and the reason, or None.
+
+        The default finds keys that were set but are not among the `keys_by_kind` of the target.
+        """
+        applicable = self.keys_by_kind.get(target.kind)
+        if applicable is None:
+            return None
+        assert isinstance(self, BaseModel)
+        given = [name for name in type(self).model_fields if name in self.model_fields_set]
+        wrong = next((name for name in given if name not in applicable), None)
+        only = f"only `{'`, `'.join(applicable)}` {'does' if len(applicable) == 1 else 'do'}"
+        return None if wrong is None else (wrong, f"`{wrong}` does not apply there, {only}")
 
     @abstractmethod
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Start the fault. `rng` belongs to this fault alone."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start the fault and return its effect. No other fault uses the generator `rng`."""
 
 
 class AnyFault(Choice):
-    """One fault, chosen by its key."""
+    """One fault, selected by its key."""
 
     group: ClassVar[str] = "fault"
 
@@ -187,7 +193,7 @@ class AnyFault(Choice):
 
     @property
     def fault(self) -> Fault:
-        """The chosen fault."""
+        """Specification of the selected fault."""
         fault = self.chosen
         assert isinstance(fault, Fault)
         return fault

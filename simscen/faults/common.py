@@ -1,33 +1,20 @@
-"""Helpers that several faults share: range arithmetic, late corrections, and odometry increments."""
+"""Parts that several faults share: changed lidar and camera distances, late localizer corrections, odometry errors."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from pydantic import BaseModel
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Odometry, Reading, Scan
-from simscen.faults.base import Disturbance, Fault, Instance
-
-
-def inapplicable_key(fault: Fault, target: Instance) -> tuple[str, str] | None:
-    """Return a key of the fault that was set but does not apply to the target (see `Fault.keys_by_kind`), and why."""
-    assert isinstance(fault, BaseModel)
-    applicable = fault.keys_by_kind[target.kind]
-    given = [name for name in type(fault).model_fields if name in fault.model_fields_set]
-    wrong = next((name for name in given if name not in applicable), None)
-    if wrong is None:
-        return None
-    only = f"only `{'`, `'.join(applicable)}` {'does' if len(applicable) == 1 else 'do'}"
-    return wrong, f"`{wrong}` does not apply there, {only}"
+from simscen.faults.base import FaultEffect
 
 
 def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
-    """Return the belief that follows from the current odometry and an older localizer correction."""
+    """Return the belief with the current odometry, but with `map_from_odom` as an older correction by the localizer."""
     odometry = belief.map_from_odom.between(belief.pose)
     return replace(belief, pose=map_from_odom.compose(odometry), map_from_odom=map_from_odom)
 
@@ -59,10 +46,10 @@ def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
 
 
 def ranges_with_scan_errors(scan: Scan, distances: Array, nominal: Array) -> Array:
-    """Return the ranges that the lidar would have reported at other true distances, with the noise of this scan.
+    """Return the ranges (n,) that the lidar would have reported at other true distances, with the noise of this scan.
 
-    `nominal` are the true distances behind the scan. Ranges are rounded to whole millimeters, so that differences in
-    the last bits do not spread.
+    `nominal` are the true distances (n,) that the scan measured. Ranges are rounded to whole millimeters, so that
+    differences in the last bits do not spread.
     """
     with np.errstate(invalid="ignore"):
         errors = scan.ranges - nominal
@@ -70,8 +57,8 @@ def ranges_with_scan_errors(scan: Scan, distances: Array, nominal: Array) -> Arr
     return clip_to_sensor_range(scan, ranges)
 
 
-class OdometryDistortion(Disturbance):
-    """Distorts each odometry increment and integrates the increments again, for each sensor separately.
+class OdometryDistortion(FaultEffect):
+    """Base class of odometry errors: distorts each increment and integrates the increments again, for each sensor.
 
     The reported pose starts at the sensor's own pose, so that it does not jump when the fault begins. When the fault
     ends, the accumulated error remains, as on a real robot; only new increments are correct again.
@@ -105,7 +92,7 @@ class OdometryDistortion(Disturbance):
         self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)
 
-    def end(self) -> Disturbance | None:
+    def end(self) -> FaultEffect | None:
         """Keep the accumulated error."""
         self._ended = True
         return self

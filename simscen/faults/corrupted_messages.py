@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Reading, Scan
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 VALUES = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+"""Number that fills a garbage message, by the keyword in `value`."""
 WRONG_SIZES = ("empty", "short")
 T = TypeVar("T", bound="np.generic")
 
@@ -28,8 +29,8 @@ T = TypeVar("T", bound="np.generic")
 class Garbage(Spec, Fault):
     """Messages with meaningless content: nan, inf, negative or huge values, no values at all, or too few.
 
-    Real drivers send them while they start, when a frame is cut off, or when a checksum is not verified. A stack must
-    tolerate them and must not treat them as measurements.
+    Real drivers send such messages while they start, when a frame is cut off, or when a checksum is not verified. A
+    stack must tolerate them and must not treat them as measurements.
 
     Example: `{sensor: lidar, garbage: {value: nan, probability: 20 %}}`
     """
@@ -42,18 +43,18 @@ class Garbage(Spec, Fault):
     probability: Probability = 1.0
     """Probability that a message is garbage."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
         """Return `value` and the reason if messages of the target have a fixed size and cannot be empty or short."""
         if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Start the fault: draw for each message whether it is garbage, and its content."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw for each message whether it is garbage, and its content."""
         return _RandomGarbage(rng, self)
 
 
-class _RandomGarbage(Disturbance):
+class _RandomGarbage(FaultEffect):
     def __init__(self, rng: np.random.Generator, garbage: Garbage) -> None:
         self._rng, self._garbage = rng, garbage
 
@@ -81,7 +82,7 @@ class _RandomGarbage(Disturbance):
 
 
 def _garbage_values(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
-    """Return the values, or rows of values, with meaningless content or a wrong size."""
+    """Return an array of the same dtype with the `content` of Garbage.value: filled, empty, or half as long."""
     if content == "empty":
         return values[:0]
     if content == "short":
@@ -102,12 +103,14 @@ class Stuck(Spec, Fault):
         {"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Wheels", "Belief"}
     )
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Repeat the next message."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to repeat the next message."""
         return _Repeated(STOP if setting.kind == "Wheels" else None)
 
 
-class _Repeated(Disturbance):
+class _Repeated(FaultEffect):
+    """Repeats the first message that it receives, or the given command."""
+
     def __init__(self, command: Twist | None) -> None:
         self._command = command
         self._reading: Reading | None = None

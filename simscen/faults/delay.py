@@ -1,4 +1,4 @@
-"""`delay`: messages arrive late."""
+"""The fault `delay`: messages arrive late."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
-from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.faults.common import apply_correction
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration
@@ -24,8 +24,8 @@ class Delay(Spec, Fault):
     """Messages arrive late and in order: a slow driver, or a busy bus or network.
 
     A message arrives at the first beat at or after its due time, with the time stamp of its measurement. The delay is
-    `latency` plus a random share of `jitter`, but no message overtakes an earlier one. Messages in transit when the
-    fault ends still arrive, and delay those that follow. On `localizer`, the odometry correction is late.
+    `latency` plus a random part of `jitter`, but no message overtakes an earlier one. Messages in transit when the
+    fault ends still arrive, and delay those that follow. On `localizer`, the correction of the odometry is late.
 
     Example: `{sensor: lidar, delay: {latency: 200 ms, jitter: 50 ms}}`
     """
@@ -37,12 +37,12 @@ class Delay(Spec, Fault):
     jitter: Duration = 0.0
     """Largest additional delay; drawn uniformly for each message."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Delay all further messages."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to delay messages."""
         return _DelayedMessages(rng, self, setting)
 
 
-class _DelayedMessages(Disturbance):
+class _DelayedMessages(FaultEffect):
     def __init__(self, rng: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
         self._rng, self._delay, self._setting = rng, delay, setting
         self._readings, self._commands = _LatencyQueue[Reading](), _LatencyQueue[Twist]()
@@ -59,7 +59,7 @@ class _DelayedMessages(Disturbance):
     def reading(self, reading: Reading) -> Reading | None:
         return self._readings.pass_or_hold(reading, self._due_tick(), self._setting.now())
 
-    def arriving(self) -> list[Reading]:
+    def arriving_readings(self) -> list[Reading]:
         return self._readings.pop_due(self._setting.now())
 
     def command(self, command: Twist) -> Twist | None:
@@ -76,14 +76,14 @@ class _DelayedMessages(Disturbance):
         self._correction = arrived[-1] if arrived else self._correction or newest
         return apply_correction(belief, self._correction)
 
-    def end(self) -> Disturbance | None:
+    def end(self) -> FaultEffect | None:
         """Deliver the messages in transit."""
         self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 
 
 class _LatencyQueue(Generic[T]):
-    """Messages in transit in their order of arrival."""
+    """Queue of messages in transit, in their order of arrival."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[int, T]] = deque()
@@ -92,7 +92,7 @@ class _LatencyQueue(Generic[T]):
         return len(self._waiting)
 
     def pass_or_hold(self, message: T, due: int, now: int) -> T | None:
-        """Return the message if it is due and no other is waiting; otherwise hold it and return None."""
+        """Return the message if its tick `due` has come and no other waits; otherwise hold it and return None."""
         if not self._waiting and due <= now:
             return message
         self._waiting.append((max(due, self._waiting[-1][0]) if self._waiting else due, message))

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.messages.sensor_data import Image, Reading, Scan
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, PositiveAngle, PositiveLength, Probability
 
@@ -27,12 +27,12 @@ class BeamDropout(Spec, Fault):
     probability: Probability
     """Probability that a beam returns nothing."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw once for each beam."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw for each beam of each scan whether it is lost."""
         return _LostBeams(rng, self.probability)
 
 
-class _LostBeams(Disturbance):
+class _LostBeams(FaultEffect):
     def __init__(self, rng: np.random.Generator, probability: float) -> None:
         self._rng, self._probability = rng, probability
 
@@ -61,16 +61,16 @@ class Sector(Spec, Fault):
         turn = 2 * math.pi
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return `to` and the reason if the sector has no width."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `to` and the reason if the sector has no width, or None."""
         return ("to", "the sector ends where it begins") if not self.width else None
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Drop the same beams of each scan."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to drop the same beams of each scan."""
         return _BlindSector(self.from_, self.width)
 
 
-class _BlindSector(Disturbance):
+class _BlindSector(FaultEffect):
     def __init__(self, first: float, width: float) -> None:
         self._first, self._width = first, width
 
@@ -91,19 +91,19 @@ class RangeLimit(Spec, Fault):
     max: PositiveLength
     """Largest range or depth that is still measured."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return `max` and the reason if it is not below the maximum range of the sensor."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `max` and the reason if it is not below the maximum range of the sensor, or None."""
         own = getattr(target.spec, "max_range", None)
         if own is None or self.max < own:
             return None
         return "max", f"{self.max:g} m is no limit: the range of the sensor is {own:g} m"
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Limit all further readings."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to limit the range of readings."""
         return _LimitedRange(self.max)
 
 
-class _LimitedRange(Disturbance):
+class _LimitedRange(FaultEffect):
     def __init__(self, max_range: float) -> None:
         self._max_range = max_range
 
@@ -119,7 +119,7 @@ class _LimitedRange(Disturbance):
 
 
 class Ghost(Spec, Fault):
-    """Beams in a window of directions hit an object that does not exist: a reflection, a vest, the sensor's own cover.
+    """Beams in a window of directions hit an object that does not exist: a reflection, a reflective vest, the cover.
 
     The ghost is fixed in the lidar's frame and therefore moves with the robot.
 
@@ -137,19 +137,19 @@ class Ghost(Spec, Fault):
     probability: Probability = 1.0
     """Probability that a beam of the window hits the ghost, drawn again for each scan."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return `range` and the reason if the lidar cannot measure it."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `range` and the reason if the ghost is outside the range limits of the lidar, or None."""
         nearest, farthest = (getattr(target.spec, key, None) for key in ("min_range", "max_range"))
         if nearest is None or farthest is None or nearest <= self.range <= farthest:
             return None
         return "range", f"the sensor measures from {nearest:g} m to {farthest:g} m"
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw for each beam of the window."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw for each beam of the window whether it hits the ghost."""
         return _GhostHits(rng, self)
 
 
-class _GhostHits(Disturbance):
+class _GhostHits(FaultEffect):
     def __init__(self, rng: np.random.Generator, ghost: Ghost) -> None:
         self._rng, self._ghost = rng, ghost
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Reading, Scan
-from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.faults.common import clip_to_sensor_range, ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.places import ObjectName
@@ -27,7 +27,7 @@ class Glass(Spec, Fault):
     """Beams pass through the named objects and return what is behind: glass doors and walls, polished steel, water.
 
     A laser passes through a pane except within a few degrees of its normal (Foster, Sun, Park and Kuipers, VisAGGE:
-    Visible angle grid for glass environments, 2013); `probability` is the share of beams that pass. The robot still
+    Visible angle grid for glass environments, 2013); `probability` is the fraction of beams that pass. The robot still
     collides with the object, and its map still shows it.
 
     Example: `{sensor: lidar, glass: {of: [east wall]}}`
@@ -40,21 +40,21 @@ class Glass(Spec, Fault):
     probability: Probability = 1.0
     """Probability that a beam passes through."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Cast each scan again without the named objects."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to cast each scan again without the named objects."""
         return _TransparentObjects(rng, self, setting)
 
 
-class _TransparentObjects(Disturbance):
+class _TransparentObjects(FaultEffect):
     def __init__(self, rng: np.random.Generator, glass: Glass, setting: FaultSetting) -> None:
-        self._rng, self._glass, self._sight = rng, glass, setting.sight
+        self._rng, self._glass, self._simulator = rng, glass, setting.simulator
 
     def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan) or self._sight is None:
+        if not isinstance(reading, Scan) or self._simulator is None:
             return reading
         passes = self._rng.random(len(reading.ranges)) < self._glass.probability
-        opaque = self._sight.distances(reading)
-        transparent = self._sight.distances(reading, without=self._glass.of)
+        opaque = self._simulator.distances(reading)
+        transparent = self._simulator.distances(reading, without=self._glass.of)
         ranges = ranges_with_scan_errors(reading, transparent, opaque)
         return replace(reading, ranges=np.where(passes & (transparent != opaque), ranges, reading.ranges))
 
@@ -65,8 +65,8 @@ class Rain(Spec, Fault):
     At a rain rate of R mm/h the extinction is α = 0.01 R^0.6 per meter. A range z returns ρ exp(-2 α z) / z² of the
     light; it is lost if that is less than a surface of 90 % reflectivity returns at the lidar's maximum range in clear
     air. Range errors have the standard deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson,
-    Predicting the influence of rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of the drops
-    themselves, use `dust`.
+    Predicting the influence of rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use
+    `dust`.
 
     Example: `{sensor: lidar, rain: {rate: 25 mm/h, reflectivity: 50 %}}`
     """
@@ -77,8 +77,8 @@ class Rain(Spec, Fault):
     reflectivity: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = REFERENCE_REFLECTIVITY
     """Reflectivity of all surfaces: 90 % is white, 10 % black."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw an error for each beam."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to attenuate beams and to draw a range error for each."""
         return _RainAttenuation(rng, self)
 
     @property
@@ -87,7 +87,7 @@ class Rain(Spec, Fault):
         return float(0.01 * (self.rate / MM_PER_HOUR) ** 0.6)
 
 
-class _RainAttenuation(Disturbance):
+class _RainAttenuation(FaultEffect):
     def __init__(self, rng: np.random.Generator, rain: Rain) -> None:
         self._rng, self._rain = rng, rain
         self._relative_std = 0.02 * float((1 - np.exp(-rain.rate / MM_PER_HOUR)) ** 2)
@@ -123,12 +123,12 @@ class Dust(Spec, Fault):
     mean_free_path: PositiveLength
     """Mean distance that a beam travels in free space before it hits a particle."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw for each beam of each scan."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw for each beam of each scan the distance to the first particle."""
         return _Particles(rng, self.mean_free_path)
 
 
-class _Particles(Disturbance):
+class _Particles(FaultEffect):
     def __init__(self, rng: np.random.Generator, mean_free_path: float) -> None:
         self._rng, self._mean_free_path = rng, mean_free_path
 

@@ -13,7 +13,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Belief
-from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring
 from simscen.spec.quantities import Angle, Length
@@ -22,7 +22,7 @@ Rings = Annotated[list[Ring], Field(max_length=100)]
 
 
 class Jump(Spec, Fault):
-    """The estimated pose jumps to another place, as when a localizer mistakes one aisle for another.
+    """The estimated pose jumps, as when a localizer mistakes one aisle for another.
 
     The jump is given in the frame of the estimated pose at the start of the fault. The estimate keeps this error until
     the fault ends, and then jumps back. The localizer itself continues undisturbed.
@@ -39,12 +39,12 @@ class Jump(Spec, Fault):
     yaw: Angle = 0.0
     """Counterclockwise."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Jump with the next belief."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to shift the belief, from the next one on."""
         return _ShiftedBelief(Pose2(self.x, self.y, self.yaw))
 
 
-class _ShiftedBelief(Disturbance):
+class _ShiftedBelief(FaultEffect):
     def __init__(self, jump: Pose2) -> None:
         self._jump = jump
         self._error: Pose2 | None = None
@@ -57,7 +57,7 @@ class _ShiftedBelief(Disturbance):
 
 
 class Shift(Spec, Fault):
-    """The map of the stack is rotated and shifted: a wrong origin in its YAML file, or the frame of another survey.
+    """The map of the stack is rotated and shifted: a wrong origin in its YAML file, or a map from another survey.
 
     Goals and the initial pose do not change. The map is first rotated about the origin of the map frame, then shifted.
 
@@ -73,12 +73,12 @@ class Shift(Spec, Fault):
     yaw: Angle = 0.0
     """Counterclockwise."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Shift the map before the stack receives it."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to shift the map that the stack receives."""
         return _ShiftedMap(Pose2(self.x, self.y, self.yaw))
 
 
-class _ShiftedMap(Disturbance):
+class _ShiftedMap(FaultEffect):
     def __init__(self, shift: Pose2) -> None:
         self._shift = shift
 
@@ -99,12 +99,12 @@ class Outdated(Spec, Fault):
     extra: Rings = []
     """Polygons in which the map shows an obstacle."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Change the map before the stack receives it."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to change the map that the stack receives."""
         return _EditedMap(self)
 
 
-class _EditedMap(Disturbance):
+class _EditedMap(FaultEffect):
     def __init__(self, spec: Outdated) -> None:
         self._spec = spec
 

@@ -12,23 +12,24 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
 from simscen.faults.common import apply_correction
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Frequency, PositiveDuration, Probability
 
-MESSAGES = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+MESSAGE_KINDS = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+"""Kinds of targets that consist of messages: readings and velocity commands."""
 
 
-class _MessageLoss(Disturbance):
-    """Drops readings and commands; between two corrections, the belief follows the odometry."""
+class _MessageLoss(FaultEffect):
+    """Base class: drops lost readings and commands. Without a new correction, the belief follows the odometry."""
 
     def __init__(self) -> None:
         self._correction: Pose2 | None = None
 
     @abstractmethod
     def is_lost(self) -> bool:
-        """Return whether the message at hand is lost; called once for each message."""
+        """Decide whether the current message is lost; called once for each message."""
 
     def reading(self, reading: Reading) -> Reading | None:
         return None if self.is_lost() else reading
@@ -46,10 +47,10 @@ class Off(Spec, Fault):
     Example: `{sensor: lidar, off: {}, when: {time: 10 s}, for: 3 s}`
     """
 
-    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
+    affects: ClassVar[frozenset[str]] = MESSAGE_KINDS | {"Belief"}
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Drop everything."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to drop all messages."""
         return _Silence()
 
 
@@ -71,13 +72,13 @@ class Dropout(Spec, Fault):
     Example: `{sensor: lidar, dropout: {probability: 30 %}}`
     """
 
-    affects: ClassVar[frozenset[str]] = MESSAGES
+    affects: ClassVar[frozenset[str]] = MESSAGE_KINDS
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
     """Probability that a message is lost."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw once for each message."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw for each message whether it is lost."""
         return _RandomLoss(rng, self.probability)
 
 
@@ -94,19 +95,19 @@ class Intermittent(Spec, Fault):
     """Messages arrive and fail in bursts of random length, as with a loose contact or a fading radio link.
 
     The bursts have exponentially distributed lengths (a Gilbert channel: Gilbert, Capacity of a burst-noise channel,
-    1960), so that on average the share down / (up + down) of all messages is lost. The fault begins with a gap.
+    1960), so that on average the fraction down / (up + down) of all messages is lost. The fault begins with a gap.
 
     Example: `{sensor: lidar, intermittent: {up: 1 s, down: 0.5 s}}`
     """
 
-    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
+    affects: ClassVar[frozenset[str]] = MESSAGE_KINDS | {"Belief"}
     up: PositiveDuration
     """Mean length of the periods in which messages arrive."""
     down: PositiveDuration
     """Mean length of the gaps."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Begin with a gap."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start with a gap of random length."""
         return _GilbertChannel(rng, self, setting)
 
 
@@ -133,24 +134,24 @@ class _GilbertChannel(_MessageLoss):
 class Slow(Spec, Fault):
     """Messages arrive at a lower rate than normal: an overloaded computer, a sensor in its energy-saving mode.
 
-    The first message arrives, then the first of each further period; all others are lost. The base keeps the last
+    Only the first message of each period of 1 / `rate` arrives; all others are lost. The base keeps the last
     velocity command and stops after its `command_timeout`; the localizer corrects the odometry less often.
 
     Example: `{sensor: lidar, slow: {rate: 2 Hz}}`
     """
 
-    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
+    affects: ClassVar[frozenset[str]] = MESSAGE_KINDS | {"Belief"}
     rate: Frequency
     """Messages per second that arrive."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return `rate` and the reason if it is not below the rate of the target."""
+    def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
+        """Return `rate` and the reason if it is not below the rate of the target, or None."""
         if not target.rate or self.rate < target.rate:
             return None
         return "rate", f"{self.rate:g} Hz is not slower than its normal rate of {target.rate:g} messages per second"
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Let the next message through."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start a period; its first message, the next one, arrives."""
         return _RateLimit(self.rate, setting)
 
 

@@ -1,4 +1,4 @@
-"""`noise`: additional Gaussian noise on a sensor or on the localizer."""
+"""The fault `noise`: additional Gaussian noise on a sensor or on the localizer."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
-from simscen.faults.common import OdometryDistortion, inapplicable_key
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
+from simscen.faults.common import OdometryDistortion
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     NonNegativeAcceleration,
@@ -28,8 +28,8 @@ from simscen.spec.quantities import (
 class Noise(Spec, Fault):
     """Gaussian noise in addition to that of the sensor: a failing or badly shielded sensor, vibration, poor light.
 
-    On a lidar and on the depths of a camera, `std` applies to every range, which stays within the limits of the sensor;
-    `colour` applies to every pixel. On odometry, the errors of `linear` and `angular` grow with the square root of the
+    On a lidar and on the depths of a camera, `std` applies to each range; a range stays within the limits of the lidar.
+    `colour` applies to each pixel. On odometry, the errors of `linear` and `angular` grow with the square root of the
     distance, so that they do not depend on the rate. On the localizer, each belief has an independent error.
 
     Example: `{sensor: lidar, noise: {std: 10 cm}}`
@@ -59,16 +59,12 @@ class Noise(Spec, Fault):
     accelerometer: NonNegativeAcceleration = 0.0
     """Standard deviation of the acceleration along each axis."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target and the reason, or None."""
-        return inapplicable_key(self, target)
-
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw again for each message."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to draw noise for each message."""
         return _NoisyOdometry(rng, self, setting) if setting.kind == "Odometry" else _NoisyValues(rng, self)
 
 
-class _NoisyValues(Disturbance):
+class _NoisyValues(FaultEffect):
     def __init__(self, rng: np.random.Generator, noise: Noise) -> None:
         self._rng, self._noise = rng, noise
 

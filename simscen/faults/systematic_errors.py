@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
-from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
-from simscen.faults.common import OdometryDistortion, change_distances, inapplicable_key, ranges_with_scan_errors
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
+from simscen.faults.common import OdometryDistortion, change_distances, ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     Acceleration,
@@ -64,12 +64,8 @@ class Bias(Spec, Fault):
     brightness: Annotated[float, Field(ge=-1, le=1), Quantity("ratio")] = 0.0
     """Added to red, green, and blue of each pixel, relative to full scale."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target and the reason, or None."""
-        return inapplicable_key(self, target)
-
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Scale each increment, or add to each value."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to add the error to each reading."""
         return _BiasedReadings(self) if setting.kind in ("Scan", "Imu", "Image") else _BiasedOdometry(self)
 
 
@@ -83,7 +79,7 @@ class _BiasedOdometry(OdometryDistortion):
         return Twist(step.vx * self._bias.linear_scale, step.vy * self._bias.linear_scale, turn)
 
 
-class _BiasedReadings(Disturbance):
+class _BiasedReadings(FaultEffect):
     def __init__(self, bias: Bias) -> None:
         self._bias = bias
 
@@ -115,8 +111,8 @@ class Scale(Spec, Fault):
     factor: Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
     """Reported value over true value."""
 
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Scale each value or each odometry increment."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to scale each value or each odometry increment."""
         return _ScaledOdometry(self.factor) if setting.kind == "Odometry" else _ScaledReadings(self.factor)
 
 
@@ -129,7 +125,7 @@ class _ScaledOdometry(OdometryDistortion):
         return Twist(*(self._factor * value for value in step))
 
 
-class _ScaledReadings(Disturbance):
+class _ScaledReadings(FaultEffect):
     def __init__(self, factor: float) -> None:
         self._factor = factor
 
@@ -168,12 +164,8 @@ class Drift(Spec, Fault):
     gyro: AngularAcceleration = 0.0
     """Growth of the bias of the angular velocity about the vertical axis."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target and the reason, or None."""
-        return inapplicable_key(self, target)
-
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Begin with an error of zero."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start with an error of zero."""
         return _DriftingOdometry(self, setting) if setting.kind == "Odometry" else _DriftingValues(self, setting)
 
 
@@ -191,7 +183,7 @@ class _DriftingOdometry(OdometryDistortion):
         return drifted, self.increment(velocity)
 
 
-class _DriftingValues(Disturbance):
+class _DriftingValues(FaultEffect):
     def __init__(self, drift: Drift, setting: FaultSetting) -> None:
         self._drift, self._setting, self._start_tick = drift, setting, setting.now()
         self._start_pose: Pose2 | None = None
@@ -219,10 +211,10 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 class Extrinsic(Spec, Fault):
-    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated, and no node knows.
+    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated.
 
-    The error is the true pose of the sensor in the frame of its nominal pose. A lidar that is pitched down sees the
-    floor as a wall; an IMU that is tilted measures a part of gravity as forward acceleration.
+    The stack assumes the nominal pose. The error is the true pose of the sensor in the frame of its nominal pose. A
+    lidar that is pitched down sees the floor as a wall; a tilted IMU measures a part of gravity as acceleration.
 
     Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
     """
@@ -247,26 +239,25 @@ class Extrinsic(Spec, Fault):
     yaw: Angle = 0.0
     """Counterclockwise."""
 
-    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target and the reason, or None."""
-        return inapplicable_key(self, target)
-
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Measure from the wrong pose from now on."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to measure from the wrong pose."""
         return _WrongPose(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
 
 
-class _WrongPose(Disturbance):
+class _WrongPose(FaultEffect):
     def __init__(self, error: Pose3, setting: FaultSetting) -> None:
-        self._error, self._sight = error, setting.sight
+        self._error, self._simulator = error, setting.simulator
 
     def reading(self, reading: Reading) -> Reading | None:
         match reading:
-            case Scan() if self._sight is not None:
-                nominal, actual = self._sight.distances(reading), self._sight.distances(reading, self._error)
+            case Scan() if self._simulator is not None:
+                nominal, actual = (
+                    self._simulator.distances(reading),
+                    self._simulator.distances(reading, self._error),
+                )
                 return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
-            case Image() if self._sight is not None:
-                image = self._sight.image(self._error)
+            case Image() if self._simulator is not None:
+                image = self._simulator.image(self._error)
                 return replace(reading, rgb=image.rgb, depth=image.depth)
             case Imu(angular_velocity=angular, linear_acceleration=linear):
                 rotated = np.array([angular, linear]) @ self._error.rotation()

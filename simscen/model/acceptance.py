@@ -17,7 +17,7 @@ Confidence = Annotated[float, Field(ge=0.5, le=0.999999), Quantity("ratio")]
 
 
 class PassRate(Spec):
-    """Claim that the robot passes at least a share of all runs, and the statistical test that decides it.
+    """Claim that the robot passes at least the fraction `min` of all runs, and the statistical test of this claim.
 
     Example: `pass_rate: {min: 95 %, confidence: 95 %}`
     """
@@ -25,14 +25,14 @@ class PassRate(Spec):
     min: Rate
     """Lowest acceptable pass rate."""
     confidence: Confidence = 0.95
-    """Minimum probability that a robot with a lower pass rate is not accepted."""
+    """Minimum probability that a robot with a pass rate below `min` is not accepted."""
     method: Literal["fixed", "sprt", "anytime"] = "fixed"
     """`fixed`: all `runs`, then the exact Clopper-Pearson limits. `sprt`: the sequential probability ratio test between
     `min` and `target`, which stops as soon as it is decided. `anytime`: a confidence sequence, which may be evaluated
     after each run and stops as soon as it is decided."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
-    """Number of runs of `fixed`; for the others, the number after which they end undecided. Default: the fewest runs
-    that show the claim if all pass; for the others, 20 times as many."""
+    """Number of runs of `fixed`; for the other methods, the number after which the test ends undecided. Default: the
+    fewest runs that show the claim if all pass; for the other methods, 20 times as many."""
     target: Rate | None = None
     """Pass rate of a robot that should be accepted; only for `sprt`."""
     power: Confidence = 0.9
@@ -62,7 +62,7 @@ class PassRate(Spec):
 
 
 def fewest_runs(rate: float, confidence: float) -> int:
-    """Return the fewest runs that show the pass rate if all pass: 1 - `rate`^n >= `confidence`."""
+    """Return the smallest number n of runs that show the pass rate if all pass: 1 - `rate`^n >= `confidence`."""
     runs = math.ceil(math.log1p(-confidence) / math.log(rate) - 1e-9)
     return max(1, runs)
 

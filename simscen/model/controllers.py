@@ -1,10 +1,10 @@
-"""Specifications of the controllers, with Nav2's names, meanings, and defaults unless noted otherwise."""
+"""Specifications of controllers, goal checkers, and the progress checker; defaults are Nav2's unless noted."""
 
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.model.mppi import Mppi
+from simscen.model.mppi import Deceleration, Mppi
 from simscen.model.stack_base import ControllerSpec, GoalTolerances, PathFollowerSpec, Weight
 from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
 from simscen.spec.extensible_union import ExtensibleUnion
@@ -25,27 +25,26 @@ from simscen.spec.quantities import (
     Speed,
 )
 
-Deceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("acceleration")]
 SidewaysAcceleration = Annotated[float, Field(ge=0, le=1000), Quantity("acceleration")]
 SidewaysDeceleration = Annotated[float, Field(ge=-1000, le=0), Quantity("acceleration")]
 AngularDeceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("angular acceleration")]
 
 
 class RegulatedPurePursuit(Ranged, PathFollowerSpec):
-    """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
+    """Regulated pure pursuit controller (Macenski et al. 2023; nav2_regulated_pure_pursuit_controller)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
     type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
     desired_linear_vel: PositiveSpeed | None = None
-    """Maximum speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     lookahead_dist: PositiveLength = 0.6
-    """Distance to the plan point to follow if it does not scale with speed."""
+    """Lookahead distance, i.e. the distance to the carrot on the plan, if it does not scale with speed."""
     min_lookahead_dist: PositiveLength = 0.3
     """Minimum lookahead distance if it scales with speed."""
     max_lookahead_dist: PositiveLength = 0.9
     """Maximum lookahead distance if it scales with speed."""
     lookahead_time: PositiveDuration = 1.5
-    """Time for which the current speed is multiplied to get the lookahead distance."""
+    """Time by which the current speed is multiplied to get the lookahead distance."""
     use_velocity_scaled_lookahead_dist: bool = True
     """Whether the lookahead distance scales with speed."""
     use_fixed_curvature_lookahead: bool = False
@@ -53,7 +52,8 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     curvature_lookahead_dist: PositiveLength = 0.6
     """Distance to the point that defines the curvature."""
     interpolate_curvature_after_goal: bool = False
-    """Whether that point may be beyond the end of the plan, so that the robot approaches it straight."""
+    """Whether the point for the curvature may lie beyond the end of the plan, so that the robot approaches the end
+    straight."""
     rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
     """Turn rate when turning in place."""
     rotate_to_heading_min_angle: PositiveAngle = 0.785
@@ -67,7 +67,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     use_collision_detection: bool = True
     """Whether to stop if the command would lead to a collision."""
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
-    """Time for which commands are checked for collisions, at most up to the point that is followed."""
+    """Time for which commands are checked for collisions, at most up to the carrot."""
     min_slowed_speed: PositiveSpeed = 0.1
     """Speed to which a command that would lead to a collision is slowed down before the controller fails with
     NO_VALID_CONTROL. Nav2 fails at once."""
@@ -99,7 +99,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
 
     @property
     def lookahead_s(self) -> float:
-        """Time to collision that the controller keeps, in seconds."""
+        """Time in seconds for which commands are checked for collisions."""
         return self.max_allowed_time_to_collision_up_to_carrot
 
 
@@ -109,13 +109,13 @@ class DynamicWindow(PathFollowerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.dwb.controller:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
-    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum forward speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
     """Maximum backward speed, negative."""
     max_vel_y: NonNegativeSpeed | None = None
     """Maximum speed to the left; default: `max_vel_x` if the base can move sideways, otherwise 0."""
     min_vel_y: Annotated[Speed, Field(ge=-100, le=0)] | None = None
-    """Maximum speed to the right, negative; default: like that to the left."""
+    """Maximum speed to the right, negative; default: the same as to the left."""
     max_vel_theta: PositiveAngularSpeed = 1.0
     """Maximum turn rate."""
     min_speed_xy: NonNegativeSpeed = 0.0
@@ -198,36 +198,38 @@ CONTROLLERS = {
     "dwb": "simscen.model.controllers:DynamicWindow",
     "mppi": "simscen.model.mppi:Mppi",
 }
+"""Specifications of the shipped controllers as `module:Class`, by type."""
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
-    """Base class of goal checker specifications. Goals without tolerances have those of the goal checker."""
+    """Base class of goal checker specifications. A goal without its own tolerances has those of the goal checker."""
 
 
 class SimpleGoalChecker(GoalCheckerSpec):
-    """nav2_controller::SimpleGoalChecker."""
+    """Goal checker that compares position and heading with tolerances (nav2_controller::SimpleGoalChecker)."""
 
     component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
     """Whether only the heading counts once the position has been reached."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """Fraction of the tolerances within which a moving robot has reached the goal; a robot at rest may be anywhere
-    within them. Nav2: 1."""
+    """Fraction of the tolerances within which a moving robot has reached the goal. For a robot at rest, the full
+    tolerances apply. Nav2: 1."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]
 
 
 class ProgressChecker(Spec):
-    """nav2_controller::SimpleProgressChecker, or PoseProgressChecker if an angle is given."""
+    """Detects that the robot makes no progress (nav2_controller::SimpleProgressChecker or PoseProgressChecker)."""
 
     required_movement_radius: PositiveLength = 0.5
     """Distance that the robot must move within the time allowance."""
     required_movement_angle: PositiveAngle | None = None
-    """Angle that counts as progress, too, if the robot turns by it within the time allowance."""
+    """Angle of a turn that also counts as progress within the time allowance (PoseProgressChecker); default: none."""
     movement_time_allowance: PositiveDuration = 10.0
     """Time without progress after which driving fails with FAILED_TO_MAKE_PROGRESS."""
 
 
 GOAL_CHECKERS = {"simple": "simscen.model.controllers:SimpleGoalChecker"}
+"""Specifications of the shipped goal checkers as `module:Class`, by type."""

@@ -1,17 +1,11 @@
-"""Specifications of the two costmaps (nav2_costmap_2d)."""
+"""Specifications of the global and the local costmap (nav2_costmap_2d)."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from simscen.spec.base import Ranged, Spec, by_default
-from simscen.spec.quantities import (
-    Frequency,
-    NonNegativeAngle,
-    NonNegativeLength,
-    PositiveLength,
-    Quantity,
-)
+from simscen.spec.quantities import Frequency, NonNegativeAngle, NonNegativeLength, PositiveLength, Quantity
 
 PublishFrequency = Annotated[float, Field(ge=0, le=1000), Quantity("frequency")]
 
@@ -39,12 +33,11 @@ class Costmap(Ranged):
     update_frequency: Frequency = 5.0
     """Rate of the updates with sensor data."""
     publish_frequency: PublishFrequency = 0.5
-    """Maximum rate at which the costmap is written to the log, if it has changed; lower for large costmaps. 0 = never
+    """Maximum rate at which a changed costmap is written to the log. Large costmaps are written less often. 0 = never
     (Nav2: 1 Hz)."""
     lethal_cost_threshold: Annotated[int, Field(ge=1, le=100)] = 65
-    """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). All values mean the same on a
-    map of the mode `trinary`, whose cells are free or occupied; cells of the modes `scale` and `raw` may be in between.
-    """
+    """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). Only matters for maps of the modes
+    `scale` and `raw`, since the cells of the mode `trinary` are either free or occupied."""
     obstacle_max_range: PositiveLength = 2.5
     """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength = 0.0
@@ -61,11 +54,11 @@ class Costmap(Ranged):
     max_obstacle_height: NonNegativeLength = 2.0
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
-    """Whether beams without a hit clear the cells that they pass. In Nav2, they are ignored by default."""
+    """Whether beams without a hit clear the cells that they pass. In Nav2, such beams are ignored by default."""
     denoise_layer: DenoiseLayer = by_default()
     """Removal of small obstacles."""
     track_unknown_space: bool = True
-    """Whether cells that neither the map nor a beam shows are unknown; otherwise they are free."""
+    """Whether cells that neither the map nor a beam shows are unknown; otherwise such cells are free."""
     rolling_size: PositiveLength = 24.0
     """Edge length of the rolling window if the robot has no map."""
 
@@ -73,14 +66,13 @@ class Costmap(Ranged):
 class LocalCostmap(Spec):
     """Local costmap in the odom frame, which rolls with the robot, for controllers and recovery behaviors.
 
-    It contains sensor data and keepout zones, but not the map. Parameters without a value have that of `costmap`.
+    It contains sensor data and keepout zones, but not the map. Parameters without a value have the value of `costmap`.
     """
 
     width: PositiveLength | None = None
-    """Size along x of the odom frame; default: the distance that the controller looks ahead at full speed, at least 3
-    m."""
+    """Size along x of the odom frame; default: 3 m, or more if the controller looks farther ahead at full speed."""
     height: PositiveLength | None = None
-    """Size along y of the odom frame; default: like the width."""
+    """Size along y of the odom frame; the default is that of `width`."""
     resolution: PositiveLength | None = None
     """Edge length of a cell."""
     inflation_radius: NonNegativeLength | None = None
@@ -112,7 +104,7 @@ class LocalCostmap(Spec):
     track_unknown_space: bool = False
     """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
-    def completed(self, shared: Costmap) -> Costmap:
-        """Return the complete parameters; those without a value are taken from `shared`."""
+    def with_defaults_from(self, shared: Costmap) -> Costmap:
+        """Return the complete parameters; parameters without a value are taken from `shared`."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)

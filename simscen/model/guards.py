@@ -29,7 +29,7 @@ class VelocitySmoother(Spec):
     max_decel: PositiveAcceleration | None = None
     """Maximum deceleration; default: the limit of the robot."""
     max_velocity: PositiveSpeed | None = None
-    """Maximum of each velocity component; default: unlimited."""
+    """Maximum of each linear velocity component; default: unlimited."""
     max_angular_velocity: PositiveAngularSpeed | None = None
     """Maximum turn rate; default: unlimited."""
     counter_turn_slip: bool = False
@@ -69,7 +69,7 @@ class Prediction(Ranged):
     max_radius: PositiveLength = 1.0
     """Maximum radius of tracked objects; larger ones are static."""
     min_speed: PositiveSpeed = 0.25
-    """Minimum speed; slower objects are static."""
+    """Minimum speed of tracked objects; slower ones are static."""
     acceleration: PositiveAcceleration = 1.5
     """Standard deviation of the acceleration of a tracked object."""
     margin: NonNegativeLength = 0.15

@@ -1,4 +1,4 @@
-"""Parameters of the localizers, with Nav2's names and default values."""
+"""Specifications of the localizers and of the odometry filter, with Nav2's names and default values."""
 
 import math
 from collections.abc import Mapping
@@ -26,15 +26,18 @@ class LocalizerSpec(Typed):
     """Base class of localizer specifications."""
 
     fuses_odometry: ClassVar[bool] = False
-    """Whether the pose never jumps, so that it also defines the odom frame, as odom→base of robot_localization does."""
+    """Whether the localizer fuses odometry and IMU. Its pose never jumps, so it also defines the odom frame."""
     needs_map: ClassVar[bool] = False
-    """Whether the localizer is only dead reckoning without a map."""
+    """Whether the localizer needs a map for more than dead reckoning."""
     precomputation: ClassVar[str] = ""
-    """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; optional."""
+    """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; "" = none."""
 
 
 class AmclParameters(Ranged, LocalizerSpec):
-    """Parameters of nav2_amcl, with its names and, except for `laser_model_type`, its default values."""
+    """Base class of particle filters, with the parameters of nav2_amcl.
+
+    All default values except that of `laser_model_type` are those of nav2_amcl.
+    """
 
     needs_map: ClassVar[bool] = True
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ("laser_max_range",)
@@ -57,7 +60,7 @@ class AmclParameters(Ranged, LocalizerSpec):
     pf_err: Annotated[float, Field(gt=0, lt=1), Quantity("ratio")] = 0.05
     """KLD sampling: maximum distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
-    """KLD sampling: upper quantile of the standard normal distribution, used as it is, as in Nav2."""
+    """KLD sampling: upper quantile z of the standard normal distribution; not a probability, as in Nav2."""
     update_min_d: NonNegativeLength = 0.25
     """Distance that the robot must move before the next filter update."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
@@ -72,7 +75,7 @@ class AmclParameters(Ranged, LocalizerSpec):
     z_hit: Probability = 0.5
     """Weight of beams that end at an obstacle of the map."""
     z_short: Probability = 0.05
-    """Weight of beams that end before it; `beam` model only."""
+    """Weight of beams that end before an obstacle of the map; `beam` model only."""
     z_max: Probability = 0.05
     """Weight of beams that measure the maximum range; `beam` model only."""
     z_rand: Probability = 0.5
@@ -92,19 +95,19 @@ class AmclParameters(Ranged, LocalizerSpec):
     recovery_alpha_fast: Probability = 0.0
     """Decay rate of the fast average of weights, which decides when to add random particles; 0 = never."""
     selective_resampling: bool = False
-    """Resample only when the effective number of particles is below half of them."""
+    """Whether to resample only if the effective number of particles is below half of their number."""
     do_beamskip: bool = False
-    """Skip beams that fit hardly any particle once the filter has converged; `likelihood_field_prob` only."""
+    """Whether to skip beams that fit few particles once the filter has converged; `likelihood_field_prob` only."""
     beam_skip_distance: PositiveLength = 0.5
     """A beam fits a particle if it ends this near to an obstacle of the map."""
     beam_skip_threshold: Probability = 0.3
-    """Beams that fit a smaller share of the particles are skipped."""
+    """Beams that fit a smaller fraction of the particles are skipped."""
     beam_skip_error_threshold: Probability = 0.9
-    """If this share of the beams would be skipped, none is, because the pose must be wrong."""
+    """If at least this fraction of the beams would be skipped, none is skipped, because the pose must be wrong."""
 
     @property
-    def farthest(self) -> float:
-        """Maximum range in m that is used, if the lidar's own is not less; infinite for the lidar's own."""
+    def max_used_range(self) -> float:
+        """`laser_max_range` in m, or infinity if only the lidar's own maximum applies."""
         return self.laser_max_range if self.laser_max_range > 0.0 else math.inf
 
 
@@ -127,7 +130,7 @@ class Amcl(AmclParameters):
 
 
 class EkfParameters(LocalizerSpec):
-    """Noise of wheel odometry and gyroscope."""
+    """Base class of Kalman filters that fuse wheel odometry and gyroscope, with the noise of both."""
 
     fuses_odometry: ClassVar[bool] = True
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
@@ -150,7 +153,7 @@ class Ekf(EkfParameters):
 
 
 class GroundTruth(LocalizerSpec):
-    """The true pose, to separate faults of localization from faults of navigation."""
+    """The true pose as the belief, to separate faults of localization from faults of navigation."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]
@@ -188,29 +191,30 @@ LOCALIZERS = {
     "scan_matching_amcl": "simscen.advanced.spec:ScanMatchingAmcl",
     "slip_ekf": "simscen.advanced.spec:SlipEkf",
 }
+"""Specifications of the shipped localizers as `module:Class`, by type."""
 
 
 Variance = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class OdometryFilter(Spec):
-    """Source of the transform from odom to base, as robot_localization's ekf_node sets it up for Nav2.
+    """Source of the transform from odom to base. The default is an EKF, like robot_localization's ekf_node in Nav2.
 
-    Robots without an IMU use the wheel odometry as it is; so do the localizers that fuse both themselves (`ekf` and
-    `slip_ekf`).
+    The EKF is not used on robots without an IMU, whose wheel odometry is used as it is, nor with the localizers `ekf`
+    and `slip_ekf`, which fuse wheel odometry and IMU themselves.
     """
 
     type: Literal["ekf", "wheel"] = "ekf"
     """`ekf`: an extended Kalman filter of wheel odometry and the yaw rate of the IMU. `wheel`: wheel odometry alone."""
     frequency: Frequency = 30.0
-    """Largest rate of the updates. An update uses the motion and the turn since the last one, so nothing is lost. With
-    wheel odometry at 40 Hz, every second reading causes an update."""
+    """Maximum rate of the updates. An update uses all motion since the previous update, so nothing is lost. With wheel
+    odometry at 40 Hz, every second reading causes an update."""
     process_noise_covariance: Annotated[list[Variance], Field(min_length=3, max_length=3)] = [10.0, 10.0, 10.0]
     """Variances by which vx, vy (m²/s²) and the yaw rate (rad²/s²) may change within one second. The diagonal of
     robot_localization's matrix; its other entries do not apply."""
     odom0_twist_rejection_threshold: Annotated[float, Field(gt=0, le=1e6)] = 5.0
     """The yaw rate of the wheels is not used while it differs from that of the gyroscope by more than this number of
-    standard deviations: wheels slip in turns."""
+    standard deviations, because wheels slip in turns."""
     gyro_bias: NonNegativeAngularSpeed = 0.0005
     """Standard deviation of the bias of the gyroscope, which is estimated; 0 = no bias, as in robot_localization."""
     gyro_bias_walk: NonNegativeAngularSpeed = 0.00001

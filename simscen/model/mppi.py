@@ -23,9 +23,9 @@ from simscen.spec.quantities import (
     Speed,
 )
 
-Power = Annotated[int, Field(ge=1, le=10)]
-Points = Annotated[int, Field(ge=0, le=1000)]
-Every = Annotated[int, Field(ge=1, le=100)]
+Exponent = Annotated[int, Field(ge=1, le=10)]
+PointCount = Annotated[int, Field(ge=0, le=1000)]
+PoseStep = Annotated[int, Field(ge=1, le=100)]
 Deceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("acceleration")]
 CriticName = Literal[
     "ConstraintCritic",
@@ -47,7 +47,7 @@ class MppiCritic(Spec):
 
     enabled: bool = True
     """Whether to use the critic."""
-    cost_power: Power = 1
+    cost_power: Exponent = 1
     """Exponent of the cost."""
 
 
@@ -73,7 +73,7 @@ class MppiCostCritic(MppiCritic):
     """Whether to check the whole footprint instead of its inscribed circle; default: true (Nav2: false)."""
     near_goal_distance: NonNegativeLength = 1.0
     """Distance from the end of the plan within which only critical costs count."""
-    trajectory_point_step: Every = 2
+    trajectory_point_step: PoseStep = 2
     """Step between the poses of a trajectory that are checked."""
 
 
@@ -121,11 +121,11 @@ class MppiPathAlignCritic(MppiCritic):
     """Weight of the mean distance in meters."""
     max_path_occupancy_ratio: Annotated[float, Field(ge=0, le=1), Quantity("ratio")] = 0.05
     """Fraction of the plan that may be blocked; the critic is inactive if more is."""
-    trajectory_point_step: Every = 4
+    trajectory_point_step: PoseStep = 4
     """Step between the poses of a trajectory that are checked."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
-    offset_from_furthest: Points = 20
+    offset_from_furthest: PointCount = 20
     """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active, so that a robot can
     turn toward the plan first."""
     use_path_orientations: bool = False
@@ -138,7 +138,7 @@ class MppiPathFollowCritic(MppiCritic):
 
     cost_weight: Weight = 5.0
     """Weight of the distance in meters."""
-    offset_from_furthest: Points = 5
+    offset_from_furthest: PointCount = 5
     """Number of plan points, 5 cm apart, beyond the furthest point reached; blocked points are skipped."""
     threshold_to_consider: NonNegativeLength = 1.4
     """Distance from the end of the plan within which the critic is inactive."""
@@ -149,13 +149,13 @@ class MppiPathAngleCritic(MppiCritic):
 
     cost_weight: Weight = 2.0
     """Weight of the angle in rad."""
-    offset_from_furthest: Points = 4
+    offset_from_furthest: PointCount = 4
     """Number of plan points beyond the furthest point that any trajectory reaches, to the point that defines the
     direction."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
     max_angle_to_furthest: NonNegativeAngle = 1.0
-    """Angle to that point within which the critic is inactive."""
+    """Angle to the point that defines the direction within which the critic is inactive."""
     mode: Annotated[int, Field(ge=0, le=2)] = 0
     """0: forward driving is preferred; 1: forward and backward driving are equal; 2: the orientations of the plan
     decide."""
@@ -215,11 +215,11 @@ class Mppi(PathFollowerSpec):
     iteration_count: Annotated[int, Field(ge=1, le=20)] = 1
     """Number of optimization iterations per command."""
     vx_max: PositiveSpeed | None = None
-    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum forward speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
     """Maximum backward speed, negative."""
     vy_max: NonNegativeSpeed | None = None
-    """Maximum sideways speed of the Omni model; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum sideways speed of the Omni model; default: 0.5 m/s, or the limit of the robot if that is lower."""
     wz_max: PositiveAngularSpeed = 1.9
     """Maximum turn rate."""
     ax_max: PositiveAcceleration | None = None
@@ -254,7 +254,8 @@ class Mppi(PathFollowerSpec):
     """Time for which the command itself must be free of collisions; otherwise it is slowed down. Nav2 has no such
     check."""
     min_slowed_speed: PositiveSpeed = 0.1
-    """Speed to which such a command is slowed down before the controller fails with NO_VALID_CONTROL."""
+    """Speed to which a command that would lead to a collision is slowed down before the controller fails with
+    NO_VALID_CONTROL."""
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1
@@ -262,7 +263,7 @@ class Mppi(PathFollowerSpec):
     open_loop: bool = False
     """Whether to use the last command instead of the measured velocity."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
-    """Order of the Savitzky-Golay filter that smooths commands: 2 preserves bends, 1 is the mean of nine commands."""
+    """Order of the Savitzky-Golay filter that smooths commands: 2 keeps bends, 1 is the mean of nine commands."""
     critics: Annotated[list[CriticName], Field(min_length=1, max_length=11)] | None = None
     """Critics to use; default: as in Nav2, all except ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic
     only with the Omni model."""
@@ -293,5 +294,5 @@ class Mppi(PathFollowerSpec):
 
     @property
     def lookahead_s(self) -> float:
-        """Duration of a sample in seconds."""
+        """Duration of a sampled trajectory in seconds."""
         return self.time_steps * self.model_dt

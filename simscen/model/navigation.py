@@ -1,4 +1,4 @@
-"""Specification of how goals are sent to a robot, with the names of Nav2's actions, and of their expected outcomes."""
+"""Specifications around goals: the navigation action that sends them, their expected outcome, and waiting at them."""
 
 from typing import Annotated, Any, Literal
 
@@ -27,19 +27,20 @@ class Navigation(Spec):
     RemovePassedGoals. A goal's own `xy_tolerance` takes precedence."""
 
 
-def _text_or_mapping(value: Any) -> str:
+def text_or_mapping(value: Any) -> str:
+    """Return the tag of a value in a union of a text and a mapping."""
     return "text" if isinstance(value, str) else "mapping"
 
 
 Expectation = Annotated[
     Annotated[Literal["succeeded", "failed"], Tag("text")]
     | Annotated[Spec, LazySpec("simscen.criteria.error_codes", "ExpectedError"), Tag("mapping")],
-    Discriminator(_text_or_mapping),
+    Discriminator(text_or_mapping),
 ]
 
 
 def expected_failure_name(expected: "Expectation") -> str:
-    """Return the expected failure: "failed", or the name of an error code, or "" if the goal should succeed."""
+    """Return "failed" or the name of the expected error code, or "" if the goal should succeed."""
     code = getattr(expected, "error_code", None)
     if code is not None:
         return str(code.name)

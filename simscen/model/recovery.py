@@ -1,4 +1,4 @@
-"""Specifications of recovery behaviors, which run after planning or control failed (Nav2's default behavior tree)."""
+"""Specifications of recovery behaviors, which run after planning or control has failed, as in Nav2."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -74,7 +74,7 @@ class BackUp(BehaviorSpec):
     backup_dist: NonNegativeLength = 0.30
     """Distance to back up."""
     backup_speed: PositiveSpeed = 0.15
-    """Speed."""
+    """Speed of backing up."""
     simulate_ahead_time: Duration = 2.0
     """Time for which the motion is checked for collisions; 0 = no check."""
     time_allowance: PositiveDuration = 10.0
@@ -96,7 +96,7 @@ class Retrace(BehaviorSpec):
     retrace_dist: NonNegativeLength = 1.0
     """Maximum distance to drive back. After `backup_dist`, the behavior ends once there is room to turn in place."""
     backup_speed: PositiveSpeed = 0.15
-    """Speed."""
+    """Speed of driving back."""
     time_allowance: PositiveDuration = 10.0
     """Time after which the behavior fails with BACKUP_TIMEOUT. It is extended to 1.5 times the duration of driving
     `retrace_dist` at `backup_speed` if that is longer."""
@@ -131,13 +131,13 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrPara
 
 
 class Recovery(Spec):
-    """Recovery behaviors, which run in turn after planning or control failed (Nav2's default behavior tree)."""
+    """Recovery behaviors, which run in turn after planning or control has failed (Nav2's default behavior tree)."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """Number of retries before the goal fails."""
     retries_since_progress: bool = False
-    """Whether to restart the count, and the list of behaviors, once the robot is one meter nearer to its goal than at
-    any earlier recovery. Nav2 counts all retries of a goal."""
+    """Whether the count of retries and the list of behaviors start again once the robot is one meter nearer to its goal
+    than at any earlier recovery. Nav2 counts all retries of a goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "PLANNER_TIMEOUT",
@@ -146,12 +146,7 @@ class Recovery(Spec):
     """Planner errors that start recovery; after others, the goal fails immediately. In Nav2, the condition
     WouldAPlannerRecoveryHelp decides this. The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and
     GOAL_OCCUPIED."""
-    behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
-        "clear_costmap",
-        "spin",
-        "wait",
-        "backup",
-    ]
+    behaviors: Annotated[list[Behavior], Field(max_length=20)] = ["clear_costmap", "spin", "wait", "backup"]
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
     """Whether `clear_costmap`, and each retry after a planner error, clears the entire global costmap, as in Nav2. With
@@ -187,8 +182,8 @@ class Recovery(Spec):
         """Names of the behaviors in order."""
         return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
-    def chosen(self) -> list[BehaviorSpec]:
-        """Return the behaviors in order; parameters that they do not set have the values given here."""
+    def behavior_specs(self) -> list[BehaviorSpec]:
+        """Return the behaviors in order; parameters that a behavior does not set have the values of this section."""
         return [self._with_shared_parameters(entry) for entry in self.behaviors]
 
     def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
@@ -207,11 +202,5 @@ _SHIPPED: dict[str, type[BehaviorSpec]] = {
 }
 
 
-_MODULE = "simscen.model.recovery:"
-BEHAVIORS = {
-    "clear_costmap": _MODULE + "ClearCostmap",
-    "spin": _MODULE + "Spin",
-    "wait": _MODULE + "Wait",
-    "backup": _MODULE + "BackUp",
-    "retrace": _MODULE + "Retrace",
-}
+BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}
+"""Specifications of the shipped behaviors as `module:Class`, by type."""

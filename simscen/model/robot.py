@@ -146,9 +146,9 @@ class Limits(Spec):
     linear: PositiveSpeed
     """Maximum forward speed."""
     reverse: PositiveSpeed | None = None
-    """Maximum backward speed; default: that of forward motion."""
+    """Maximum backward speed; default: `linear`."""
     lateral: PositiveSpeed | None = None
-    """Maximum sideways speed of an omnidirectional or mecanum base; default: that of forward motion."""
+    """Maximum sideways speed of an omnidirectional or mecanum base; default: `linear`."""
     angular: PositiveAngularSpeed
     """Maximum turn rate in both directions."""
     linear_acceleration: PositiveAcceleration
@@ -200,7 +200,7 @@ class SensorSpec(Component):
     rate: Frequency = 10.0
     """Rate of the readings."""
     latency: Duration = 0.0
-    """Delay from the moment that a reading shows until the stack receives it: exposure, sweep, driver, and bus."""
+    """Delay between the time stamp of a reading and its arrival at the stack: exposure, sweep, driver, and bus."""
 
     @classmethod
     def definition_problem(cls) -> str:
@@ -325,7 +325,7 @@ class Sensor(Choice):
 
     @property
     def may_render(self) -> bool:
-        """Whether the sensor may use the renderer; sensors of installed packages may do so whatever they report."""
+        """Whether the sensor may need the renderer: cameras do, and sensors of installed packages may."""
         return self.original_class is not None or self.reading_type == "Image"
 
 
@@ -380,7 +380,7 @@ class RobotSpec(Spec):
 
     @property
     def has_imu(self) -> bool:
-        """Whether it has an IMU."""
+        """Whether the robot has an IMU."""
         return any(sensor.reading_type == "Imu" for sensor in self.sensors.values())
 
     @model_validator(mode="after")

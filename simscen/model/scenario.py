@@ -1,4 +1,4 @@
-"""Specification of scenarios (`*.scenario.yaml`)."""
+"""Specification of scenarios (`*.scenario.yaml`): world, robots, goals, disturbances, and pass criteria."""
 
 from itertools import count
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -10,9 +10,9 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.verdict import ExpectedFailure as DeclaredFailure
 from simscen.criteria.registry import AnyCriterion
-from simscen.model.navigation import Expectation, Navigation, OnReached
+from simscen.model.navigation import Expectation, Navigation, OnReached, text_or_mapping
 from simscen.model.stack_files import AnyStack
-from simscen.model.world import WorldSpec
+from simscen.model.world import FilePath, WorldSpec
 from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default
 from simscen.spec.places import (
     Name,
@@ -51,15 +51,10 @@ else:
     Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]
 
 
-def _text_or_mapping(value: Any) -> str:
-    return "text" if isinstance(value, str) else "mapping"
-
-
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 WorldOrFile = Annotated[
     Annotated[FilePath, Tag("text")]
     | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("mapping")],
-    Discriminator(_text_or_mapping),
+    Discriminator(text_or_mapping),
 ]
 
 
@@ -75,7 +70,7 @@ class InitialEstimate(PoseSpec):
 
 
 class EstimateOrPlace(PlaceAllowed):
-    """Annotation of an initial estimate that can also be given as the name of a place."""
+    """Annotation of an initial estimate in a file, which can also be given as the name of a place."""
 
     def value_at(self, pose: PoseSpec) -> InitialEstimate:
         """Return an estimate at the pose of the place with the default standard deviations."""
@@ -91,7 +86,7 @@ else:
 
 
 class Payload(Spec):
-    """Load on the robot that is unknown to its stack and not included in its robot file."""
+    """Load on the robot that its robot file does not include and that its stack does not know."""
 
     mass: PositiveMass
     """Mass in kg."""
@@ -177,7 +172,7 @@ Reason = Annotated[str, Field(max_length=500), AfterValidator(_check_reason)]
 
 
 class ExpectedFailure(Spec):
-    """Failure that is known: the run counts as expected while it fails, and as a failure as soon as it passes.
+    """Known failure: a run that fails counts as failed-as-expected, and a run that passes counts as a failure.
 
     Example: `expected: {fail: "the planner hugs corners, NAV-123", criteria: [clearance]}`
     """
@@ -197,7 +192,8 @@ class ExpectedFailure(Spec):
 
 
 MIN_TRUTH_RATE_HZ = 20.0
-"""Lowest rate at which short violations are not missed between two samples and `smoothness` (SPARC) has a value."""
+"""Lowest rate of the truth: at lower rates, criteria could miss violations between two samples, and `smoothness`
+(SPARC) has no value."""
 
 
 class Physics(Spec):
@@ -263,7 +259,7 @@ class ScenarioSpec(Spec):
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_check_unique)] = []
     """Additional metrics of types that installed packages add."""
     expected: ExpectedFailure | None = None
-    """Declaration, with a reason, that the run is known to fail. A run that is aborted is still an error."""
+    """Known failure of the run, with a reason. An aborted run is still an error."""
     skip: Reason | None = None
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
@@ -274,13 +270,13 @@ class ScenarioSpec(Spec):
 
     @property
     def only_robot(self) -> RobotEntry:
-        """The only robot of the scenario."""
+        """The robot of a scenario with a single robot; raises AssertionError otherwise."""
         assert self.robot is not None
         return self.robot
 
     @property
     def steps(self) -> "list[SequenceStep]":
-        """All events and, after each event, the steps of its sequence."""
+        """All steps of the events in order; see `steps_of`."""
         from simscen.model.disturbances import steps_of
 
         return steps_of(self.events)
@@ -319,12 +315,12 @@ def initial_estimate(entry: RobotEntry, truth: Pose2) -> Estimate:
 
 
 def expected_failure(spec: ScenarioSpec) -> DeclaredFailure | None:
-    """Return the known failure that a scenario declares, or None."""
+    """Return the known failure that a scenario declares as `expected`, or None."""
     return None if spec.expected is None else DeclaredFailure(spec.expected.fail, tuple(spec.expected.criteria))
 
 
 class CriteriaSpec(ScenarioSpec):
-    """Scenario in which only `pass` is required: enough to evaluate an existing log."""
+    """Scenario whose `world` and `robot` are optional: enough to evaluate an existing log by the criteria in `pass`."""
 
     simscen: LanguageVersion = 1
     """Version of the scenario language."""

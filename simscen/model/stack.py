@@ -1,4 +1,4 @@
-"""Specification of the navigation stack, with Nav2's parameter names and defaults."""
+"""Specification of simscen's navigation stack, with Nav2's parameter names, and the profiles of default values."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -13,15 +13,13 @@ from simscen.model.planners import Planner
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
 from simscen.spec.base import Typed, by_default
-from simscen.spec.quantities import (
-    Quantity,
-)
+from simscen.spec.quantities import Quantity
 
 Profile = Literal["reference", "advanced", "nav2", "simscen"]
 Values = Mapping[str, Any]
 
 SECTIONS_BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
-"""Sections whose parameters depend on `type`. In the profiles, the first type is the default."""
+"""Sections whose parameters depend on `type`. In a profile, they have parameters by type; the first is the default."""
 _COSTMAP: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
     "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
@@ -71,6 +69,7 @@ NAV2: Values = {
         "source_timeout": 1.0, "time_before_collision": 1.2, "stop_margin": 0.0, "min_points": 6, "hold_timeout": 0.0,
     },
 }  # fmt: skip
+"""Parameters of the profile `nav2`, by section."""
 _CAUTIOUS: Values = {"cautious": True}
 ADVANCED: Values = {
     "localizer": {"scan_matching_amcl": {}},
@@ -92,11 +91,12 @@ ADVANCED: Values = {
     "velocity_smoother": {"counter_turn_slip": True},
     "prediction": {"enabled": True},
 }  # fmt: skip
+"""Parameters of the profile `advanced`, by section, that differ from the defaults."""
 PROFILES: Mapping[str, Values] = {"reference": {}, "advanced": ADVANCED, "nav2": NAV2, "simscen": ADVANCED}
 
 
 def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the parameters of a stack, with missing ones from the profile that it names."""
+    """Return the parameters of a stack, completed by those of its `profile`."""
     profile = PROFILES.get(str(parameters.get("profile", "reference")), {})
     sections = {name: _complete_section(name, values, parameters.get(name)) for name, values in profile.items()}
     return {**parameters, **sections}
@@ -126,24 +126,17 @@ def merge_parameters(defaults: Mapping[str, Any], parameters: Mapping[str, Any])
     return merged
 
 
-FailureTolerance = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
-
-
 ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
-_LatencyOrRobots = Annotated[
+_LatencyOrRobot = Annotated[
     Annotated[Literal["robot"], Tag("a name")] | Annotated[Latency, Tag("durations")],
     Discriminator(lambda value: "a name" if isinstance(value, str) else "durations"),
 ]
-
-
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
 
 
 class InProcessStack(StackBase, Typed):
-    """Stack in the process of the run: the one of simscen, or one of an installed package."""
+    """Base class of the specifications of stacks that run in the process of the simulation."""
 
 
 class StackSpec(InProcessStack):
@@ -168,7 +161,7 @@ class StackSpec(InProcessStack):
     """Planner of the global path."""
     controller: Controller = by_default()
     """Controller that follows the path."""
-    failure_tolerance: FailureTolerance = 0.3
+    failure_tolerance: Annotated[float, Field(ge=-1, le=86400), Quantity("duration")] = 0.3
     """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED; 0: it fails immediately
     with NO_VALID_CONTROL; -1: it never fails."""
     goal_checker: GoalChecker = by_default()
@@ -178,10 +171,10 @@ class StackSpec(InProcessStack):
     recovery: Recovery = by_default()
     """Recovery behaviors after planning or control failed."""
     velocity_smoother: VelocitySmoother = by_default()
-    """Limits of the acceleration of commands."""
+    """Limits of the acceleration and velocity of commands."""
     collision_monitor: CollisionMonitor = by_default()
     """Monitor that stops or slows the robot before a collision."""
-    latency: _LatencyOrRobots = by_default()
+    latency: _LatencyOrRobot = by_default()
     """Computing times of the stack, or `robot` for those of the robot file, which include the delays of its sensors."""
     prediction: Prediction = by_default()
     """Prediction of moving obstacles."""
@@ -194,7 +187,7 @@ class StackSpec(InProcessStack):
 
     @property
     def builder(self) -> str:
-        """Class that builds the stack as `module:Class`: that of the advanced stack if any parameter needs it."""
+        """Builder of the stack, as `module:Class`; that of the advanced stack if any parameter needs it."""
         is_advanced = (
             self.prediction.enabled
             or self.planner.cautious
@@ -204,7 +197,7 @@ class StackSpec(InProcessStack):
         return ADVANCED_BUILDER if is_advanced else REFERENCE_BUILDER
 
     def filters_odometry(self, has_imu: bool) -> bool:
-        """Return whether wheel odometry and IMU are fused by the odometry filter."""
+        """Return whether the odometry filter fuses wheel odometry and IMU."""
         return self.odometry.type == "ekf" and has_imu and not self.localizer.fuses_odometry
 
     @property
@@ -214,3 +207,4 @@ class StackSpec(InProcessStack):
 
 
 STACKS = {"reference": "simscen.model.stack:StackSpec"}
+"""Specifications of the shipped stacks as `module:Class`, by type."""

@@ -1,4 +1,4 @@
-"""Base class of all stack specifications: the parameters that the simulation and the criteria use."""
+"""Base classes of the specifications of stacks and controllers, and the latencies of stacks and robots."""
 
 from typing import Annotated
 
@@ -10,7 +10,7 @@ from simscen.spec.quantities import Duration, Frequency, PositiveAngle, Positive
 
 
 class GoalTolerances(Spec):
-    """Tolerances of goals that do not have their own, for the stack and for criteria."""
+    """Tolerances of goals that do not have their own, used by the stack and by criteria."""
 
     xy_goal_tolerance: PositiveLength = 0.25
     """Distance from the goal within which the goal counts as reached."""
@@ -28,7 +28,7 @@ class SpeedZone(Spec):
 
 
 class StackBase(Spec):
-    """Parameters of every stack."""
+    """Base class of stack specifications: the parameters that the simulation and the criteria use."""
 
     controller_frequency: Frequency = 20.0
     """Rate at which the stack computes commands."""
@@ -59,12 +59,12 @@ class ControllerSpec(Typed):
 
     @property
     def lookahead_s(self) -> float:
-        """Time horizon of the commands in seconds. The size of the local costmap follows from it."""
+        """Time in seconds that the controller looks ahead. The default size of the local costmap follows from it."""
         return 2.0
 
 
 class PathFollowerSpec(ControllerSpec):
-    """Base class of the specifications of the shipped controllers."""
+    """Base class of the specifications of the shipped controllers, which follow a path."""
 
     goal_tolerance_ratio: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.45
     """Fraction of the goal's `xy_goal_tolerance` at which the position counts as reached, and the robot turns to the
@@ -72,7 +72,7 @@ class PathFollowerSpec(ControllerSpec):
     centimeter makes it report a false success."""
     max_robot_pose_search_dist: PositiveLength = 1.5
     """Distance along the plan, beyond the previous nearest point, in which the point nearest to the robot is searched
-    (Nav2: half the size of the local costmap). The limit makes the robot follow a plan that crosses itself in order."""
+    (Nav2: half the size of the local costmap). Without this limit, the robot could skip a loop of the plan."""
 
 
 class Latency(Spec):
@@ -97,7 +97,7 @@ class Latency(Spec):
 class RobotLatency(Latency):
     """Computing times on the robot's usual computer, and usual delays of its sensors.
 
-    Used by scenarios with `stack: {latency: robot}`.
+    They apply to scenarios with `stack: {latency: robot}`.
     """
 
     sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}

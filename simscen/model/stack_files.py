@@ -1,4 +1,4 @@
-"""Specifications of stacks: the stack of a scenario, stack files (`--stack NAME=FILE`), and the user configuration."""
+"""Specifications of external stacks, of stack files (`--stack NAME=FILE`), and of the user configuration."""
 
 from typing import Annotated, Any
 
@@ -13,7 +13,7 @@ from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
 _TAG = "an external stack"
-"""Tag of external stacks in validation errors; not a valid key, so that it differs from all keys of a stack."""
+"""Tag of external stacks in validation errors. It contains spaces, so that it differs from all types of stacks."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 
@@ -21,8 +21,8 @@ class ExternalStackSpec(StackBase):
     """Stack in a separate process, in any language, in lockstep with the simulation.
 
     A scenario contains only the name. The command that starts the process is given on the command line (`--stack
-    mine='COMMAND'`) or in the user configuration, so that scenarios contain no code. With several robots, each has its
-    own process.
+    mine='COMMAND'`) or in the user configuration, so that scenarios contain no code. With several robots, each robot
+    has its own process.
 
     Example: `stack: {external: mine, controller_frequency: 10 Hz}`
     """
@@ -39,7 +39,7 @@ class ExternalStackSpec(StackBase):
 
 
 def _kind(value: Any) -> str:
-    """Return the tag of the specification of a stack: external, or its `type`."""
+    """Return the tag of a stack specification: its `type`, or `_TAG` if it is external."""
     if isinstance(value, dict):
         return _TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
     return _TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
@@ -54,9 +54,8 @@ AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack"
 class StackFileSpec(Spec):
     """Stack for `--stack NAME=FILE`, with the same `stack` section as a scenario.
 
-    Parameters that it does not set have their default values, whatever the scenarios say. Only parameters that every
-    stack has come from the scenario: keepout regions, speed zones, filter masks, and goal tolerances if the scenario
-    sets them.
+    Parameters that the file does not set have their default values, not those of the scenarios. Exceptions are keepout
+    regions, speed zones, filter masks, and goal tolerances, which come from the scenario if it sets them.
     """
 
     simscen: LanguageVersion

@@ -1,4 +1,4 @@
-"""Specification of variations: one scenario with many values (`variations:`)."""
+"""Specification of variations (`variations:`): values of a scenario, and how they are combined or drawn."""
 
 from typing import Annotated, Any, Literal
 
@@ -74,7 +74,7 @@ class Draw(Choice):
 
 
 class Sampled(Spec):
-    """Reproducible random values.
+    """Reproducible random values of several paths.
 
     The k-th value of a path depends only on the seed, the path, and k: a larger count or more paths do not change
     existing values. Numbers are rounded to six digits.
@@ -95,13 +95,14 @@ class Sampled(Spec):
 class VariationBlock(Spec):
     """Values of a scenario by path.
 
-    If several of the fields are given, each variation of one field is combined with each variation of the others.
+    If several kinds of values are given, such as `grid` and `pairs`, each variation of one kind is combined with each
+    variation of the other kinds.
     """
 
     grid: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """All combinations of the values of each path."""
     pairwise: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """Few combinations in which each pair of values of two paths occurs: far fewer than a grid of many paths."""
+    """Few combinations, in which each pair of values of any two paths occurs: far fewer than a grid of many paths."""
     pairs: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """The first values of all paths together, then the second ones, and so on; all lists must have the same length."""
     list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MAX_VARIATIONS, alias="list")] = None
@@ -121,12 +122,12 @@ class VariationBlock(Spec):
 
     @property
     def is_random(self) -> bool:
-        """Whether its variations are independent random draws."""
+        """Whether the variations are independent random draws."""
         return self.is_sampled_alone and self.sampled is not None and self.sampled.method == "random"
 
     @property
     def is_sampled_alone(self) -> bool:
-        """Whether it has `sampled` and no other kind of values."""
+        """Whether the block has `sampled` values and no others."""
         others = (self.grid, self.pairwise, self.pairs, self.list_)
         return self.sampled is not None and all(other is None for other in others)
 

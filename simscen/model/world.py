@@ -1,4 +1,4 @@
-"""Specification of worlds (`*.world.yaml`)."""
+"""Specifications of worlds (`*.world.yaml`) and of ROS maps."""
 
 from typing import Annotated, Literal
 
@@ -8,6 +8,8 @@ from simscen.spec.base import LanguageVersion, Spec
 from simscen.spec.moving_objects import Motion, Shaped
 from simscen.spec.places import Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Length, Mass, PositiveLength, Probability
+
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
 class Wall(Spec):
@@ -82,7 +84,7 @@ class Door(Spec):
     name: Name
     """Name for the actions `open` and `close`."""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
-    """The two door posts as [x, y] or names of places. A door swings about the first post, and slides past it."""
+    """The two door posts as [x, y] or names of places. A door swings about the first post, or slides past it."""
     motion: Literal["swing", "slide"] = "swing"
     """`swing`: by 90° counterclockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
     travel: PositiveLength | None = None
@@ -110,11 +112,11 @@ class WorldSpec(Spec):
     """Name of the world; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """Description for people."""
-    map: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    map: FilePath | None = None
     """ROS map (yaml) whose occupied cells become walls with the height `map_height`."""
     map_height: PositiveLength = 1.0
     """Height of the walls made from `map`."""
-    sdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    sdf: FilePath | None = None
     """Gazebo world to which the objects are added."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     """Walls along polylines."""
@@ -147,7 +149,7 @@ class RosMapSpec(Spec):
 
     model_config = ConfigDict(extra="ignore")
 
-    image: Annotated[str, Field(min_length=1, max_length=4096)]
+    image: FilePath
     """Image file (pgm, png, bmp), relative to this file."""
     resolution: PositiveLength
     """Size of a pixel in meters."""
@@ -156,7 +158,7 @@ class RosMapSpec(Spec):
     negate: Literal[0, 1] | bool = 0
     """Whether black is free and white is occupied."""
     occupied_thresh: Probability = 0.65
-    """Minimum darkness of occupied pixels."""
+    """Minimum darkness of occupied pixels, from 0 (white) to 1 (black)."""
     free_thresh: Annotated[Probability, Field(validate_default=True)] = 0.25
     """Maximum darkness of free pixels."""
     mode: Literal["trinary", "scale", "raw"] = "trinary"

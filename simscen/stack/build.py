@@ -98,7 +98,7 @@ class StackBuilder:
             setting,
             surroundings=self.surroundings,
             name="controller",
-            resolution=spec.local_costmap.completed(spec.costmap).resolution,
+            resolution=spec.local_costmap.with_defaults_from(spec.costmap).resolution,
             trail=odometry.trail,
         )
         controller: Controller = build_component(CheckedController, spec.controller, driving)
@@ -188,5 +188,5 @@ def _latency_ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
 
 def _behaviors(spec: Recovery, shared: Setting) -> list[Behavior]:
     """Build the recovery behaviors that the robot can execute, each with its own random stream."""
-    possible = [each for each in spec.chosen() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
+    possible = [each for each in spec.behavior_specs() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
     return [CheckedBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)]

@@ -1,4 +1,4 @@
-"""Fakes for triggers, actions and sensors: a stage that records all calls, and a room with four walls."""
+"""Fakes for tests of triggers, actions, and sensors: a stage that records all changes, and a robot in a square room."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,7 +22,11 @@ from simscen.model.robot import Differential
 
 @dataclass
 class FakeStage:
-    """Fake of core.stage.Stage. Unknown regions are squares around the origin, and unknown objects are near it."""
+    """Fake of core.stage.Stage, whose situation tests set.
+
+    Regions that are not in `regions` are squares around the origin. Objects that are not in `objects` are at
+    (0.5, 0.5). `calls` records the calls that would change the world, as tuples of the method and its arguments.
+    """
 
     tick: int = 0
     clock: Clock = field(default_factory=Clock)
@@ -38,7 +42,7 @@ class FakeStage:
     regions: dict[str, Polygon] = field(default_factory=dict)
     objects: dict[str, Pose2 | None] = field(default_factory=dict)
     motions: dict[str, tuple[MotionPath, float]] = field(default_factory=dict)
-    done: list[Any] = field(default_factory=list)
+    calls: list[Any] = field(default_factory=list)
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick of the newest scan of this lidar, or of any lidar."""
@@ -54,7 +58,7 @@ class FakeStage:
         return self
 
     def region(self, name: str) -> Polygon:
-        """Return a region."""
+        """Return the corners of a region."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
     def object(self, name: str) -> Pose2 | None:
@@ -75,11 +79,11 @@ class FakeStage:
 
     def spawn(self, body: Body) -> None:
         """Record the call."""
-        self.done.append(("spawn", body))
+        self.calls.append(("spawn", body))
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
         """Record the call."""
-        self.done.append(("add_pedestrian", walker))
+        self.calls.append(("add_pedestrian", walker))
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
         """Return True: there is space everywhere."""
@@ -91,69 +95,68 @@ class FakeStage:
 
     def remove(self, name: str) -> None:
         """Record the call."""
-        self.done.append(("remove", name))
+        self.calls.append(("remove", name))
 
     def move(self, name: str, path: MotionPath) -> None:
         """Record the call."""
-        self.done.append(("move", name, path))
+        self.calls.append(("move", name, path))
 
     def place(self, name: str, pose: Pose2) -> None:
         """Record the call."""
-        self.done.append(("place", name, pose))
+        self.calls.append(("place", name, pose))
 
     def place_robot(self, pose: Pose2) -> None:
         """Record the call."""
-        self.done.append(("place_robot", pose))
+        self.calls.append(("place_robot", pose))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Record the call."""
-        self.done.append(("push", impulse, name, seconds))
+        self.calls.append(("push", impulse, name, seconds))
 
     def add_friction_patch(self, name: str, patch: Patch) -> None:
         """Record the call."""
-        self.done.append(("add_friction_patch", name, patch))
+        self.calls.append(("add_friction_patch", name, patch))
 
     def send_goal(self, name: str) -> None:
         """Record the call."""
-        self.done.append(("send_goal", name))
+        self.calls.append(("send_goal", name))
 
     def cancel_goal(self) -> None:
         """Record the call."""
-        self.done.append(("cancel_goal",))
+        self.calls.append(("cancel_goal",))
 
     def switch_zone(self, order: ZoneSwitch) -> str:
         """Record the call."""
-        self.done.append(("switch_zone", order))
+        self.calls.append(("switch_zone", order))
         return ""
 
     def record_world_event(self, event: Event) -> None:
         """Record the call."""
-        self.done.append(("record_world_event", event))
+        self.calls.append(("record_world_event", event))
 
     def record_event(self, event: Event) -> None:
         """Record the call."""
-        self.done.append(("record_event", event))
+        self.calls.append(("record_event", event))
 
 
 LINEAR_SPEED_M_S, ANGULAR_SPEED_RAD_S = 0.3, 0.2
-"""Speeds of the robot in m/s and rad/s."""
 ROOM_HALF_WIDTH_M = 4.0
-"""Half of the side length of the room."""
+"""Half of the side length of the room, which is centered on the origin."""
 DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
 
 
 class FakeSensorView:
-    """Fake of sensors.sensor.SensorView at the time `seconds`, which tests set."""
+    """Fake of sensors.sensor.SensorView: a robot that drives a circle, at the time `seconds`, which tests set."""
 
     seconds = 0.0
 
     def base_pose(self) -> Pose3:
-        """Return a pose on a circle around (0, 1.5)."""
+        """Return the current pose on a circle around (0, 1.5)."""
         yaw, radius = ANGULAR_SPEED_RAD_S * self.seconds, LINEAR_SPEED_M_S / ANGULAR_SPEED_RAD_S
         return Pose3.planar(Pose2(radius * math.sin(yaw), radius * (1 - math.cos(yaw)), yaw))
 
     def base_velocity(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return the velocity in the world frame."""
+        """Return the linear and the angular velocity in the world frame, in m/s and rad/s."""
         yaw = ANGULAR_SPEED_RAD_S * self.seconds
         return (LINEAR_SPEED_M_S * math.cos(yaw), LINEAR_SPEED_M_S * math.sin(yaw), 0.0), (
             0.0,
@@ -162,7 +165,7 @@ class FakeSensorView:
         )
 
     def placements(self) -> int:
-        """Return 0: the robot is never placed elsewhere."""
+        """Return 0, the number of times that the robot was placed elsewhere."""
         return 0
 
     def encoders(self) -> tuple[float, ...]:
@@ -178,15 +181,15 @@ class FakeSensorView:
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Return a gray image with a depth of 2 m."""
+        """Return a gray image with a depth of 2 m, or `far` if that is less."""
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 
 class SquareRoomRays(RayCaster):
-    """Ray caster for the four walls."""
+    """Ray caster for the four walls of the room."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Return the ranges; see core.geometry.ray_fans.RayCaster."""
+        """Return the ranges (n,) in m, as described in core.geometry.ray_fans.RayCaster."""
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
         far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)

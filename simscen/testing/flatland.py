@@ -1,6 +1,6 @@
 """Planar world of boxes and discs, in which a stack can drive a robot without physics.
 
-Ray casting and distances use closed formulas, so they are an independent reference.
+Distances and ranges use closed formulas, independent of the tested code, so that tests can compare both.
 """
 
 import math
@@ -24,12 +24,12 @@ from simscen.stack.setting import Setting
 
 RATE = 240
 """Ticks per second."""
-CONTROL, SCAN, ODOMETRY = 12, 24, 6
-"""Periods of the controller, the lidar and odometry in ticks."""
+CONTROL_PERIOD, SCAN_PERIOD, ODOMETRY_PERIOD = 12, 24, 6
+"""Periods in ticks: controller at 20 Hz, lidar at 10 Hz, odometry at 40 Hz."""
 
 
 def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> RobotModel:
-    """Return a round robot like a TurtleBot."""
+    """Return a round robot like a TurtleBot: radius in m, speed in m/s; `limits` are other fields of RobotModel."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     corners = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
     data: dict[str, Any] = {
@@ -43,14 +43,14 @@ def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> Ro
 
 
 def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
-    """Return a rectangular robot like a Jackal."""
+    """Return a rectangular robot like a Jackal; sizes in m, speed in m/s."""
     a, b = length / 2, width / 2
     return RobotModel(((a, b), (-a, b), (-a, -b), (a, -b)), None, speed, speed, 0.0, 2.0, 5.0, 5.0, 10.0)
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """Return what a single component is built with; it is called at 20 Hz, with costmaps of 5 cm per cell."""
-    return Setting(Surroundings(robot, grid, RATE, lidars=("lidar",)), name, Streams(seed), CONTROL / RATE, 0.05)
+    """Return the Setting of a component that is tested alone; control at 20 Hz, costmap cells of 5 cm, map `grid`."""
+    return Setting(Surroundings(robot, grid, RATE, lidars=("lidar",)), name, Streams(seed), CONTROL_PERIOD / RATE, 0.05)
 
 
 @dataclass
@@ -71,7 +71,7 @@ class Flatland:
         return self
 
     def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
-        """Return the occupancy map. A cell is occupied if its center is inside an obstacle."""
+        """Return the map of `bounds` (min x, min y, max x, max y). Cells with centers in obstacles are occupied."""
         columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
         y, x = (np.indices((rows, columns)) + 0.5) * resolution
         distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))
@@ -93,7 +93,7 @@ class Flatland:
         return result
 
     def cast(self, origin: tuple[float, float], angles: Array) -> Array:
-        """Return the distances (n,) along rays."""
+        """Return the distances (n,) from `origin` along rays at world `angles` (n,); inf without a hit."""
         c, s = np.cos(angles), np.sin(angles)
         best = np.full(len(angles), np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -110,7 +110,7 @@ class Flatland:
         return best
 
     def clearance(self, robot: RobotModel, pose: Pose2) -> float:
-        """Return the distance from the robot's footprint to the nearest surface, which is not positive in contact."""
+        """Return the distance from the robot's footprint to the nearest surface; zero or negative in contact."""
         if robot.radius is not None:
             return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
         corners = np.array(robot.footprint)
@@ -121,7 +121,11 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """Drive of a robot that a stack controls. `log` has the events; `min_clearance` is in m."""
+    """Simulated drive of a robot that a stack controls, with ideal odometry and a noisy lidar.
+
+    `blind` stops the scans, `noise` is the standard deviation of ranges in m, and `odometry` contains the names of the
+    odometry sensors. `log` contains the events so far, `track` the true poses, and `min_clearance` is in m.
+    """
 
     world: Flatland
     robot: RobotModel
@@ -145,7 +149,7 @@ class Drive:
         self.min_clearance = math.inf
 
     def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
-        """Continue for some seconds, or until an event of the kind `until`."""
+        """Continue for some seconds, or until an event of the kind `until` ("" = no event). Return the drive itself."""
         end = self.tick + round(seconds * RATE)
         while self.tick < end:
             if any(event.kind == until for event in self.step()):
@@ -153,23 +157,23 @@ class Drive:
         return self
 
     def step(self) -> tuple[Event, ...]:
-        """Simulate one step of 6 ticks, and return its events."""
+        """Simulate one odometry period, and return the events of the stack."""
         readings: list[Reading] = []
-        if self.tick % ODOMETRY == 0:
+        if self.tick % ODOMETRY_PERIOD == 0:
             readings += [Odometry(name, self.tick, self.pose, self.twist) for name in self.odometry]
-        if self.tick % SCAN == 0 and not self.blind:
+        if self.tick % SCAN_PERIOD == 0 and not self.blind:
             readings.append(self.scan())
         decision = self.stack.decide(self.tick, tuple(readings))
         self.log += decision.events
         self.commands.append(decision.command)
         if decision.plan is not None:
             self.plans.append(decision.plan)
-        self._move(decision.command, ODOMETRY / RATE)
-        self.tick += ODOMETRY
+        self._move(decision.command, ODOMETRY_PERIOD / RATE)
+        self.tick += ODOMETRY_PERIOD
         return decision.events
 
     def scan(self) -> Scan:
-        """Return the scan of the lidar."""
+        """Return the scan of the lidar at the current pose."""
         full = self.field_of_view >= 2 * math.pi - 1e-9
         step = self.field_of_view / (self.beams if full else self.beams - 1)
         first = -self.field_of_view / 2
@@ -202,7 +206,7 @@ class Drive:
 
     @property
     def result(self) -> str:
-        """Result of the navigation, or ""."""
+        """Result of the navigation, such as "SUCCEEDED"; "" if it has not ended."""
         return self.events_of_kind("navigation.ended")[-1].name if self.events_of_kind("navigation.ended") else ""
 
 
@@ -217,7 +221,10 @@ def drive(
     stop_on_failure: bool = True,
     **options: Any,
 ) -> Drive:
-    """Return a drive of the reference stack with true poses. Without `grid`, the robot has no map."""
+    """Return a drive before its first step; by default of the reference stack with true poses.
+
+    Without `grid`, the robot has no map. `options` are fields of Drive.
+    """
     from simscen.stack.build import build_stack
 
     robot = robot or round_robot()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
-"""The collector of scenarios, by name because it is in a higher layer."""
+"""Plug-in that collects scenario files, loaded by name because this package must not import simscen.pytesting."""
 
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
@@ -43,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Find the promises of the targets. Without paths on the command line, only these are tested."""
+    """Find the promises of the targets. Without paths on the command line, only these promises are tested."""
     targets: list[str] = config.getoption("--simscen-contract")
     if not targets:
         return
@@ -76,7 +76,7 @@ class SubjectCollector(pytest.Collector):
     """Collector of the promises of one subject."""
 
     def collect(self) -> list[pytest.Item]:
-        """Return nothing, because the plug-in adds the items."""
+        """Return nothing, because `pytest_collection_modifyitems` adds the items."""
         return []
 
 

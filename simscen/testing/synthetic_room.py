@@ -1,6 +1,6 @@
-"""Asymmetric room, drives of a robot in it, and noisy sensors, without physics.
+"""Computed drives of a robot through an asymmetric room, with noisy sensors, for tests of localizers.
 
-The truth and the perfect scans of a drive are computed once. Each seed only changes the noise.
+The truth and the perfect scans of a drive are computed once, without physics. Each seed only changes the noise.
 """
 
 from dataclasses import dataclass
@@ -20,16 +20,18 @@ from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 
 TICK_RATE_HZ, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
+"""Ticks per second, and periods in ticks: odometry at 40 Hz, scans at 10 Hz."""
 READINGS_PER_SCAN = SCAN_PERIOD // ODOMETRY_PERIOD
 RANGE_MAX_M, BEAMS = 12.0, 360
-# Boxes as (left, bottom, right, top) in m: four walls of different depth, then furniture.
 BOXES = np.array([
     (-5.07, -4.03, 5.12, -3.87), (-5.07, 3.91, 5.12, 4.06), (-5.07, -4.03, -4.88, 4.06), (4.93, -4.03, 5.12, 4.06),
     (-1.13, 1.62, -0.88, 4.06), (-5.07, -0.52, -3.31, -0.29), (2.21, -2.44, 3.02, -1.17), (1.37, 2.73, 2.96, 3.34),
     (-2.52, -4.03, -1.49, -3.06), (3.58, 0.71, 4.93, 1.29), (-3.52, 2.18, -3.07, 2.61),
 ])  # fmt: skip
+"""Boxes (left, bottom, right, top) in m: four walls of different thickness, then furniture."""
 WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
+"""Corners (x, y) in m of the closed route of a drive."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
 
 
@@ -58,7 +60,7 @@ def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class RoomDrive:
     """Drive through the room, sampled at 40 Hz from tick 0.
 
     `truth` (k, 3) are the true poses, `steps` (k, 3) the motion to each pose from the previous one in its base frame,
@@ -70,17 +72,17 @@ class Drive:
     ranges: Array
 
 
-def record(truth: Array) -> Drive:
-    """Return the drive along poses (k, 3)."""
+def drive_along(truth: Array) -> RoomDrive:
+    """Return the drive along true poses (k, 3), with its perfect scans."""
     poses = [Pose2(*row) for row in truth]
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS, dtype=np.float64)
-    return Drive(truth, steps, cast(truth[::READINGS_PER_SCAN], angles))
+    return RoomDrive(truth, steps, cast(truth[::READINGS_PER_SCAN], angles))
 
 
 @cache
-def drive(seconds: float, first: int = 0) -> Drive:
-    """Return a drive through the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
+def drive(seconds: float, first: int = 0) -> RoomDrive:
+    """Return a drive along the waypoints at up to 0.5 m/s and 1 rad/s, from the waypoint with the index `first`."""
     dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE_HZ, Pose2(*WAYPOINTS[first], 0.0), first + 1
     truth = [pose]
     for _ in range(round(seconds / dt)):
@@ -91,16 +93,16 @@ def drive(seconds: float, first: int = 0) -> Drive:
         turn, forward = np.clip(2 * error, -1, 1) * dt, 0.5 * max(0.0, np.cos(error)) ** 4 * dt
         pose = pose.compose(Pose2(forward * np.cos(turn / 2), forward * np.sin(turn / 2), turn))
         truth.append(pose)
-    return record(np.array(truth))
+    return drive_along(np.array(truth))
 
 
 def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
-    """Return the surroundings for a stack in the room."""
+    """Return the surroundings of a stack in the room, with the map `room` (default: `grid()`)."""
     return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE_HZ)
 
 
-def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
-    """Return a localizer in the room."""
+def build_localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
+    """Build a localizer in the room that starts from the estimate."""
     setting = Setting(surroundings(), "localizer", Streams(seed), estimate=estimate)
     localizer: Localizer = spec.implementation()(spec, setting)
     return localizer
@@ -108,7 +110,7 @@ def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
 
 @dataclass(frozen=True)
 class Noise:
-    """Sensor noise, as in simscen.model.robot. Odometry noise grows with the square root of the distance."""
+    """Standard deviations of lidar ranges, odometry, and IMU; units and meanings as in the sensors of model.robot."""
 
     lidar: float = 0.01
     translation: float = 0.01
@@ -121,10 +123,10 @@ class Noise:
 DEFAULT_NOISE = Noise()
 
 
-def run(
-    subject: Localizer, drive: Drive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
+def run_localizer(
+    subject: Localizer, drive: RoomDrive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
 ) -> list[Belief]:
-    """Return the beliefs (k) of a localizer, one for each row of the truth."""
+    """Send noisy readings of the drive to a localizer, with `imu` also yaw rates; return its belief after each pose."""
     rng, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX_M, np.round(ranges, 3), np.inf)
@@ -145,7 +147,7 @@ def run(
 
 
 def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
-    """Return a scan of 360 degrees by a lidar at the center of the robot."""
+    """Return a scan of 360 degrees by a lidar at the center of the robot; `changes` are other fields of Scan."""
     defaults = {
         "angle_min": -np.pi,
         "angle_increment": 2 * np.pi / max(len(ranges), 1),
@@ -155,13 +157,13 @@ def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
     return Scan("lidar", tick, ranges, **(defaults | changes))  # type: ignore[arg-type]
 
 
-def errors(beliefs: list[Belief], truth: Array) -> Array:
-    """Return the errors (k, 3) of the beliefs in the map frame, with wrapped headings."""
+def pose_errors(beliefs: list[Belief], truth: Array) -> Array:
+    """Return the errors (k, 3) in x, y, and yaw of the beliefs in the map frame; headings are wrapped."""
     error: Array = np.array([belief.pose for belief in beliefs]) - truth
     error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
     return error
 
 
 def nees(belief: Belief, error: Array) -> float:
-    """Return the normalized estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
+    """Return the NEES of a belief with the pose error (3,) (Bar-Shalom et al. 2001, section 5.4)."""
     return float(error @ np.linalg.solve(belief.covariance, error))

@@ -1,4 +1,4 @@
-"""Traces and cases from short descriptions, for golden cases and the documentation of criteria."""
+"""Traces and cases built from short descriptions, for golden cases and the documentation of criteria."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,15 +13,23 @@ from simscen.core.records.events import Disturbance, Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
 TICK_RATE_HZ, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
+"""Ticks per second, and periods in ticks."""
 
 
 def synthetic_trace(description: Mapping[str, Any]) -> Trace:
-    """Return a trace with 240 Hz ticks, truth at 40 Hz, scans and belief at 10 Hz.
+    """Return a trace with 240 ticks per second, truth at 40 Hz, scans and belief at 10 Hz.
 
-    seconds: duration · truth: waypoints [t, x, y, yaw] with straight lines at constant speed between them · belief:
-    waypoints, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, meters] or one number ·
-    scans: intervals [from, to] with scans · events: [t, kind, name, {data}] · plans: [t, [[x, y], …]] · objects:
-    {name: waypoints} · ended: why the run ended; null for a truncated log.
+    Keys of the description, with times t in seconds:
+
+    seconds:    duration
+    truth:      waypoints [t, x, y, yaw]; between them, straight lines at constant speed
+    belief:     waypoints, or {offset: [dx, dy, dyaw]} from the truth, or null for none
+    clearance:  list of [t, meters], or one number
+    scans:      intervals [from, to] with scans
+    events:     list of [t, kind, name, {data}]
+    plans:      list of [t, [[x, y], …]]
+    objects:    {name: waypoints}
+    ended:      why the run ended; null for a truncated log
     """
     end = round(description["seconds"] * TICK_RATE_HZ)
     ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
@@ -45,7 +53,7 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
 
 
 def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
-    """Return x, y, yaw at `ticks`, interpolated between waypoints; headings turn the shorter way."""
+    """Return x, y, yaw at `ticks`, interpolated between waypoints [t, x, y, yaw]; headings turn the shorter way."""
     points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
     times = ticks / TICK_RATE_HZ
     columns = [np.interp(times, points[:, 0], points[:, axis]) for axis in (1, 2)]
@@ -108,10 +116,14 @@ def _path_points(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:
-    """Return a case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
-    expected {goal: failed or a code} · shortest {goal: meters} · passages [[goal, [x, y], [x, y], name, name]] ·
-    disturbances [{name, kind, …}] ·
-    masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""
+    """Return a case. Keys of the description are fields of Case, of which these are converted:
+
+    start:         [x, y, yaw]
+    goals, sent:   list of {name, pose: [x, y, yaw], and other fields of Goal}
+    passages:      list of [goal, end [x, y], end [x, y], name of a solid, name of the other solid]
+    masks:         {file: {resolution, origin: [x, y, yaw], blocks: list of [column, row, width, height, value]}}
+    disturbances:  list of {name, kind, and other fields of Disturbance}
+    """
     goals, sent = (
         tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in description.get(key, []))
         for key in ("goals", "sent")

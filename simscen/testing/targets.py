@@ -1,4 +1,4 @@
-"""Contracts of plug-ins, selected by a specification, a class, or the name of an entry point."""
+"""Find the contracts and promises of a plug-in, given its specification, its class, or the name of its entry point."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from simscen.testing.flatland import box_robot, round_robot
 from simscen.triggers.base import Condition
 
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
-"""Default robots for planners, controllers and behaviors: 0.44 m wide, and 0.42 m by 0.31 m."""
+"""Default robots for planners, controllers, and behaviors, by name: 0.44 m wide, and 0.42 m by 0.31 m."""
 
 _CONTRACTS_PER_ROBOT: dict[type, Callable[..., Contract]] = {
     PlannerSpec: PlannerContract,
@@ -62,16 +62,20 @@ class InvalidTarget(Exception):
 
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
-    """Return the contracts of a specification, one for each robot if the robot matters."""
+    """Return the contracts of a specification: one for each robot if it is a planner, controller, or behavior.
+
+    `subject` is the name of the component in reports, and `robots` are robots by name, ROBOTS by default. Raises
+    InvalidTarget.
+    """
     for kind, contract in _CONTRACTS_PER_ROBOT.items():
         if isinstance(spec, kind):
             named_robots = (robots or ROBOTS).items()
-            return [contract(spec, robot, f"{subject} on a {name}".strip()) for name, robot in named_robots]
+            return [contract(spec, f"{subject} on a {name}".strip(), robot=robot) for name, robot in named_robots]
     if isinstance(spec, GoalCheckerSpec):
-        return [GoalCheckerContract(spec, ROBOTS["round robot"], subject)]
+        return [GoalCheckerContract(spec, subject, robot=ROBOTS["round robot"])]
     for kind, contract in _CONTRACTS.items():
         if isinstance(spec, kind):
-            return [contract(spec, subject=subject)]
+            return [contract(spec, subject)]
     raise InvalidTarget(f"{type(spec).__name__} is not a specification of one of: {', '.join(GROUPS)}")
 
 
@@ -79,7 +83,7 @@ def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | No
     """Return all promises of the component of a specification.
 
     `spec` is the specification of a planner, controller, localizer, behavior, goal checker, stack, criterion, fault,
-    trigger, action, sensor or metric. `robots` are the robots for the tests by name.
+    trigger, action, sensor, or metric. The other parameters are those of `contracts_of`.
     """
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
@@ -125,7 +129,10 @@ def _import_class(component: str) -> Any:
 
 
 def specification_of(component_class: Any, component: str) -> Any:
-    """Return the specification, or for a component the specification that its constructor takes."""
+    """Return a class if it is a specification, otherwise the specification class that its constructor takes first.
+
+    Raises InvalidTarget, whose message names the class as `component`.
+    """
     if not inspect.isclass(component_class):
         raise InvalidTarget(f"{component} is not a class")
     if hasattr(component_class, "model_validate"):

@@ -11,7 +11,7 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of
 from simscen.testing.contracts.localizer import short_drive, start_estimate
-from simscen.testing.synthetic_room import Drive, localizer, run
+from simscen.testing.synthetic_room import RoomDrive, build_localizer, run_localizer
 
 SPECS: dict[str, LocalizerSpec] = {
     "amcl": Amcl(),
@@ -40,8 +40,10 @@ def test_component_meets_its_contract(promise: Promise) -> None:
 @pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 def test_belief_after_reset_equals_the_estimate(spec: LocalizerSpec) -> None:
     """This is stricter than the contract, which allows the deviation of random particles."""
-    used = localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
-    run(used, Drive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True)
+    used = build_localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
+    run_localizer(
+        used, RoomDrive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True
+    )
     used.reset(start_estimate())
     assert used.belief.pose == start_estimate().pose
     assert np.allclose(used.belief.covariance, np.diag(np.square(start_estimate().std)))

@@ -25,7 +25,9 @@ SPECS = {
     "reeds_shepp": (Spec(), CAR),
     "dubins": (Spec(state_space="dubins"), CAR),
 }
-PROMISES = [each for name, (spec, robot) in SPECS.items() for each in PlannerContract(spec, robot, name).promises()]
+PROMISES = [
+    each for name, (spec, robot) in SPECS.items() for each in PlannerContract(spec, name, robot=robot).promises()
+]
 
 
 @pytest.mark.sample(24)
@@ -39,7 +41,9 @@ def test_component_meets_its_contract(promise: Promise) -> None:
 @pytest.mark.parametrize("space", ["reeds_shepp", "dubins"])
 def test_path_of_a_car_keeps_its_turning_radius(space: str, kind: str) -> None:
     """Also where the direction of travel changes."""
-    contract = PlannerContract(Spec(type=kind, state_space=space, max_iterations=2000, improving_iterations=100), CAR)
+    contract = PlannerContract(
+        Spec(type=kind, state_space=space, max_iterations=2000, improving_iterations=100), robot=CAR
+    )
     for seed in (1, 2, 3):
         points = contract.plan(contract.build(), contract.view(), seed)
         step = np.hypot(*np.diff(points[:, :2], axis=0).T)

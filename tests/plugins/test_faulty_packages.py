@@ -39,7 +39,7 @@ from simscen.core.stage import Effect
 from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.base import Measure
-from simscen.faults.base import Disturbance, Fault
+from simscen.faults.base import FaultEffect, Fault
 from simscen.model.robot import SensorSpec
 from simscen.spec.base import Spec
 from simscen.triggers.base import Condition
@@ -51,7 +51,7 @@ HEADS = {
     "action": "class Mine(Spec, Action):\n    def perform(self, stage):\n        ",
     "fault": "class Mine(Spec, Fault):\n"
     "    affects: ClassVar = frozenset({'Scan', 'Command', 'Wheels', 'Belief', 'Map'})\n"
-    "    def begin(self, rng, wheels):\n        return Broken()\n\nclass Broken(Disturbance):\n    ",
+    "    def begin(self, rng, setting):\n        return Broken()\n\nclass Broken(FaultEffect):\n    ",
     "sensor": "class Mine(SensorSpec):\n    component: ClassVar = 'mine:Device'\n"
     "    reading_type: ClassVar = 'Scan'\n\n"
     "class Device:\n    def __init__(self, spec, setting): self.setting = setting\n    def read(self, tick):\n        ",
@@ -203,10 +203,10 @@ def test_invalid_command_from_a_fault_is_an_error_with_its_name(run) -> None:
         ("wheels", "def command(self, command): return None", "returned None for a command"),
         (
             "lidar",
-            "def arriving(self): return ['late']",
-            "returned 'late' from `arriving`, which is not a reading of `lidar`",
+            "def arriving_readings(self): return ['late']",
+            "returned 'late' from `arriving_readings`, not a reading of `lidar`",
         ),
-        ("lidar", "def arriving(self): return None", "returned None from `arriving`"),
+        ("lidar", "def arriving_readings(self): return None", "returned None from `arriving_readings`"),
         ("localizer", "def belief(self, belief): return 'here'", "returned 'here' for a belief"),
         ("cmd_vel", "def arriving_command(self): return 'go'", "returned 'go' for a command"),
     ],

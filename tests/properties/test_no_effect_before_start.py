@@ -13,7 +13,7 @@ from simscen.actions.base import AnyAction
 from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
 from simscen.core.records.trace import Moment
 from simscen.faults.base import AnyFault
-from simscen.loading.checks.faults import instances, unknown_sensors, unsuitable_faults
+from simscen.loading.checks.faults import fault_targets, unknown_sensors, unsuitable_faults
 from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
@@ -238,6 +238,6 @@ def test_every_fault_is_tested_on_each_target(play, tmp_path: Path) -> None:
     file.write_text(SCENARIO % ("true", "1 s", " []", " []"))
     loaded = load_scenario(file, tmp_path)
     assert loaded.robot.spec is not None
-    known = {instance.kind for instance in instances(loaded, loaded.robot.spec).values()}
+    known = {instance.kind for instance in fault_targets(loaded, loaded.robot.spec).values()}
     affected = {kind for word in AnyFault.choices() for kind in kinds_of(word)}
     assert affected == known - {MAP}

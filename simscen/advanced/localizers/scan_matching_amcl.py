@@ -113,7 +113,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
 
     def _relocalize(self, relocalizer: Relocalizer, scan: Scan, odometry: Pose2) -> None:
         """Redistribute the particles if the relocalizer finds the robot elsewhere."""
-        range_limits = self._spec.laser_min_range, self._spec.farthest
+        range_limits = self._spec.laser_min_range, self._spec.max_used_range
         base = self._base(odometry)
         if self._skipped:
             relocalizer.add_scan(scan, base, range_limits, self._motion_observed)

@@ -88,7 +88,7 @@ def _components(value: object) -> Iterator[Component]:
     inner: Iterable[object] = ()
     match value:
         case Recovery():  # its fields contain only the names of its behaviors
-            inner = value.chosen()
+            inner = value.behavior_specs()
         case BaseModel():
             inner = value.__dict__.values()
         case Mapping():

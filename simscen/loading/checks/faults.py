@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
-from simscen.faults.base import Instance
+from simscen.faults.base import FaultTarget
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.loaded import LoadedScenario
@@ -22,22 +22,22 @@ RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
 
 
 class ListedFault(NamedTuple):
-    """A fault, its number in the list from 0, and the instance that it affects (None if the robot does not have it)."""
+    """A fault, its number in the list from 0, and its target (None if the robot does not have it)."""
 
     number: int
     entry: FaultEntry
-    instance: Instance | None
+    target: FaultTarget | None
 
 
-def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
+def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, FaultTarget]:
     """Return all things that faults can affect, by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
-        name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
+        name: FaultTarget(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
         for name, kind in KIND_BY_INSTANCE.items()
     }
     sensors = {
-        name: Instance(sensor.reading_type, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)
+        name: FaultTarget(sensor.reading_type, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)
         for name, sensor in robot.sensors.items()
     }
     return {**sensors, **{name: other for name, other in others.items() if name not in sensors}}
@@ -46,7 +46,7 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
 def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
     """Yield all faults; nothing for a robot that is only a URDF and not built yet, whose sensors are not known."""
     if loaded.robot.spec is not None:
-        known = instances(loaded, loaded.robot.spec)
+        known = fault_targets(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
             yield ListedFault(index, entry, known.get(entry.sensor))
 
@@ -55,10 +55,10 @@ def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
 def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults of a sensor that the robot does not have."""
     loaded = scope.loaded
-    for index, entry, instance in _listed_faults(loaded):
-        if instance is None:
+    for index, entry, target in _listed_faults(loaded):
+        if target is None:
             assert loaded.robot.spec is not None
-            hint = suggestion(entry.sensor, instances(loaded, loaded.robot.spec))
+            hint = suggestion(entry.sensor, fault_targets(loaded, loaded.robot.spec))
             message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
             yield CheckProblem(("faults", index, "sensor"), message, hint)
 
@@ -67,19 +67,19 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
 def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults of a kind that cannot affect their sensor, or whose values do not fit the sensor."""
     loaded = scope.loaded
-    for index, entry, instance in _listed_faults(loaded):
-        if instance is None:
+    for index, entry, target in _listed_faults(loaded):
+        if target is None:
             continue
         assert loaded.robot.spec is not None
         keys = ("faults", index, entry.kind)
-        if instance.kind not in entry.fault.affects:
-            known = instances(loaded, loaded.robot.spec)
+        if target.kind not in entry.fault.affects:
+            known = fault_targets(loaded, loaded.robot.spec)
             suitable = [name for name, one in known.items() if one.kind in entry.fault.affects]
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
-            what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
+            what = NOUNS.get(target.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield CheckProblem(keys, message, hint, at_key=True)
-        elif unsuitable := entry.fault.unsuitable_key(instance):
+        elif unsuitable := entry.fault.unsuitable_key(target):
             below = (unsuitable[0],) if unsuitable[0] else ()
             message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
             yield CheckProblem((*keys, *below), message, at_key=True)
@@ -89,8 +89,8 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
 def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults of the map in scenarios without a map, and faults of the map with a time."""
     loaded = scope.loaded
-    for index, entry, instance in _suitable_faults(loaded):
-        if instance.kind != MAP:
+    for index, entry, target in _suitable_faults(loaded):
+        if target.kind != MAP:
             continue
         if loaded.spec.map == "none":
             message = "the map cannot have faults: the scenario has `map: none`"
@@ -106,18 +106,18 @@ def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults of the localizer of a stack that is not one of simscen's own, and so cannot be disturbed."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
-    for index, _, instance in _suitable_faults(scope.loaded):
-        if instance.kind == BELIEF:
+    for index, _, target in _suitable_faults(scope.loaded):
+        if target.kind == BELIEF:
             message = "only the localizer of simscen's own stacks can have faults"
             hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
             yield CheckProblem(("faults", index, "sensor"), message, hint)
 
 
-def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Instance]]:
-    """Yield the index, the fault, and the instance of each fault that can affect its instance."""
-    for index, entry, instance in _listed_faults(loaded):
-        if instance is not None and instance.kind in entry.fault.affects and not entry.fault.unsuitable_key(instance):
-            yield index, entry, instance
+def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, FaultTarget]]:
+    """Yield the index, the fault, and the target of each fault that can affect its target."""
+    for index, entry, target in _listed_faults(loaded):
+        if target is not None and target.kind in entry.fault.affects and not entry.fault.unsuitable_key(target):
+            yield index, entry, target
 
 
 @NAMES.check("SC032")
@@ -125,11 +125,11 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults that compute the measurement anew, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
-    for index, entry, instance in _listed_faults(loaded):
+    for index, entry, target in _listed_faults(loaded):
         before = [
             fault.label for fault in faults[:index] if fault.sensor == entry.sensor and fault.kind in ("delay", "stuck")
         ]
-        resamples = entry.kind in RESAMPLING_FAULTS and instance is not None and instance.kind in ("Scan", "Image")
+        resamples = entry.kind in RESAMPLING_FAULTS and target is not None and target.kind in ("Scan", "Image")
         if resamples and before:
             message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"
             hint = f"list it before `{before[0]}`; faults apply in the order of the list"

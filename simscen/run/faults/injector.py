@@ -19,7 +19,7 @@ from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import BELIEF, COMMAND, WHEELS, Event, EventKind
-from simscen.faults.base import Disturbance, FaultSetting
+from simscen.faults.base import FaultEffect, FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.faults.interfaces import CommandLink
 from simscen.run.stream_names import stream_names
@@ -36,7 +36,7 @@ class _Active:
     index: int
     sensor: str
     kind: str
-    disturbance: Disturbance
+    effect: FaultEffect
     changed_count: int = 0
     has_ended: bool = False
 
@@ -85,10 +85,10 @@ class FaultInjector:
         self._activations[index] += 1
         rng = self._streams.generator(f"fault{self._names[index]}#{self._activations[index]}")
         setting = self._setting(entry)
-        disturbance: object = entry.fault.begin(rng, setting)
-        if not isinstance(disturbance, Disturbance):
-            self._raise_invalid(index, f"returned {disturbance!r} from `begin`, which is not a Disturbance")
-        self.active[index, self._activations[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
+        effect: object = entry.fault.begin(rng, setting)
+        if not isinstance(effect, FaultEffect):
+            self._raise_invalid(index, f"returned {effect!r} from `begin`, which is not a FaultEffect")
+        self.active[index, self._activations[index]] = _Active(index, entry.sensor, setting.kind, effect)
         self._affects_commands = self._affects_commands or setting.kind == COMMAND
         return setting.kind
 
@@ -96,7 +96,7 @@ class FaultInjector:
         """End a fault and return how many messages and commands it changed. Delayed messages still arrive later."""
         key = index, self._activations[index]
         active = self.active.pop(key)
-        if remaining := active.disturbance.end():
+        if remaining := active.effect.end():
             self.active[key] = _Active(index, active.sensor, active.kind, remaining, has_ended=True)
         return active.changed_count
 
@@ -128,7 +128,7 @@ class FaultInjector:
         elif is_sent:
             self._link.receive(tick, command)
         for active in self._in_order():
-            if active.kind == WHEELS or active.disturbance.drives:
+            if active.kind == WHEELS or active.effect.changes_motion:
                 command = self._disturb_command(active, command) or command
         return command
 
@@ -150,19 +150,21 @@ class FaultInjector:
         return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
 
     def _delayed_readings(self, active: _Active) -> Sequence[Reading]:
-        arriving: object = active.disturbance.arriving()
+        arriving: object = active.effect.arriving_readings()
         if not isinstance(arriving, list | tuple):
             self._raise_invalid(
-                active.index, f"returned {arriving!r} from `arriving`, which is not a list or tuple of readings"
+                active.index,
+                f"returned {arriving!r} from `arriving_readings`, not a list or tuple of readings",
             )
         if foreign := [one for one in arriving if getattr(one, "sensor", None) != active.sensor]:
             self._raise_invalid(
-                active.index, f"returned {foreign[0]!r} from `arriving`, which is not a reading of `{active.sensor}`"
+                active.index,
+                f"returned {foreign[0]!r} from `arriving_readings`, not a reading of `{active.sensor}`",
             )
         return arriving
 
     def _disturb_reading(self, active: _Active, reading: Reading) -> Reading | None:
-        disturbed = active.disturbance.reading(_read_only(reading))
+        disturbed = active.effect.reading(_read_only(reading))
         if disturbed is not None and _type_and_sensor(disturbed) != _type_and_sensor(reading):
             problem = f"returned an object of type {type(disturbed).__name__} for a {type(reading).__name__} reading"
             self._raise_invalid(active.index, problem)
@@ -174,7 +176,7 @@ class FaultInjector:
         """Pass the new command and delayed ones through the chain of faults; what remains reaches the base."""
         for active in self._in_order():
             if active.kind == COMMAND:
-                late = active.disturbance.arriving_command()
+                late = active.effect.arriving_command()
                 if late is not None:
                     self._require_finite_command(active, late)
                 disturbed = None if command is None else self._disturb_command(active, command)
@@ -183,7 +185,7 @@ class FaultInjector:
             self._link.receive(tick, command)
 
     def _disturb_command(self, active: _Active, command: Twist) -> Twist | None:
-        disturbed = active.disturbance.command(command)
+        disturbed = active.effect.command(command)
         if disturbed is None and active.kind == COMMAND:
             self._count(active)
             return None
@@ -198,7 +200,7 @@ class FaultInjector:
         return command
 
     def _disturb_belief(self, active: _Active, belief: Belief) -> Belief:
-        disturbed: object = active.disturbance.belief(belief)
+        disturbed: object = active.effect.belief(belief)
         if not isinstance(disturbed, Belief) or not all(
             map(math.isfinite, (*disturbed.pose, *disturbed.map_from_odom))
         ):

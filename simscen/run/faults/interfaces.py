@@ -13,7 +13,7 @@ from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
 from simscen.core.records.events import KIND_BY_INSTANCE
-from simscen.faults.base import FaultSetting, Sight
+from simscen.faults.base import FaultSetting, SensorSimulator
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Camera, Mount, RobotSpec
 from simscen.sensors.lidar import floor_distances
@@ -49,10 +49,10 @@ class FaultSettingFactory:
             clock=self._clock,
             now=self._now,
             kind=sensor.reading_type if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
-            sight=None if sensor is None else self._sight(entry.sensor, sensor.chosen),
+            simulator=None if sensor is None else self._simulator(entry.sensor, sensor.chosen),
         )
 
-    def _sight(self, name: str, spec: object) -> Sight:
+    def _simulator(self, name: str, spec: object) -> SensorSimulator:
         return HypotheticalSensor(spec, self._view, self._ray_caster_without, self._now, name)
 
 
@@ -68,7 +68,7 @@ CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
 
 
 class HypotheticalSensor:
-    """Readings that a lidar or camera would produce from another pose or without some objects (faults.base.Sight)."""
+    """Readings that a lidar or camera would produce otherwise, as in faults.base.SensorSimulator."""
 
     def __init__(
         self,

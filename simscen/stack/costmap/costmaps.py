@@ -36,7 +36,7 @@ class Costmaps:
         `lookahead_distance` in m is how far the controller looks ahead; `latency` is the time of an update in ticks.
         """
         self.global_costmap = LayeredCostmap(spec.costmap, surroundings)
-        local_spec = spec.local_costmap.completed(spec.costmap)
+        local_spec = spec.local_costmap.with_defaults_from(spec.costmap)
         min_half_size = lookahead_distance + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M
         default_size = max(MIN_LOCAL_SIZE_M, 2.0 * min_half_size)
         size = spec.local_costmap.width or default_size, spec.local_costmap.height or default_size

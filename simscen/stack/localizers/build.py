@@ -83,7 +83,7 @@ def motion_model(spec: model.AmclParameters, holonomic: bool) -> MotionModel:
 def sensor_model(spec: model.AmclParameters, grid: OccupancyGrid, field: DistanceField) -> SensorModel:
     """Return the sensor model `laser_model_type`. `field` is the obstacle field of `grid`."""
     if spec.laser_model_type == "beam":
-        opaque = opaque_field(grid, spec.farthest)
+        opaque = opaque_field(grid, spec.max_used_range)
         return BeamModel(
             opaque, spec.z_hit, spec.z_short, spec.z_max, spec.z_rand, spec.sigma_hit, spec.lambda_short
         )  # fmt: skip

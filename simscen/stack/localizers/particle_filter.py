@@ -61,7 +61,7 @@ class ParticleFilter:
 
     def beams(self, scan: Scan) -> Beams:
         """Return the beams of a scan that are compared with the map."""
-        return select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.farthest)
+        return select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.max_used_range)
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""

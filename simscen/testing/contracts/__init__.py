@@ -1,1 +1,1 @@
-"""Contract of each plug-in role: the promises of its protocol, as checks of a component."""
+"""One contract for each kind of plug-in: a class whose methods check the rules of its protocol on a component."""

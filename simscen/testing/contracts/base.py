@@ -11,7 +11,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any, ClassVar, TypeVar
 
@@ -43,7 +43,7 @@ def require(condition: object, observation: str) -> None:
 
 @dataclass(frozen=True)
 class Promise:
-    """One promise, to be checked for one subject.
+    """One rule of a protocol, to be checked for one component.
 
     `str(promise)` is a sentence; `check()` raises PromiseBroken if the promise is broken.
     """
@@ -73,20 +73,22 @@ def promise(method: Callable[[T], None]) -> Callable[[T], None]:
     return method
 
 
+@dataclass(frozen=True, eq=False)
 class Contract:
-    """Promises of one role, to be checked for one subject. Each promise is checked on new components."""
+    """Promises of one kind of component (`role`), to be checked for the component that `spec` specifies.
+
+    `subject` is the name of the component in reports. Each promise is checked on new components.
+    """
 
     role: ClassVar[str]
+    spec: Any
     subject: str = ""
 
     def promises(self) -> list[Promise]:
         """Return all promises in the order of the contract."""
-        names = [n for kind in reversed(type(self).__mro__) for n, v in vars(kind).items() if _is_promise(v)]
+        members = [member for kind in reversed(type(self).__mro__) for member in vars(kind).items()]
+        names = [name for name, value in members if hasattr(value, "__is_promise__")]
         return [Promise(self.role, self.subject, n.replace("_", " "), getattr(self, n)) for n in dict.fromkeys(names)]
-
-
-def _is_promise(value: Any) -> bool:
-    return getattr(value, "__is_promise__", False)
 
 
 _reseed_count = 0
@@ -102,7 +104,7 @@ def reseed_global_generators() -> None:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise PromiseBroken if the block takes too long. Only the main thread can be interrupted."""
+    """Raise PromiseBroken if the block takes longer. Only the main thread can be interrupted; others have no limit."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -124,12 +126,10 @@ def time_limit(seconds: float) -> Iterator[None]:
 class ComponentContract(Contract):
     """Contract of a component that is built as `Class(spec, setting)`, for one robot."""
 
-    spec: Any
-    robot: RobotModel
-    subject: str = ""
+    robot: RobotModel = field(kw_only=True)
 
     def setting(self) -> Setting:
-        """Return what a component is built with besides its specification, with a new random generator."""
+        """Return the Setting that the component is built with, with a new random generator of the same seed."""
         return setting(self.robot, name=self.role)
 
     def build(self) -> Any:
@@ -156,7 +156,7 @@ def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: An
 
 
 def costmap_of_world(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
-    """Return a costmap of the world with cells of 5 cm."""
+    """Return a costmap of the world in `bounds` (min x, min y, max x, max y) with cells of 5 cm."""
     return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
 
 
@@ -166,7 +166,7 @@ def copy_costmap(view: CostmapView) -> CostmapView:
 
 
 def equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
-    """Return whether two costmaps are equal."""
+    """Return whether two costmaps have the same costs and distances."""
     return np.array_equal(one.costs, other.costs) and np.array_equal(one.distance, other.distance)
 
 

@@ -1,4 +1,4 @@
-"""Contract of recovery behaviors."""
+"""Contract of recovery behaviors: checks that every behavior must pass."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from simscen.testing.contracts.controller import PERIOD_S, checked_command, move
 from simscen.testing.flatland import Flatland
 
 MAX_DURATION_S = 120.0
-"""Maximum simulated duration of a behavior."""
+"""Maximum simulated duration of a behavior: several times the time allowances of Nav2's behaviors."""
 START = Pose2(0.0, 0.0, 0.4)
 
 
@@ -30,15 +30,15 @@ class BehaviorContract(ComponentContract):
 
     role = "behavior"
 
-    def view(self, half: float = 4.0) -> CostmapView:
-        """Return the costmap of a square room around the robot; `half` is half of its width in m."""
-        walls = [(-half - 0.2, -half - 0.2, half + 0.2, -half), (-half - 0.2, half, half + 0.2, half + 0.2)]
-        walls += [(-half - 0.2, -half, -half, half), (half, -half, half + 0.2, half)]
-        edge = half + 1.0
+    def view(self, half_width: float = 4.0) -> CostmapView:
+        """Return the costmap of a square room of 2 · `half_width` m around the origin."""
+        inner, outer, edge = half_width, half_width + 0.2, half_width + 1.0
+        walls = [(-outer, -outer, outer, -inner), (-outer, inner, outer, outer)]
+        walls += [(-outer, -inner, -inner, inner), (inner, -inner, outer, inner)]
         return costmap_of_world(Flatland(walls), self.robot, (-edge, -edge, edge, edge))
 
     def simulate(self, behavior: Behavior, view: CostmapView) -> list[Pose2]:
-        """Return the track of a base that follows the commands until the behavior is done or fails."""
+        """Return the poses of a base that follows the commands until the behavior is done or fails."""
         track, seconds = [START], 0.0
         try:
             call_component("starts", lambda: behavior.start(START))

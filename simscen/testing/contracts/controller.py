@@ -1,4 +1,4 @@
-"""Contracts of controllers and goal checkers."""
+"""Contracts of controllers and goal checkers: checks that each of them must pass."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ from simscen.testing.contracts.base import (
 from simscen.testing.flatland import Flatland
 
 PERIOD_S = 0.05
+"""Time between two commands."""
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
 TOLERANCE = 1e-6
+"""Rounding error by which a command may exceed a limit, in m/s and rad/s."""
 GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
 """Maximum error in m and rad at the goal, and time for which the robot must stay there."""
 
@@ -48,17 +50,17 @@ class ControllerContract(ComponentContract):
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
-        """Return the command, checked for type, finiteness and limits."""
+        """Return the command at this pose and velocity, checked for type, finiteness, and limits."""
         command = call_component("computes a command", lambda: controller.command(pose, twist, view, GOAL))
         return checked_command(command, self.robot)
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
-        """Return the track of an ideal base until it has been at the goal for DWELL_S."""
+        """Return the poses of an ideal base until it has been at the goal for DWELL_S, or for `seconds`."""
         track, twist, periods_at_goal = [pose], Twist(), 0
         for _ in range(round(seconds / PERIOD_S)):
             twist = self.command(controller, track[-1], twist, view)
             track.append(move(track[-1], twist))
-            periods_at_goal = periods_at_goal + 1 if at_goal(track[-1]) else 0
+            periods_at_goal = periods_at_goal + 1 if is_at_goal(track[-1]) else 0
             if periods_at_goal * PERIOD_S >= DWELL_S:
                 break
         return track
@@ -137,7 +139,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def an_empty_path_is_an_invalid_path(self) -> None:
-        """Given a path without points then fails with INVALID_PATH."""
+        """Given a path without points then it fails with INVALID_PATH."""
         controller = self.build()
         try:
             call_component("receives an empty path", lambda: controller.set_path(Path()))
@@ -186,13 +188,13 @@ def checked_command(command: Twist, robot: RobotModel) -> Twist:
     return command
 
 
-def at_goal(pose: Pose2) -> bool:
-    """Return whether the base is at the goal."""
+def is_at_goal(pose: Pose2) -> bool:
+    """Return whether the base is at GOAL."""
     return pose.distance(GOAL.pose) < GOAL_TOLERANCE and abs(pose.yaw - GOAL.pose.yaw) < GOAL_TOLERANCE
 
 
 def move(pose: Pose2, twist: Twist) -> Pose2:
-    """Return the pose after one period at this velocity."""
+    """Return the pose after PERIOD_S at this velocity."""
     return Pose2(*poses_along(pose, twist, np.array([PERIOD_S]))[0].tolist())
 
 
@@ -213,7 +215,7 @@ class GoalCheckerContract(ComponentContract):
     role = "goal_checker"
 
     def answers_at(self, checker: GoalChecker, pose: Pose2, twist: Twist = STOP) -> list[bool]:
-        """Return the answers of the checker during 2 s."""
+        """Return the answers of the reset checker for a robot that keeps this pose and velocity for 2 s."""
         call_component("is reset", checker.reset)
         answers = [
             call_component("checks a pose", lambda: checker.reached(REACHED_GOAL, pose, twist))

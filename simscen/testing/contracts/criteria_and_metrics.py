@@ -1,10 +1,9 @@
-"""Contracts of criteria, metrics, actions and triggers."""
+"""Contracts of criteria, metrics, actions, and triggers: checks that each of them must pass."""
 
 from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
 from typing import Any
 
 from simscen.core.geometry import Pose2
@@ -17,6 +16,7 @@ from simscen.testing.contracts.base import Contract, call_component, promise, re
 from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
+# Descriptions for `synthetic_case` and `synthetic_trace`.
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
 DRIVE: dict[str, Any] = {
     "seconds": 8,
@@ -40,16 +40,13 @@ TRACES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
 class CriterionContract(Contract):
     """Contract of a criterion, on the traces of a drive, of a stationary robot, and of a truncated log."""
 
     role = "criterion"
-    spec: Any
-    subject: str = ""
 
     def findings(self, trace: Trace, case: Case, label: str) -> list[Finding]:
-        """Return the findings, checked for their type."""
+        """Return the findings, checked for their type. `label` describes the trace in messages."""
         criterion: Criterion = self.spec
         findings = call_component(f"judges {label}", criterion.judge, trace, case)
         is_valid = isinstance(findings, list) and all(isinstance(f, Finding) for f in findings)
@@ -105,16 +102,13 @@ class CriterionContract(Contract):
             )
 
 
-@dataclass(frozen=True, eq=False)
 class MetricContract(Contract):
     """Contract of a metric, on the traces of a drive, of a stationary robot, and of a truncated log."""
 
     role = "metric"
-    spec: Any
-    subject: str = ""
 
     def measure(self, description: dict[str, Any], label: str) -> float | str:
-        """Return the value of the metric."""
+        """Return the value of the metric for a trace; `label` describes the trace in messages."""
         value: float | str = call_component(
             f"measures {label}", self.spec.measure, synthetic_trace(description), synthetic_case(CASE)
         )
@@ -155,19 +149,16 @@ class MetricContract(Contract):
         require(is_valid, f"has the evidence {evidence!r}, not a set of Evidence")
 
 
-@dataclass(frozen=True, eq=False)
 class ActionContract(Contract):
     """Contract of an action, on a fake stage (the interface to the running simulation) that records calls."""
 
     role = "action"
-    spec: Any
-    subject: str = ""
 
     def perform(self) -> tuple[Effect, list[Any]]:
         """Return the effect and the recorded calls."""
         stage = FakeStage()
         effect = call_component("is performed", self.spec.perform, stage)
-        return effect, stage.done
+        return effect, stage.calls
 
     @promise
     def it_returns_an_effect(self) -> None:
@@ -184,25 +175,23 @@ class ActionContract(Contract):
         require(self.perform() == self.perform(), "makes different calls the second time")
 
 
-MOMENTS = (
+SITUATIONS = (
     {"tick": 0},
     {"tick": 240, "robot": Pose2(1.0, 0.0, 0.0), "travelled": 1.0},
     {"tick": 2400, "robot": Pose2(5.0, -3.0, 2.0), "travelled": 12.0},
     {"tick": 240_000, "robot": Pose2(0.1, 0.1, -1.0), "travelled": 500.0},
 )
+"""Fields of FakeStage at four times of a run."""
 
 
-@dataclass(frozen=True, eq=False)
 class TriggerContract(Contract):
-    """Contract of a trigger, at four moments of a run in different orders."""
+    """Contract of a trigger, in four situations of a run in different orders."""
 
     role = "trigger"
-    spec: Any
-    subject: str = ""
 
     def answers(self, order: list[int]) -> dict[int, bool]:
-        """Return the answer for each moment."""
-        answers = {k: call_component("is evaluated", self.spec.holds, FakeStage(**MOMENTS[k])) for k in order}
+        """Return the answers by index of SITUATIONS; the trigger is evaluated in this order."""
+        answers = {k: call_component("is evaluated", self.spec.holds, FakeStage(**SITUATIONS[k])) for k in order}
         for answer in answers.values():
             require(answer is True or answer is False, f"answers {answer!r}")
         return answers
@@ -225,6 +214,6 @@ class TriggerContract(Contract):
     @promise
     def it_changes_nothing(self) -> None:
         """Given a situation then the trigger changes nothing."""
-        stage = FakeStage(**MOMENTS[1])  # type: ignore[arg-type]
+        stage = FakeStage(**SITUATIONS[1])  # type: ignore[arg-type]
         call_component("is evaluated", self.spec.holds, stage)
-        require(not stage.done, f"changes the world: {stage.done}")
+        require(not stage.calls, f"changes the world: {stage.calls}")

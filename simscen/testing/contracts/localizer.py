@@ -1,10 +1,8 @@
-"""Contract of localizers."""
+"""Contract of localizers: checks that every localizer must pass."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -14,14 +12,24 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
 from simscen.testing.contracts.base import Contract, call_component, promise, require
-from simscen.testing.synthetic_room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
+from simscen.testing.synthetic_room import (
+    BEAMS,
+    Noise,
+    RoomDrive,
+    build_localizer,
+    drive,
+    drive_along,
+    pose_errors,
+    run_localizer,
+    scan,
+)
 
 NO_NOISE = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
 
 @cache
-def short_drive() -> Drive:
-    """Return six seconds of a drive through the room."""
+def short_drive() -> RoomDrive:
+    """Return a drive of six seconds through the synthetic room."""
     return drive(6.0)
 
 
@@ -30,17 +38,14 @@ def start_estimate() -> Estimate:
     return Estimate(Pose2(*short_drive().truth[0]), (0.1, 0.1, 0.05))
 
 
-@dataclass(frozen=True, eq=False)
 class LocalizerContract(Contract):
     """Contract of a localizer, in a room of 10 m by 8 m with a lidar of 360 beams at 10 Hz and odometry at 40 Hz."""
 
     role = "localizer"
-    spec: Any
-    subject: str = ""
 
     def build_at(self, estimate: Estimate) -> Localizer:
         """Build a localizer that starts from this estimate."""
-        subject = call_component("is built", lambda: localizer(self.spec, estimate, 1))
+        subject = call_component("is built", lambda: build_localizer(self.spec, estimate, 1))
         call_component("is reset", lambda: subject.reset(estimate))
         return subject
 
@@ -49,7 +54,7 @@ class LocalizerContract(Contract):
         """Given the same readings and the same seed then the beliefs are bit-identical."""
         for pose in (start_estimate().pose, None):
             first, again = (
-                call_component("localizes", run, self.build_at(Estimate(pose)), short_drive(), 4, imu=True)
+                call_component("localizes", run_localizer, self.build_at(Estimate(pose)), short_drive(), 4, imu=True)
                 for _ in range(2)
             )
             for one, other in zip(first, again, strict=True):
@@ -60,10 +65,10 @@ class LocalizerContract(Contract):
     @promise
     def without_motion_the_belief_does_not_drift(self) -> None:
         """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
-        still = record(np.tile(short_drive().truth[:1], (400, 1)))
+        still = drive_along(np.tile(short_drive().truth[:1], (400, 1)))
         start = Estimate(start_estimate().pose, (0.02, 0.02, 0.01))
-        beliefs = call_component("localizes", lambda: run(self.build_at(start), still, 1, NO_NOISE, imu=True))
-        error = errors(beliefs, still.truth)
+        beliefs = call_component("localizes", lambda: run_localizer(self.build_at(start), still, 1, NO_NOISE, imu=True))
+        error = pose_errors(beliefs, still.truth)
         offset, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
         require(offset < 0.05, f"drifts by {offset:.3f} m while the robot stands")
         require(turn < 0.03, f"drifts by {turn:.3f} rad while the robot stands")
@@ -132,8 +137,8 @@ class LocalizerContract(Contract):
         """Given a reset then the belief is within three standard deviations of the estimate."""
         used = self.build_at(Estimate(Pose2(3, 3, 3)))
         whole = short_drive()
-        first_part = Drive(whole.truth[:80], whole.steps[:80], whole.ranges[:20])
-        call_component("localizes", lambda: run(used, first_part, 1, imu=True))
+        first_part = RoomDrive(whole.truth[:80], whole.steps[:80], whole.ranges[:20])
+        call_component("localizes", lambda: run_localizer(used, first_part, 1, imu=True))
         call_component("is reset", lambda: used.reset(start_estimate()))
         require_near_start(valid_belief(used), "after a reset")
         send_odometry(used, 0, Pose2(-8, 4, 2))
@@ -141,7 +146,7 @@ class LocalizerContract(Contract):
 
 
 def require_near_start(belief: Belief, when: str) -> None:
-    """Require that a belief is within three standard deviations of `start_estimate`."""
+    """Require that a belief is within three standard deviations of `start_estimate`; `when` is for the message."""
     start = start_estimate()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
@@ -176,7 +181,7 @@ def valid_belief(subject: Localizer) -> Belief:
 
 
 def _invalid_ranges(seed: int) -> Array:
-    """Return invalid ranges of a different kind for each seed."""
+    """Return ranges (BEAMS,) of a different kind for each seed, most of them invalid."""
     rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
     mixed = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)

@@ -1,4 +1,4 @@
-"""Contract of planners: tests that every planner must pass."""
+"""Contract of planners: checks that every planner must pass."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from simscen.testing.flatland import Flatland
 
 START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
 MAX_POINT_SPACING_M = 0.1
+"""Largest distance between consecutive points of a path."""
 IMPOSSIBLE = (
     (Pose2(-3, 1), GOAL, ErrorCode.START_OUTSIDE_MAP),
     (START, Pose2(30, 1), ErrorCode.GOAL_OUTSIDE_MAP),
@@ -31,7 +32,7 @@ IMPOSSIBLE = (
     (START, Pose2(8.05, 5), ErrorCode.GOAL_OCCUPIED),
     (START, Pose2(15, 3.5), ErrorCode.NO_VALID_PATH),
 )
-"""Start or goal outside the map or in a wall, and a goal in a room without a door."""
+"""Requests (start, goal, expected error): outside the map, in a wall, and to a goal in a room without a door."""
 
 
 @cache
@@ -60,7 +61,7 @@ class PlannerContract(ComponentContract):
     def plan(
         self, planner: Planner, view: CostmapView, seed: int, start_and_goal: tuple[Pose2, Pose2] = (START, GOAL)
     ) -> Array:
-        """Return the points of a plan, checked for shape and finiteness."""
+        """Return the points (n, 3) of a plan, checked for shape and finiteness."""
         path = call_component("plans", lambda: planner.plan(view, *start_and_goal, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points

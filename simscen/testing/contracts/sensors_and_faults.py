@@ -1,10 +1,10 @@
-"""Contracts of sensors and faults."""
+"""Contracts of sensors and faults: checks that each of them must pass."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from simscen.core.messages import sensor_data
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.records.events import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP, WHEELS
-from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.fakes import DRIVE, FakeSensorView, SquareRoomRays
@@ -29,15 +29,16 @@ READINGS: dict[str, Callable[[int], Reading]] = {
     "Bump": lambda k: Bump("it", 24 * k, k % 2 == 0),
     "Image": lambda k: Image("it", 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)),
 }
+"""Function that returns the k-th reading of each type, one every 24 ticks."""
 FAULT_READING_COUNT = 40
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
 
-class FakeSight:
-    """Fake view from a displaced sensor: longer distances and another image."""
+class FakeSensorSimulator:
+    """Fake of faults.base.SensorSimulator."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return constant distances, which depend on the arguments."""
+        """Return 2 m for the actual sensor and objects, otherwise 4 m."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
@@ -45,39 +46,36 @@ class FakeSight:
         return Image("it", 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
 
 
-@dataclass(frozen=True, eq=False)
 class FaultContract(Contract):
     """Contract of a fault, on forty readings or commands of each affected kind."""
 
     role = "fault"
-    spec: Any
-    subject: str = ""
 
-    def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
-        """Start a new fault on a kind of target, always with the same generator."""
+    def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> FaultEffect:
+        """Start the fault on a kind of target, with a new generator of the same seed; `now` returns the tick."""
         fault: Fault = self.spec
-        setting = FaultSetting(0.3, now=now, kind=kind, sight=FakeSight() if kind in ("Scan", "Image") else None)
+        setting = FaultSetting(
+            0.3, now=now, kind=kind, simulator=FakeSensorSimulator() if kind in ("Scan", "Image") else None
+        )
         return call_component("begins", fault.begin, np.random.default_rng(5), setting)
 
     def outputs(self, kind: str) -> list[Any]:
         """Return the outputs for readings or commands of a kind, including delayed ones."""
         tick = 0
         outputs: list[Any] = []
-        disturbance = self.start(kind, lambda: tick)
+        effect = self.start(kind, lambda: tick)
         for k in range(FAULT_READING_COUNT):
             tick = 24 * k
             if kind in (COMMAND, WHEELS):
-                outputs.append(call_component("returns delayed commands", disturbance.arriving_command))
-                outputs.append(
-                    call_component("receives a command", disturbance.command, Twist(0.4, 0.0, 0.1 * (k % 5)))
-                )
+                outputs.append(call_component("returns delayed commands", effect.arriving_command))
+                outputs.append(call_component("receives a command", effect.command, Twist(0.4, 0.0, 0.1 * (k % 5))))
             elif kind == BELIEF:
-                outputs.append(call_component("receives a belief", disturbance.belief, _belief(k)))
+                outputs.append(call_component("receives a belief", effect.belief, _belief(k)))
             elif kind == MAP:
-                outputs.append(call_component("receives a map", disturbance.map, GRID))
+                outputs.append(call_component("receives a map", effect.map, GRID))
             else:
-                outputs += call_component("returns delayed readings", disturbance.arriving)
-                outputs.append(call_component(f"receives a {kind}", disturbance.reading, READINGS[kind](k)))
+                outputs += call_component("returns delayed readings", effect.arriving_readings)
+                outputs.append(call_component(f"receives a {kind}", effect.reading, READINGS[kind](k)))
         return outputs
 
     @promise
@@ -118,19 +116,19 @@ class FaultContract(Contract):
     def a_reading_is_never_changed(self) -> None:
         """Given a reading then it is not changed, because the log contains it."""
         for kind in sorted(set(self.spec.affects) & set(READINGS)):
-            disturbance = self.start(kind)
+            effect = self.start(kind)
             for k in range(FAULT_READING_COUNT):
                 reading = READINGS[kind](k)
                 before = copy.deepcopy(reading)
-                call_component(f"receives a {kind}", disturbance.reading, reading)
+                call_component(f"receives a {kind}", effect.reading, reading)
                 require(equal(reading, before), f"changes the {kind} that it receives")
 
     @promise
-    def its_end_leaves_a_disturbance_or_nothing(self) -> None:
-        """Given the end of a fault then the remaining disturbance is a Disturbance or None."""
+    def its_end_leaves_an_effect_or_nothing(self) -> None:
+        """Given the end of a fault then what remains is a FaultEffect or None."""
         for kind in sorted(self.spec.affects):
             remaining = call_component("ends", self.start(kind).end)
-            require(remaining is None or isinstance(remaining, Disturbance), f"leaves {remaining!r}")
+            require(remaining is None or isinstance(remaining, FaultEffect), f"leaves {remaining!r}")
 
 
 def equal(one: Any, other: Any) -> bool:
@@ -149,21 +147,19 @@ def _belief(number: int) -> Belief:
 
 
 NAME = "it"
+"""Name of the tested sensor."""
 READING_COUNT = 20
 FIELDS_WITH_NAN = ("ranges", "depth")
 """Fields whose values may be infinite or nan, because a beam or pixel has no return."""
 
 
-@dataclass(frozen=True, eq=False)
 class SensorContract(Contract):
     """Contract of a sensor, on a robot with two wheels that drives a circle in a square room."""
 
     role = "sensor"
-    spec: Any
-    subject: str = ""
 
     def readings(self, seed: int = 1) -> list[Reading]:
-        """Return twenty readings of a new sensor."""
+        """Return READING_COUNT readings of a new sensor."""
         return self.measure(*self.build(seed))
 
     def build(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
@@ -174,7 +170,7 @@ class SensorContract(Contract):
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
-        """Return the next twenty readings."""
+        """Return the next READING_COUNT readings, with the view at the time of each."""
         readings = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240

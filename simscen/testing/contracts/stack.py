@@ -1,4 +1,4 @@
-"""Contract of stacks."""
+"""Contract of stacks: checks that every stack must pass."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from simscen.core.records.trace import Decision
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
-from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, round_robot
+from simscen.testing.flatland import CONTROL_PERIOD, RATE, Drive, Flatland, round_robot
 
 START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
@@ -26,7 +26,7 @@ GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_
 
 
 class CheckedStack:
-    """Wrapper of a stack that checks the types, finiteness and events of decisions."""
+    """Wrapper of a stack that checks the types, finiteness, and events of decisions."""
 
     def __init__(self, stack: Stack) -> None:
         self.stack = stack
@@ -54,9 +54,7 @@ class StackContract(Contract):
     """Contract of a stack, with a round robot in a room of 6 m by 4 m and almost perfect sensors."""
 
     role = "stack"
-    spec: Any
     robot: RobotModel | None = None
-    subject: str = ""
 
     def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = (), seed: int = 1) -> Drive:
         """Return a drive before its start, in a room with discs (x, y, radius) that are not on the map."""
@@ -65,7 +63,11 @@ class StackContract(Contract):
         world.discs += discs
         surroundings = Surroundings(robot, grid, RATE, lidars=("lidar",))
         setting = Setting(
-            surroundings, "stack", Streams(seed), CONTROL / RATE, estimate=Estimate(START, (0.05, 0.05, 0.02))
+            surroundings,
+            "stack",
+            Streams(seed),
+            CONTROL_PERIOD / RATE,
+            estimate=Estimate(START, (0.05, 0.05, 0.02)),
         )
         stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
         call_component("starts", lambda: stack.start(setting.estimate, goals))
@@ -74,7 +76,7 @@ class StackContract(Contract):
 
     @property
     def has_true_poses(self) -> bool:
-        """Whether the localizer uses true poses."""
+        """Whether the localizer of the stack uses true poses."""
         return bool(getattr(getattr(self.spec, "localizer", None), "type", "") == "ground_truth")
 
     @promise

@@ -10,7 +10,7 @@ from simscen.actions.base import Action
 from simscen.core.records.verdict import Finding, Status
 from simscen.core.stage import Effect
 from simscen.criteria.base import Criterion, Measure
-from simscen.faults.base import Disturbance, Fault
+from simscen.faults.base import Fault, FaultEffect
 from simscen.spec.base import Spec
 from simscen.triggers.base import Condition
 from tests.contracts.broken.cases import COUNT, word
@@ -65,7 +65,7 @@ class HasNoHorizon(Spec, Criterion):
 # faults
 
 
-class Disturbing(Disturbance):
+class Disturbing(FaultEffect):
     def __init__(self, change: Callable[[Any], Any]) -> None:
         self.reading = change  # type: ignore[method-assign]
 
@@ -112,7 +112,7 @@ class WritesIntoTheReading(OnScans):
 @word("its end leaves", "leaves 'dust'")
 class LeavesDust(OnScans):
     def begin(self, rng, wheels):
-        work = Disturbance()
+        work = FaultEffect()
         work.end = lambda: "dust"  # type: ignore[method-assign,assignment,return-value]
         return work
 

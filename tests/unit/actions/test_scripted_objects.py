@@ -25,7 +25,7 @@ def perform(stage, **action):
 
 
 def moved(stage):
-    ((_, _, path),) = stage.done
+    ((_, _, path),) = stage.calls
     return path
 
 
@@ -89,7 +89,7 @@ def test_stopped_object_stays_at_its_pose():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)))
     stage = FakeStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
     assert perform(stage, stop={"name": "cart"}).happened
-    assert stage.done == [("place", "cart", Pose2(1.5, 0.0, 0.0))]
+    assert stage.calls == [("place", "cart", Pose2(1.5, 0.0, 0.0))]
     assert not perform(FakeStage(), stop={"name": "cart"}).happened
     assert not perform(FakeStage(objects={"cart": None}), stop={"name": "cart"}).happened
 
@@ -100,7 +100,7 @@ def test_force_over_time_gives_its_impulse():
         perform(stage, push={"force": ["0.01 kN", 0], "for": "1.5 s"}).what == "pushed the robot with 10.0 N for 1.5 s"
     )
     assert perform(stage, push={"impulse": [0, 5], "name": "bin"}).what == "pushed bin with 5.0 N s"
-    assert stage.done == [("push", (15.0, 0.0), None, 1.5), ("push", (0.0, 5.0), "bin", 0.0)]
+    assert stage.calls == [("push", (15.0, 0.0), None, 1.5), ("push", (0.0, 5.0), "bin", 0.0)]
 
 
 class Heavy(FakeStage):
@@ -131,7 +131,7 @@ def test_teleport_moves_an_object_and_reports_the_distance():
     stage = FakeStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
     effect = perform(stage, teleport={"name": "bin", "pose": {"x": 4, "y": 5}})
     assert effect.what == "moved bin by 5.00 m to (4.00, 5.00)"
-    assert stage.done == [("place", "bin", Pose2(4.0, 5.0, 0.0))]
+    assert stage.calls == [("place", "bin", Pose2(4.0, 5.0, 0.0))]
     assert not perform(stage, teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
     assert not perform(FakeStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
 
@@ -139,4 +139,4 @@ def test_teleport_moves_an_object_and_reports_the_distance():
 def test_mark_is_recorded():
     stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
-    assert stage.done == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]
+    assert stage.calls == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
-from simscen.faults.base import AnyFault, FaultSetting, Instance
+from simscen.faults.base import AnyFault, FaultSetting, FaultTarget
 
 
 class Hand:
@@ -21,13 +21,13 @@ class Hand:
         return self.tick
 
 
-def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, sight=None):
-    setting = FaultSetting(separation, Clock(240), now, kind, sight)
+def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, simulator=None):
+    setting = FaultSetting(separation, Clock(240), now, kind, simulator)
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
 
 
 def unsuitable_key(fault: dict, kind: str, rate=0.0, spec=None):
-    return AnyFault.model_validate(fault).fault.unsuitable_key(Instance(kind, rate, spec))
+    return AnyFault.model_validate(fault).fault.unsuitable_key(FaultTarget(kind, rate, spec))
 
 
 def scan(ranges, tick=0, least=0.1, most=12.0) -> Scan:

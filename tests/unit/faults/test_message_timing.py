@@ -15,7 +15,7 @@ def heard(fault: dict, ticks: int, period: int = 24, until: int | None = None) -
     for now.tick in range(ticks):
         if now.tick == until:
             work = work.end()
-        got += [(now.tick, one.tick) for one in work.arriving()]
+        got += [(now.tick, one.tick) for one in work.arriving_readings()]
         if now.tick % period == 0 and (one := work.reading(scan([1.0], now.tick))) is not None:
             got.append((now.tick, one.tick))
     return got

@@ -169,7 +169,7 @@ def test_recovery_passes_its_parameters_to_behaviors_that_do_not_set_them() -> N
     entries = ["spin", {"type": "backup", "time_allowance": 3.0}, "retrace"]
     spin, backup, retrace = model.Recovery(
         behaviors=entries, time_allowance=7.0, min_rotational_vel=0.2, rotational_acc_lim=2.0
-    ).chosen()
+    ).behavior_specs()
     assert isinstance(spin, model.Spin) and isinstance(backup, model.BackUp) and isinstance(retrace, model.Retrace)
     assert (spin.time_allowance, spin.min_rotational_vel, spin.rotational_acc_lim) == (7.0, 0.2, 2.0)
     assert (backup.time_allowance, retrace.time_allowance) == (3.0, 7.0)

@@ -156,7 +156,7 @@ def test_a_behavior_is_named_or_written_out_and_takes_what_it_does_not_say_from_
         {"recovery": {"behaviors": words, "wait_duration": 2.0, "spin_dist": 1.0}}
     ).recovery
     assert recovery.names == ["nod", "nod", "spin", "spin"]
-    nod, long_nod, wide, spin = recovery.chosen()
+    nod, long_nod, wide, spin = recovery.behavior_specs()
     assert (nod.wait_duration, long_nod.wait_duration) == (2.0, 1.0)  # type: ignore[attr-defined]
     assert (wide.spin_dist, spin.spin_dist) == (3.0, 1.0)  # type: ignore[attr-defined]
 

@@ -18,7 +18,15 @@ from simscen.stack.frames import Frames, OdometryHistory
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import Surroundings
 from simscen.stack.reference import ReferenceStack
-from simscen.testing.flatland import CONTROL, ODOMETRY, RATE, Drive, Flatland, drive, round_robot
+from simscen.testing.flatland import (
+    CONTROL_PERIOD,
+    ODOMETRY_PERIOD,
+    RATE,
+    Drive,
+    Flatland,
+    drive,
+    round_robot,
+)
 
 START, FAR = Pose2(1.0, 1.0), Goal("far", Pose2(9.0, 1.0), timeout=60.0)
 
@@ -52,8 +60,8 @@ def test_a_plan_is_there_when_its_planner_is_done_and_the_robot_stands_until_the
     d = start(planner=0.2).run(1.0)
     made = d.events_of_kind("plan.made")[0].tick
     assert made - d.events_of_kind("goal.accepted")[0].tick == 0.2 * RATE
-    assert set(d.commands[: made // ODOMETRY]) == {STOP}
-    assert d.commands[made // ODOMETRY] != STOP
+    assert set(d.commands[: made // ODOMETRY_PERIOD]) == {STOP}
+    assert d.commands[made // ODOMETRY_PERIOD] != STOP
 
 
 def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
@@ -62,7 +70,7 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
     d.world.discs.append((5.0, 1.0, 0.25))
     d.run(5.0)
     blocked = next(event.tick for event in d.events_of_kind("plan.made") if event.data["reason"] == "blocked")
-    before = d.commands[(blocked - RATE) // ODOMETRY : blocked // ODOMETRY]
+    before = d.commands[(blocked - RATE) // ODOMETRY_PERIOD : blocked // ODOMETRY_PERIOD]
     assert all(command.vx > 0.3 for command in before)
     assert d.run(40).result == "SUCCEEDED"
     assert d.min_clearance > 0.02
@@ -72,7 +80,7 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
                                                ({"controller": 0.025, "collision_monitor": 0.025}, 12)])  # fmt: skip
 def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[str, float], late: int) -> None:
     soon, later = start().run(3.0), start(**latency).run(3.0)
-    first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY for d in (soon, later)]
+    first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY_PERIOD for d in (soon, later)]
     assert first[1] - first[0] == late
     assert later.run(30).result == "SUCCEEDED"
 
@@ -80,7 +88,7 @@ def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[
 def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_speeds_up_as_fast() -> None:
     d = start(controller=0.12).run(2.5)
     changes = [k for k, (a, b) in enumerate(pairwise(d.commands)) if a is not b]
-    assert min(b - a for a, b in pairwise(changes)) * ODOMETRY >= 2 * CONTROL
+    assert min(b - a for a, b in pairwise(changes)) * ODOMETRY_PERIOD >= 2 * CONTROL_PERIOD
     assert d.commands[-1].vx > 0.45
     assert d.run(40).result == "SUCCEEDED"
 

@@ -16,7 +16,7 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.protocols import CostmapView
-from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, drive, round_robot
+from simscen.testing.flatland import CONTROL_PERIOD, RATE, Drive, Flatland, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
 CORRIDOR = Flatland().room(14, 1.6)
@@ -62,7 +62,7 @@ def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jer
     ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
     assert len(ghosts) > 50
     assert np.abs(ghosts).max() < 0.1
-    robot, period = d.robot, CONTROL / RATE
+    robot, period = d.robot, CONTROL_PERIOD / RATE
     driven = d.commands[RATE * 5 // 2 // 6 :]
     for before, now in pairwise(driven):
         assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
@@ -107,8 +107,8 @@ def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
 def test_local_costmap_inherits_unset_parameters() -> None:
     shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
     with_own_default = shared.model_copy(update={"publish_frequency": 1.0})
-    assert LocalCostmap(track_unknown_space=True).completed(shared) == with_own_default
-    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).completed(shared)
+    assert LocalCostmap(track_unknown_space=True).with_defaults_from(shared) == with_own_default
+    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).with_defaults_from(shared)
     assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
 
 

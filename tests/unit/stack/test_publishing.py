@@ -58,4 +58,4 @@ def test_large_costmaps_are_published_less_often() -> None:
 def test_the_default_rates_are_half_of_nav2() -> None:
     """nav2_params.yaml has 1 Hz and 2 Hz."""
     assert (Costmap().publish_frequency, LocalCostmap().publish_frequency) == (0.5, 1.0)
-    assert LocalCostmap().completed(Costmap()).publish_frequency == 1.0
+    assert LocalCostmap().with_defaults_from(Costmap()).publish_frequency == 1.0

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.plugin import Angle, AngularSpeed, Disturbance, Fault, PositiveAngle, Reading, Scan, Spec, Wheels
+from simscen.plugin import Angle, AngularSpeed, Fault, FaultEffect, FaultSetting, PositiveAngle, Reading, Scan, Spec
 
 
 class Crosstalk(Spec, Fault):
@@ -28,12 +28,12 @@ class Crosstalk(Spec, Fault):
     drift: AngularSpeed = math.radians(30)
     """How fast it wanders, for a lidar with ten scans a second."""
 
-    def begin(self, rng: np.random.Generator, wheels: Wheels) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Begin in the direction that it says."""
         return _Interference(self, rng)
 
 
-class _Interference(Disturbance):
+class _Interference(FaultEffect):
     def __init__(self, spec: Crosstalk, rng: np.random.Generator) -> None:
         self._spec, self._rng, self._scans = spec, rng, 0
 

@@ -18,7 +18,7 @@ from simscen.core.random_streams import Streams
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
+from simscen.testing.synthetic_room import BEAMS, build_localizer, cast, drive, grid, run_localizer, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 GUESS = Estimate(Pose2(-2.3, -1.9, 0.5), (0.3, 0.3, 0.2))
@@ -36,7 +36,7 @@ def odometry(tick: int, pose: Pose2) -> Odometry:
 
 def started(spec: ScanMatchingAmcl) -> Localizer:
     """Return a localizer that has received its first odometry and its first scan."""
-    subject = localizer(spec, GUESS, 1)
+    subject = build_localizer(spec, GUESS, 1)
     subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
     subject.on_scan(seen(START, 0))
     return subject
@@ -67,7 +67,7 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_certain_robot_compares_every_nth_scan_with_the_map(interval: int, compared: list[int]) -> None:
     driven = drive(20.0)
     spec = SKIPPING.model_copy(update={"sure_update_interval": interval})
-    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
+    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
     looked_at = list(dict.fromkeys(belief.updated for belief in beliefs))
     assert compared == looked_at[: CERTAIN_AFTER_UPDATES + 1] + looked_at[CERTAIN_AFTER_UPDATES + interval :: interval]
 
@@ -75,7 +75,7 @@ def test_a_certain_robot_compares_every_nth_scan_with_the_map(interval: int, com
 @pytest.mark.parametrize("std", [1.0, 0.1])
 def test_a_scan_that_overlaps_little_is_compared_with_the_map(std: float, compared: list[int]) -> None:
     """A robot that is unsure of its pose needs each scan, above all where consecutive scans have little in common."""
-    subject = localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
+    subject = build_localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
     for tick, meters in ((0, 0.0), (24, 0.26), (48, 0.52)):
         there = Pose2(meters, 0.0, 0.0)
         view = seen(START.compose(there), tick)
@@ -89,7 +89,7 @@ def test_a_scan_that_overlaps_little_is_compared_with_the_map(std: float, compar
 def test_covariance_estimation_compares_every_scan(compared: list[int]) -> None:
     driven = drive(10.0)
     spec = SKIPPING.model_copy(update={"covariance": "scatter"})
-    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
+    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
     assert compared == list(dict.fromkeys(belief.updated for belief in beliefs))
     assert len(compared) > CERTAIN_AFTER_UPDATES + 4
 
@@ -101,7 +101,7 @@ def turning(subject: Localizer, until: int) -> None:
 
 def test_a_skipped_scan_still_measures_the_motion(compared: list[int]) -> None:
     """Odometry that is 2 cm off does not count as disagreement, and does not move the pose either."""
-    subject = localizer(SKIPPING, KNOWN, 1)
+    subject = build_localizer(SKIPPING, KNOWN, 1)
     turning(subject, CERTAIN_AFTER_UPDATES + 1)
     before, tick = subject.belief, 24 * (CERTAIN_AFTER_UPDATES + 1)
     said = Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
@@ -121,7 +121,7 @@ def test_a_skipped_scan_still_measures_the_motion(compared: list[int]) -> None:
 
 
 def test_slipping_wheels_end_the_skipping_at_once(compared: list[int]) -> None:
-    subject = localizer(SKIPPING, KNOWN, 1)
+    subject = build_localizer(SKIPPING, KNOWN, 1)
     turning(subject, CERTAIN_AFTER_UPDATES + 1)
     tick, said = 24 * (CERTAIN_AFTER_UPDATES + 1), Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
     slipped = said.compose(Pose2(0.3, 0.0, 0.0))
@@ -133,7 +133,7 @@ def test_slipping_wheels_end_the_skipping_at_once(compared: list[int]) -> None:
 
 @pytest.mark.parametrize("strange_at", [CERTAIN_AFTER_UPDATES + 3, CERTAIN_AFTER_UPDATES + 4])
 def test_a_scan_that_does_not_fit_the_map_ends_the_skipping(strange_at: int, compared: list[int]) -> None:
-    subject = localizer(SKIPPING, KNOWN, 1)
+    subject = build_localizer(SKIPPING, KNOWN, 1)
     for k in range(CERTAIN_AFTER_UPDATES + 10):
         step = Pose2(0.0, 0.0, 0.26 * k)
         here = seen(START.compose(step), 24 * k)

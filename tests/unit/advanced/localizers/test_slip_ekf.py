@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
-from simscen.testing.synthetic_room import Noise, drive, errors, localizer, nees, run
+from simscen.testing.synthetic_room import Noise, build_localizer, drive, nees, pose_errors, run_localizer
 
 STD = np.array([0.1, 0.1, 0.05])
 """Standard deviations of the initial pose: m, m, rad."""
@@ -20,7 +20,7 @@ SILENT = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
 
 def ekf(estimate: Estimate) -> Localizer:
-    return localizer(SPEC, estimate, 1)
+    return build_localizer(SPEC, estimate, 1)
 
 
 def feed(subject: Localizer, steps: int, step: Pose2, rate: float | None) -> None:
@@ -37,7 +37,7 @@ def feed(subject: Localizer, steps: int, step: Pose2, rate: float | None) -> Non
 def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
     way = drive(30.0)
     subject = ekf(Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
-    assert np.abs(errors(run(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
+    assert np.abs(pose_errors(run_localizer(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
 
 
 @pytest.mark.sample(1)
@@ -48,8 +48,8 @@ def test_covariance_is_consistent_with_the_errors(imu: bool, is_quick: bool) -> 
     for seed in range(runs):
         start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
         subject = ekf(Estimate(start, (STD[0], STD[1], STD[2])))
-        beliefs = run(subject, way, seed, AS_SPECIFIED, imu=imu)
-        values.append(nees(beliefs[-1], errors(beliefs, way.truth)[-1]))
+        beliefs = run_localizer(subject, way, seed, AS_SPECIFIED, imu=imu)
+        values.append(nees(beliefs[-1], pose_errors(beliefs, way.truth)[-1]))
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs)
     assert low <= np.sum(values) <= high
 
@@ -75,7 +75,7 @@ def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
 
 def test_corrected_turn_also_corrects_the_path() -> None:
     """Chords of odometry's 1 rad/s arcs, driven at the gyroscope's 0: a straight line."""
-    subject = localizer(
+    subject = build_localizer(
         SlipEkf(type="slip_ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1
     )
     arc = Pose2(0.0125 * np.cos(0.0125), 0.0125 * np.sin(0.0125), 0.025)

@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.testing.synthetic_room import localizer, nees
+from simscen.testing.synthetic_room import build_localizer, nees
 
 RATE, EVERY = 40, 6
 
@@ -23,7 +23,7 @@ def replayed(
 
     `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those that the wheels claim, `gyro` (n,) readings.
     """
-    subject = localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    subject = build_localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     true = claimed = Pose2(0, 0, 0)
     subject.on_odometry(Odometry("odom", 0, claimed, Twist()))
     for k in range(len(twists)):
@@ -97,7 +97,7 @@ def test_position_variance_stops_growing_after_slip() -> None:
 def test_gyro_bias_variance_has_a_floor() -> None:
     """After ten minutes at rest, a drifting bias is still detected."""
     n = 600 * RATE // 10  # at 4 Hz, to be quick
-    subject = localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    subject = build_localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     for k in range(n):
         subject.on_imu(Imu("imu", 60 * k, (0.0, 0.0, 0.003), (0.0, 0.0, 9.81)))
         subject.on_odometry(Odometry("odom", 60 * k, Pose2(0, 0, 0), Twist()))

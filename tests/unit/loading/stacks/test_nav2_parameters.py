@@ -340,7 +340,7 @@ def test_values_with_a_special_meaning_in_nav2_are_accepted(tmp_path: Path) -> N
     """AMCL ignores range limits of 0 and less, Spin a negative minimum; without time ahead, nothing is checked."""
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED)
     stack = found.spec.stack
-    assert (stack.localizer.laser_min_range, stack.localizer.farthest) == (1.44, float("inf"))
+    assert (stack.localizer.laser_min_range, stack.localizer.max_used_range) == (1.44, float("inf"))
     assert (stack.recovery.simulate_ahead_time, stack.recovery.min_rotational_vel) == (0.0, 0.0)
 
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, Drive, cast
+from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, RoomDrive, cast
 
 
-def kidnapped(before: Drive, after: Drive) -> Drive:
+def kidnapped(before: RoomDrive, after: RoomDrive) -> RoomDrive:
     """Return a drive in which the robot is moved from the end of `before` to the start of `after`, without odometry."""
     count = len(before.truth) // READINGS_PER_SCAN * READINGS_PER_SCAN
-    return Drive(
+    return RoomDrive(
         np.concatenate((before.truth[:count], after.truth)),
         np.concatenate((before.steps[:count], after.steps)),
         np.concatenate((before.ranges[: count // READINGS_PER_SCAN], after.ranges)),
@@ -23,7 +23,7 @@ ADDED_BOXES = np.array([
 ])  # fmt: skip
 
 
-def crowded(path: Drive, seed: int, people: int = 8) -> Drive:
+def crowded(path: RoomDrive, seed: int, people: int = 8) -> RoomDrive:
     """Return the same drive with moved furniture, people that come and go, and slipping wheels.
 
     People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far for some seconds.
@@ -48,4 +48,4 @@ def crowded(path: Drive, seed: int, people: int = 8) -> Drive:
         slip[row:end, 0] += rng.choice([0, 0, 0.1, -0.1, 0.3])
         row = end
     slip[:, 2] += (slip[:, 0] - 1) / 6
-    return Drive(path.truth, path.steps * slip, ranges)
+    return RoomDrive(path.truth, path.steps * slip, ranges)

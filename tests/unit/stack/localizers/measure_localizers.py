@@ -20,7 +20,17 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
-from simscen.testing.synthetic_room import DEFAULT_NOISE, Drive, Noise, drive, errors, localizer, nees, run, scan
+from simscen.testing.synthetic_room import (
+    DEFAULT_NOISE,
+    Noise,
+    RoomDrive,
+    build_localizer,
+    drive,
+    nees,
+    pose_errors,
+    run_localizer,
+    scan,
+)
 
 SUM = Amcl(laser_model_type="likelihood_field")
 PROB = Amcl(laser_model_type="likelihood_field_prob")
@@ -64,8 +74,9 @@ def tracking(
     squares, consistency, path = [], [], drive(seconds)
     for seed in seeds:
         start = Pose2(*(path.truth[0] + np.random.default_rng((seed, 3)).normal(0, START_STD)))
-        beliefs = run(localizer(spec, Estimate(start, tuple(START_STD)), seed), path, seed, noise, imu=imu)
-        error = errors(beliefs, path.truth)
+        subject = build_localizer(spec, Estimate(start, tuple(START_STD)), seed)
+        beliefs = run_localizer(subject, path, seed, noise, imu=imu)
+        error = pose_errors(beliefs, path.truth)
         times = np.linspace(0.25, 1, 25) * (len(error) - 1)
         squares.append((np.mean(error[:, 0] ** 2 + error[:, 1] ** 2), np.mean(error[:, 2] ** 2)))
         consistency.append([nees(beliefs[k], error[k]) for k in times.astype(int)])
@@ -82,7 +93,7 @@ class Relocalization:
 
 
 def relocalization(
-    spec: Spec, seeds: Iterable[int], drives: "dict[int, tuple[Drive, Estimate]]", begin: float = 0.0
+    spec: Spec, seeds: Iterable[int], drives: "dict[int, tuple[RoomDrive, Estimate]]", begin: float = 0.0
 ) -> Relocalization:
     """Run a localizer with each seed on the drive, and from the initial estimate, of this seed.
 
@@ -91,7 +102,7 @@ def relocalization(
     rows = []
     for seed in seeds:
         path, estimate = drives[seed]
-        error = np.abs(errors(run(localizer(spec, estimate, seed), path, seed), path.truth))
+        error = np.abs(pose_errors(run_localizer(build_localizer(spec, estimate, seed), path, seed), path.truth))
         lost = np.flatnonzero((np.hypot(error[:, 0], error[:, 1]) > FOUND_M) | (error[:, 2] > FOUND_RAD))
         last = lost[-1] + 1 if len(lost) else 0
         rows.append((last <= len(error) - 40, last / 40 - begin))
@@ -105,7 +116,8 @@ def among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Arr
     for seed in seeds:
         path = crowded(drive(seconds, seed % 12), seed)
         start = Estimate(Pose2(*path.truth[0]), tuple(START_STD))
-        distance = np.hypot(*errors(run(localizer(spec, start, seed), path, seed), path.truth)[:, :2].T)
+        beliefs = run_localizer(build_localizer(spec, start, seed), path, seed)
+        distance = np.hypot(*pose_errors(beliefs, path.truth)[:, :2].T)
         rows.append((np.sqrt(np.mean(distance**2)), distance.max()))
     return np.array(rows)
 
@@ -140,7 +152,7 @@ def update_cost(spec: Amcl, particles: int) -> float:
     """Return the wall time in ms of one update by a scan with this number of particles, as median of 100."""
     path = drive(20.0)
     fixed = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
-    subject, costs = localizer(fixed, Estimate(Pose2(*path.truth[0])), 1), []
+    subject, costs = build_localizer(fixed, Estimate(Pose2(*path.truth[0])), 1), []
     for tick in range(100):
         subject.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
         start = time.perf_counter()

@@ -15,7 +15,7 @@ from simscen.model.localizers import Amcl
 from simscen.stack.localizers.build import amcl
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, localizer, scan, surroundings
+from simscen.testing.synthetic_room import BEAMS, build_localizer, cast, drive, grid, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()
@@ -32,7 +32,7 @@ def odometry(tick: int, pose: Pose2) -> Odometry:
 
 def started(spec: Amcl = DEFAULT, **changes: object) -> Localizer:
     """A localizer that has had its first odometry and its first scan."""
-    subject = localizer(spec, GUESS, 1)
+    subject = build_localizer(spec, GUESS, 1)
     subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
     subject.on_scan(seen(START, 0, **changes))
     return subject
@@ -108,7 +108,7 @@ def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> N
 
 
 def test_scans_older_than_any_odometry_are_left_alone() -> None:
-    subject = localizer(Amcl(), GUESS, 1)
+    subject = build_localizer(Amcl(), GUESS, 1)
     subject.on_odometry(odometry(100, Pose2(0, 0, 0)))
     subject.on_scan(seen(START, 50))
     assert subject.belief.updated == 0
@@ -116,7 +116,7 @@ def test_scans_older_than_any_odometry_are_left_alone() -> None:
 
 def test_the_particles_start_at_the_most_and_shrink_to_the_least_as_the_place_becomes_certain() -> None:
     spec = Amcl(min_particles=100, max_particles=3000, laser_model_type="likelihood_field_prob")
-    subject = localizer(spec, GUESS, 1)
+    subject = build_localizer(spec, GUESS, 1)
     assert len(subject.belief.particles) == 3000
     for tick, row in enumerate(drive(20.0).truth[::20]):
         subject.on_odometry(odometry(tick, Pose2(*drive(20.0).truth[0]).between(Pose2(*row))))
@@ -189,7 +189,7 @@ def test_a_reset_starts_over_at_the_next_odometry() -> None:
 
 
 def test_without_an_estimate_the_particles_lie_all_over_the_free_space() -> None:
-    belief = localizer(Amcl(), Estimate(None), 1).belief
+    belief = build_localizer(Amcl(), Estimate(None), 1).belief
     assert (grid().values_at(belief.particles[:, :2]) == 0).all()
     assert np.sqrt(np.diag(belief.covariance)).min() > 1
 

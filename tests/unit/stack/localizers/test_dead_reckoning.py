@@ -8,7 +8,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import OdometryOnly
-from simscen.testing.synthetic_room import Noise, drive, errors, localizer, run
+from simscen.testing.synthetic_room import Noise, build_localizer, drive, pose_errors, run_localizer
 
 SPEC = OdometryOnly(type="odometry")
 SILENT = Noise(translation=0, rotation=0, drift=0)
@@ -16,8 +16,8 @@ SILENT = Noise(translation=0, rotation=0, drift=0)
 
 def test_without_noise_it_is_exact_and_its_correction_never_changes() -> None:
     way = drive(30.0)
-    beliefs = run(localizer(SPEC, Estimate(Pose2(*way.truth[0])), 1), way, 1, SILENT)
-    assert np.abs(errors(beliefs, way.truth)).max() < 1e-9
+    beliefs = run_localizer(build_localizer(SPEC, Estimate(Pose2(*way.truth[0])), 1), way, 1, SILENT)
+    assert np.abs(pose_errors(beliefs, way.truth)).max() < 1e-9
     assert len({belief.map_from_odom for belief in beliefs}) == 1
 
 
@@ -25,18 +25,18 @@ def test_the_error_stays_within_what_it_admits() -> None:
     """Its noise is the EKF's default, twice that of our wheels."""
     way = drive(30.0)
     for seed in range(5):
-        beliefs = run(localizer(SPEC, Estimate(Pose2(*way.truth[0]), (0.01, 0.01, 0.01)), 1), way, seed)
-        assert (np.abs(errors(beliefs, way.truth)[-1]) < 3 * np.sqrt(np.diag(beliefs[-1].covariance))).all()
+        beliefs = run_localizer(build_localizer(SPEC, Estimate(Pose2(*way.truth[0]), (0.01, 0.01, 0.01)), 1), way, seed)
+        assert (np.abs(pose_errors(beliefs, way.truth)[-1]) < 3 * np.sqrt(np.diag(beliefs[-1].covariance))).all()
 
 
 def test_the_first_odometry_is_the_reference_and_not_a_step() -> None:
-    subject = localizer(SPEC, Estimate(Pose2(1, 2, 0)), 1)
+    subject = build_localizer(SPEC, Estimate(Pose2(1, 2, 0)), 1)
     subject.on_odometry(Odometry("odom", 0, Pose2(5, 5, 1), Twist()))
     assert subject.belief.pose == pytest.approx((1, 2, 0))
     assert subject.belief.map_from_odom.compose(Pose2(5, 5, 1)) == pytest.approx((1, 2, 0))
 
 
 def test_an_unknown_start_is_the_origin_with_an_uncertainty_that_says_so() -> None:
-    belief = localizer(SPEC, Estimate(None), 1).belief
+    belief = build_localizer(SPEC, Estimate(None), 1).belief
     assert belief.pose == Pose2(0, 0, 0)
     assert np.sqrt(np.diag(belief.covariance)) == pytest.approx((100, 100, np.pi / np.sqrt(3)))

@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
-from simscen.testing.synthetic_room import Noise, drive, errors, localizer, nees, run
+from simscen.testing.synthetic_room import Noise, build_localizer, drive, nees, pose_errors, run_localizer
 
 SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)
@@ -20,7 +20,7 @@ STD = np.array([0.1, 0.1, 0.05])
 
 
 def ekf(spec: Ekf, estimate: Estimate) -> Localizer:
-    return localizer(spec, estimate, 1)
+    return build_localizer(spec, estimate, 1)
 
 
 def odometry(tick: int, pose: Pose2) -> Odometry:
@@ -31,7 +31,7 @@ def odometry(tick: int, pose: Pose2) -> Odometry:
 def test_without_noise_the_pose_is_exact(imu: bool) -> None:
     way = drive(30.0)
     subject = ekf(SPEC, Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
-    assert np.abs(errors(run(subject, way, 1, NOISELESS, imu=imu), way.truth)).max() < 1e-4
+    assert np.abs(pose_errors(run_localizer(subject, way, 1, NOISELESS, imu=imu), way.truth)).max() < 1e-4
 
 
 def test_a_precise_gyroscope_corrects_the_heading_of_the_wheels() -> None:
@@ -49,8 +49,8 @@ def test_the_covariance_agrees_with_the_error(imu: bool) -> None:
     way, values = drive(10.0), []
     for seed in range(700, 750):
         start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
-        beliefs = run(ekf(SPEC, Estimate(start, (STD[0], STD[1], STD[2]))), way, seed, AS_SPECIFIED, imu=imu)
-        values.append(nees(beliefs[-1], errors(beliefs, way.truth)[-1]))
+        beliefs = run_localizer(ekf(SPEC, Estimate(start, (STD[0], STD[1], STD[2]))), way, seed, AS_SPECIFIED, imu=imu)
+        values.append(nees(beliefs[-1], pose_errors(beliefs, way.truth)[-1]))
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * len(values))
     assert low < np.sum(values) < high
 
