@@ -16,7 +16,7 @@ from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans, TimedValues
-from simscen.reconstruction.evidence import windows
+from simscen.reconstruction.reasons import windows
 from simscen.record.foreign.trace_reader import goal_events
 from simscen.record.messages import event_text
 
@@ -42,7 +42,9 @@ ToSeconds = Callable[[int], float]
 """Converts a time of logging in ns to s since the start of the drive."""
 
 
-def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
+def find_goals(
+    messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues
+) -> tuple[tuple[RecordedGoal, ...], str]:
     """Return the goals of a drive and the final result of the navigation, "" if unknown."""
     sent = [
         RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
@@ -52,16 +54,18 @@ def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -
         (to_seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")
     ]
     if events:
-        return tuple(_with_events(sent, events)), _result(events)
+        return tuple(_with_results_of_events(sent, events)), _result(events)
     if not sent:
-        sent = list(_ends_of_plans(messages, to_seconds))
-    status = _with_status(sent, messages, to_seconds)
+        sent = list(_goals_from_plans(messages, to_seconds))
+    status = _with_results_of_actions(sent, messages, to_seconds)
     if sent:
         return tuple(status), ""
-    return tuple(ends_of_motion(poses)), ""
+    return tuple(goals_from_motion(poses)), ""
 
 
-def _with_events(sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]) -> Iterator[RecordedGoal]:
+def _with_results_of_events(
+    sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]
+) -> Iterator[RecordedGoal]:
     """Yield the goals with their names and results from the events of the navigator."""
     accepted = [(time, event) for time, event in events if event.kind is EventKind.GOAL_ACCEPTED]
     poses = list(sent)
@@ -86,7 +90,9 @@ def _result(events: Sequence[tuple[float, Event]]) -> str:
     return ended[-1] if ended else ""
 
 
-def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
+def _with_results_of_actions(
+    sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds
+) -> Iterator[RecordedGoal]:
     """Yield the goals with the results of their actions, if the log has as many actions as goals."""
     states = [(message.log_time, message.content) for message in messages.of("status")]
     names = [str(number) for number in range(len(sent))]
@@ -106,7 +112,7 @@ def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds
             yield replace(goal, sent=accepted, ended=to_seconds(ending.tick), status=status, source=source)
 
 
-def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
+def _goals_from_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
     """Yield a goal for each plan that ends elsewhere than the previous one."""
     last: Pose2 | None = None
     for message in messages.of("plan"):
@@ -118,7 +124,7 @@ def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[Rec
         last = end
 
 
-def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
+def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
     """Yield goals where the robot stopped for MIN_STOP_S, where its path bends in between, and where the drive ends."""
     if len(poses) < 2:
         return
@@ -154,7 +160,7 @@ LEAD_S = 0.5
 """Time before the first motion that is kept if the log has no goal messages."""
 
 
-def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
+def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
     """Return the drive from its first goal on. All times count from that moment."""
     if not drive.goals:
         return drive
@@ -207,5 +213,5 @@ def _scans_after(scans: Scans, begin: float) -> Scans:
         times=scans.times[first:] - begin,
         arrivals=scans.arrivals[first:] - begin,
         ranges=scans.ranges[first:],
-        malformed=scans.malformed[first:],
+        is_malformed=scans.is_malformed[first:],
     )

@@ -13,7 +13,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.reconstruction.drive.goals import from_first_goal, goals_of
+from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
 from simscen.record import topics
@@ -52,7 +52,7 @@ def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
         messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth, options.robot)
-        return from_first_goal(_DriveReader(path, messages).drive())
+        return trim_to_first_goal(_DriveReader(path, messages).drive())
 
 
 class _DriveReader:
@@ -80,13 +80,13 @@ class _DriveReader:
         commands = self._signal(
             "cmd_vel", [tuple(message.content.values) for message in self._messages.of("cmd_vel")], 3
         )
-        goals, result = goals_of(self._messages, self._seconds, poses)
+        goals, result = find_goals(self._messages, self._seconds, poses)
         return RecordedDrive(
             name=self._path.stem,
             duration=duration,
             poses=poses,
             pose_source=source,
-            has_independent_poses=independent,
+            has_true_poses=independent,
             belief=belief,
             corrections=self._poses_of_tf("map", "odom") or no_values(3),
             odometry=odometry,
@@ -210,16 +210,16 @@ class _DriveReader:
         order = np.argsort(times, kind="stable")
         first: ScanMessage = next(message.content for message in messages if len(message.content.ranges) == beams)
         ranges = np.full((len(messages), beams), np.nan)
-        malformed = np.zeros(len(messages), dtype=bool)
+        is_malformed = np.zeros(len(messages), dtype=bool)
         for row, index in enumerate(order.tolist()):
             values = messages[index].content.ranges
-            malformed[row] = len(values) != beams
-            if not malformed[row]:
+            is_malformed[row] = len(values) != beams
+            if not is_malformed[row]:
                 ranges[row] = values
         mount, height = self._mount(frame)
         angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
         limits = first.range_min, first.range_max
-        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, malformed, frame)
+        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed, frame)
 
     def _mount(self, frame: str) -> tuple[Pose2, float]:
         """Return the pose of the lidar on the base and its height, from static transforms, or else the first ones."""

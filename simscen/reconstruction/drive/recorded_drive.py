@@ -68,7 +68,7 @@ class Scans:
         range_max: Maximum range in m.
         mount: Pose of the lidar on the base.
         height: Height of the lidar above the base frame in m.
-        malformed: Whether a scan (n,) has another number of beams; its ranges are nan.
+        is_malformed: Whether a scan (n,) has another number of beams; its ranges are nan.
         frame: Frame of the lidar.
     """
 
@@ -80,7 +80,7 @@ class Scans:
     range_max: float
     mount: Pose2
     height: float
-    malformed: Mask
+    is_malformed: Mask
     frame: str = "lidar"
 
     def __len__(self) -> int:
@@ -100,14 +100,14 @@ class Scans:
     def every(self, step: int) -> Scans:
         """Return every second, third, … of the scans."""
         which = slice(None, None, step)
-        times, arrivals, ranges, malformed = (
+        times, arrivals, ranges, is_malformed = (
             self.times[which],
             self.arrivals[which],
             self.ranges[which],
-            self.malformed[which],
+            self.is_malformed[which],
         )
         limits = self.range_min, self.range_max
-        return Scans(times, arrivals, ranges, self.angles, *limits, self.mount, self.height, malformed, self.frame)
+        return Scans(times, arrivals, ranges, self.angles, *limits, self.mount, self.height, is_malformed, self.frame)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class RecordedDrive:
         duration: Time in s of the last message.
         poses: Best known poses of the base in the map frame (x, y, yaw).
         pose_source: Where `poses` are from, for people.
-        has_independent_poses: Whether `poses` are a ground truth and not the belief of the robot.
+        has_true_poses: Whether `poses` are a ground truth and not the belief of the robot.
         belief: Poses that the localizer published, with the covariances xx, xy, xyaw, yy, yyaw, yawyaw (n, 9).
         corrections: Poses of the odom frame in the map frame (n, 3), from /tf.
         odometry: Poses in the odom frame and velocities vx, vy, wz (n, 6).
@@ -162,7 +162,7 @@ class RecordedDrive:
     duration: float
     poses: TimedValues
     pose_source: str
-    has_independent_poses: bool
+    has_true_poses: bool
     belief: TimedValues = field(default_factory=lambda: no_values(9))
     corrections: TimedValues = field(default_factory=lambda: no_values(3))
     odometry: TimedValues = field(default_factory=lambda: no_values(6))

@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 SAMPLE_PERIOD_S = 0.025
 """Period at which commands and odometry are compared."""
@@ -20,9 +20,9 @@ NORMAL_LAG_S = 0.09
 """Lag of a base without faults, which needs a moment to accelerate."""
 MIN_COMMAND_M_S = 0.1
 """Speed above which a command, or a motion, counts as driving."""
-IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
+IGNORED_FRACTION, MIN_IGNORED_S = 0.1, 0.4
 """Ratio of driven to commanded speed below which the base ignores a command, for at least this time."""
-KEPT_SHARE, MIN_KEPT_S = 0.5, 0.6
+KEPT_FRACTION, MIN_KEPT_S = 0.5, 0.6
 """Ratio of commanded to driven speed below which the base should slow down, for longer than braking takes."""
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
 """Time in which a steady command changes by at most this share of its value."""
@@ -57,9 +57,7 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
     if lag >= MIN_LAG_S:
         text = f"the base follows its commands {lag:.2f} s late"
         values = {"latency": f"{1000 * (lag - NORMAL_LAG_S):.0f} ms"}
-        yield FoundFault(
-            "cmd_vel", "delay", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium")
-        )
+        yield FoundFault("cmd_vel", "delay", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
     shift = round(lag / SAMPLE_PERIOD_S)
     if shift:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
@@ -112,25 +110,25 @@ def _lag(commanded: Array, driven: Array) -> float:
 def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
     """Return the times in which the base stood although it was commanded to drive."""
     stands = (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S) & (
-        np.abs(driven[:, 0]) < IGNORED_SHARE * np.abs(commanded[:, 0])
+        np.abs(driven[:, 0]) < IGNORED_FRACTION * np.abs(commanded[:, 0])
     )
     found = []
     for window in windows(stands, times, MIN_IGNORED_S, 0.1):
-        evidence = Evidence("the base stands although it is commanded to drive", window.begin, window.end, "medium")
-        found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, evidence))
+        reason = Reason("the base stands although it is commanded to drive", window.begin, window.end, "medium")
+        found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, reason))
     return found
 
 
 def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
     """Yield the times in which the base kept its speed although it was commanded to stop."""
     speed = _averaged(driven[:, 0])
-    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_SHARE * np.abs(speed))
+    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_FRACTION * np.abs(speed))
     for window in windows(keeps, times, MIN_KEPT_S, 0.1):
         if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
             text = "the base keeps its speed although it is commanded to stop"
-            evidence = Evidence(text, window.begin, window.end, "medium")
+            reason = Reason(text, window.begin, window.end, "medium")
             begin = max(0.0, window.begin - STEADY_S)
-            yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, evidence)
+            yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, reason)
 
 
 def _side_gains(times: Array, commanded: Array, driven: Array, separation: float) -> Iterator[FoundFault]:
@@ -148,8 +146,8 @@ def _side_gains(times: Array, commanded: Array, driven: Array, separation: float
         return
     left, right = (f"{100 * gain:.0f} %" for gain in gains)
     text = f"the left wheels drive {left} and the right ones {right} of their commands"
-    evidence = Evidence(text, float(times[0]), float(times[-1]), "medium")
-    yield FoundFault("wheels", "gain", {"left": left, "right": right}, evidence=evidence)
+    reason = Reason(text, float(times[0]), float(times[-1]), "medium")
+    yield FoundFault("wheels", "gain", {"left": left, "right": right}, reason=reason)
 
 
 def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
@@ -162,12 +160,12 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
     slow = command - speed > MIN_SHORTFALL_M_S
     if slow.mean() < 0.2:
         return
-    evidence_times = float(at[slow][0]), float(at[slow][-1])
+    reason_times = float(at[slow][0]), float(at[slow][-1])
     start, end, drain, spread = _falling_limit(at[slow], speed[slow])
     if start - end > MIN_LIMIT_FALL_M_S and spread < MAX_LIMIT_SPREAD_M_S:
         values = {"start": f"{start:.2f} m/s", "end": f"{max(end, 0.01):.2f} m/s", "drain": f"{drain:.0f} s"}
         text = f"the speed falls from {start:.2f} to {end:.2f} m/s although more is commanded"
-        yield FoundFault("cmd_vel", "low_battery", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "low_battery", values, reason=Reason(text, *reason_times, "medium"))
         return
     cap = float(np.median(speed[slow]))
     below = (command < cap) & ~slow
@@ -176,12 +174,12 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
     ):
         text = f"the robot drives at most {cap:.2f} m/s although more is commanded"
         values = {"linear": f"{cap:.2f} m/s"}
-        yield FoundFault("cmd_vel", "saturation", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "saturation", values, reason=Reason(text, *reason_times, "medium"))
     elif abs(float(np.median(ratio)) - 1.0) > MIN_GAIN_ERROR:
         gain = float(np.median(ratio))
         text = f"the robot drives {100 * gain:.0f} % of the commanded speed"
         values = {"linear": f"{100 * gain:.0f} %"}
-        yield FoundFault("cmd_vel", "gain", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "gain", values, reason=Reason(text, *reason_times, "medium"))
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:

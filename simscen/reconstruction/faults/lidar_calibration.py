@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.compared_scans import ComparedScans
+from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.static_world import StaticWorld
 
 MAX_SCANS = 40
 """Number of scans, evenly spread over the drive, that are compared."""
@@ -37,20 +37,20 @@ MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
 """Smallest bias, difference of the scale from 1, and drift of ranges that are reported."""
 
 
-def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
+def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     """Return the true pose of the lidar in the frame of its nominal mount (Gauss-Newton on range differences)."""
-    step = max(1, len(model.scans) // MAX_SCANS)
-    chosen = np.flatnonzero(~model.scans.malformed)[::step]
+    step = max(1, len(compared.scans) // MAX_SCANS)
+    chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
     error = Pose2(0.0, 0.0, 0.0)
     if not len(chosen):
         return error
-    ranges, angles, reach = model.scans.ranges[chosen], model.scans.angles, model.scans.range_max
-    hit = model.is_hit[chosen]
+    ranges, angles, reach = compared.scans.ranges[chosen], compared.scans.angles, compared.scans.range_max
+    hit = compared.is_hit[chosen]
     if int(hit.sum()) < MIN_BEAMS:
         return error
 
     def differences(offset: Pose2) -> Array:
-        return ranges - world.ranges_from(_shifted(model.poses[chosen], offset), angles, reach)
+        return ranges - world.ranges_from(_shifted(compared.poses[chosen], offset), angles, reach)
 
     with np.errstate(invalid="ignore"):
         misfit = {
@@ -90,9 +90,9 @@ def _shifted(poses: Array, offset: Pose2) -> Array:
     return np.column_stack((x, y, poses[:, 2] + offset.yaw))
 
 
-def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
+def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | None:
     """Return the fault of a lidar that is not where its mount says, or None. The poses must be ground truth."""
-    error = mount_error(model, world)
+    error = mount_error(compared, world)
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
         return None
@@ -103,38 +103,38 @@ def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
         values["yaw"] = f"{math.degrees(error.yaw):.1f} deg"
     turned = math.degrees(error.yaw)
     text = f"the scans fit the walls if the lidar is turned by {turned:.1f} deg and shifted by {shift:.2f} m"
-    return FoundFault("lidar", "extrinsic", values, evidence=Evidence(text, None, None, "medium"))
+    return FoundFault("lidar", "extrinsic", values, reason=Reason(text, None, None, "medium"))
 
 
-def with_corrected_mount(model: ScanModel, world: Surroundings) -> ScanModel:
-    """Return the model with the lidar moved to its estimated true pose, at which its scans fit the walls."""
-    error = mount_error(model, world)
-    poses = _shifted(model.poses, error)
-    expected = world.ranges_from(poses, model.scans.angles, model.scans.range_max)
-    return replace(model, poses=poses, expected=expected)
+def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> ComparedScans:
+    """Return the compared with the lidar moved to its estimated true pose, at which its scans fit the walls."""
+    error = mount_error(compared, world)
+    poses = _shifted(compared.poses, error)
+    expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
+    return replace(compared, poses=poses, expected=expected)
 
 
-def range_error_faults(model: ScanModel) -> Iterator[FoundFault]:
+def range_error_faults(compared: ComparedScans) -> Iterator[FoundFault]:
     """Yield a constant error, a wrong scale, or a drift of all ranges."""
-    residuals = np.where(np.abs(np.nan_to_num(model.residuals, nan=9.0)) < OUTLIER_M, model.residuals, np.nan)
+    residuals = np.where(np.abs(np.nan_to_num(compared.residuals, nan=9.0)) < OUTLIER_M, compared.residuals, np.nan)
     rows = np.isfinite(residuals).sum(axis=1) >= 20
     if int(rows.sum()) < 10:
         return
-    medians, times = np.nanmedian(residuals[rows], axis=1), model.scans.times[rows]
+    medians, times = np.nanmedian(residuals[rows], axis=1), compared.scans.times[rows]
     slope, start = np.polyfit(times - times[0], medians, 1).tolist()
     grown = slope * float(times[-1] - times[0])
     if abs(slope) > MIN_DRIFT_M_S and abs(grown) > 2 * MIN_BIAS_M and abs(grown) > 2 * abs(start):
         text = f"the ranges drift by {100 * grown:.1f} cm during the drive"
         values = {"range": f"{100 * slope:.2f} cm/s"}
-        yield FoundFault("lidar", "drift", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium"))
+        yield FoundFault("lidar", "drift", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
         return
     finite = np.isfinite(residuals)
-    expected, errors = model.expected[finite], residuals[finite]
+    expected, errors = compared.expected[finite], residuals[finite]
     scale, bias = np.polyfit(expected, errors, 1).tolist()
     if abs(scale) > MIN_SCALE_ERROR and abs(scale * float(np.mean(expected))) > abs(bias):
         text = f"ranges are {100 * (1 + scale):.1f} % of the distances"
-        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, evidence=Evidence(text))
+        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, reason=Reason(text))
     elif abs(float(np.median(errors))) > MIN_BIAS_M:
         bias = float(np.median(errors))
         text = f"ranges differ from the distances by {100 * bias:.1f} cm"
-        yield FoundFault("lidar", "bias", {"range": f"{100 * bias:.1f} cm"}, evidence=Evidence(text))
+        yield FoundFault("lidar", "bias", {"range": f"{100 * bias:.1f} cm"}, reason=Reason(text))

@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
 """Smallest change of the error of the estimated pose, between two estimates, that is a jump."""
@@ -33,7 +33,7 @@ def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield jumps of the belief away from the ground truth and back."""
-    if not drive.has_independent_poses:
+    if not drive.has_true_poses:
         return
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
     errors = belief - truth
@@ -55,7 +55,7 @@ def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
             continue
         values = _jump_values(truth[out], belief[out])
         text = f"the estimated pose jumps by {float(away[0]):.2f} m and back"
-        yield FoundFault("localizer", "jump", values, begin, end - begin, Evidence(text, begin, end))
+        yield FoundFault("localizer", "jump", values, begin, end - begin, Reason(text, begin, end))
         return
 
 
@@ -65,8 +65,8 @@ def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -
     stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
         text = f"the estimated pose jumps by {float(errors[out]):.2f} m and stays there"
-        evidence = Evidence(text, begin, float(drive.belief.times[-1]), "medium")
-        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, evidence)
+        reason = Reason(text, begin, float(drive.belief.times[-1]), "medium")
+        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, reason)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
@@ -94,7 +94,7 @@ def _silence(drive: RecordedDrive) -> Iterator[FoundFault]:
         begin, end = float(times[index]), float(times[index + 1])
         if len(drive.odometry) > 1 and _distance(drive, begin, end) > MIN_DRIVEN_M:
             text = f"no pose from the localizer for {end - begin:.1f} s"
-            yield FoundFault("localizer", "off", {}, begin, end - begin, Evidence(text, begin, end))
+            yield FoundFault("localizer", "off", {}, begin, end - begin, Reason(text, begin, end))
     if not len(gaps):
         yield from _without_corrections(drive)
 
@@ -113,9 +113,9 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     for window in usual:
         if window.length > limit and _distance(drive, window.begin, window.end) > MIN_DRIVEN_M:
             text = f"the localizer does not correct the odometry for {window.length:.1f} s"
-            evidence = Evidence(text, window.begin, window.end, "medium")
+            reason = Reason(text, window.begin, window.end, "medium")
             until_end = window.end >= float(corrections.times[-1]) - MIN_SILENCE_S
-            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, evidence)
+            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, reason)
 
 
 def _distance(drive: RecordedDrive, begin: float, end: float) -> float:

@@ -8,15 +8,15 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_period
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_OUTAGE_PERIODS = 4.5
 """Time between two messages, in periods, from which on it is an outage and not a few lost messages."""
 MIN_GAP_PERIODS = 1.5
 """Time between two messages, in periods, from which on messages are missing in between."""
-MIN_LOST_SHARE, MIN_LOST_MESSAGES = 0.03, 4
+MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
 """Share and number of missing messages from which on they are reported."""
-MAX_MULTIPLE_ERROR, MIN_MULTIPLE_SHARE = 0.2, 0.7
+MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
 """Where messages are lost, most steps are within a fifth of a period of two, three, … periods. Otherwise the sensor
 measures irregularly."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
@@ -63,32 +63,32 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
         down = float(gaps.mean())
         up = max(period, (last - begin - float(gaps.sum())) / max(1, len(long) - 1))
         text = f"{len(long)} outages of {down:.2f} s on average"
-        evidence = Evidence(text, begin, last)
+        reason = Reason(text, begin, last)
         whole = begin < up * 3 and last > end - 3 * up
         values = {"up": f"{up:.2f} s", "down": f"{down:.2f} s"}
         start, length = (None, None) if whole else (begin, last - begin)
-        yield FoundFault(target, "intermittent", values, start, length, evidence)
+        yield FoundFault(target, "intermittent", values, start, length, reason)
         return
     for index in long.tolist():
         begin, length = float(edges[index]) + 0.5 * period, float(steps[index]) - period
         until_end = edges[index + 1] >= end - period
-        evidence = Evidence(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
-        yield FoundFault(target, "off", {}, begin, None if until_end else length, evidence)
+        reason = Reason(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
+        yield FoundFault(target, "off", {}, begin, None if until_end else length, reason)
     short = (steps > MIN_GAP_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
     lost = int(np.round(steps[short] / period - 1.0).sum())
     expected = len(times) + lost
     periods = steps[short] / period
     is_multiple = np.abs(periods - np.round(periods)) < MAX_MULTIPLE_ERROR
-    if lost >= MIN_LOST_MESSAGES and lost / expected > MIN_LOST_SHARE and is_multiple.mean() > MIN_MULTIPLE_SHARE:
+    if lost >= MIN_LOST_MESSAGES and lost / expected > MIN_LOST_FRACTION and is_multiple.mean() > MIN_MULTIPLE_FRACTION:
         at = np.flatnonzero(short)
         begin, last = float(edges[at[0]]), float(edges[at[-1] + 1])
         inside = (times >= begin) & (times <= last)
         share = lost / (lost + int(inside.sum()))
         whole = last - begin > 0.7 * (end - float(times[0]))
         share = lost / expected if whole else share
-        evidence = Evidence(f"{lost} of {expected} messages are missing", begin, last)
+        reason = Reason(f"{lost} of {expected} messages are missing", begin, last)
         start, length = (None, None) if whole else (begin, last - begin)
-        yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, evidence)
+        yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, reason)
 
 
 def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
@@ -104,9 +104,9 @@ def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | 
         step = float(np.median(inside))
         begin = float(times[window.first])
         whole = window.length > 0.8 * (end - float(times[0]))
-        evidence = Evidence(f"{1 / step:.2f} messages per second instead of {1 / period:.2f}", begin, window.end)
+        reason = Reason(f"{1 / step:.2f} messages per second instead of {1 / period:.2f}", begin, window.end)
         start, length = (None, None) if whole else (begin, window.end - begin)
-        return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, evidence)
+        return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, reason)
     return None
 
 
@@ -129,9 +129,9 @@ def _delay(target: str, times: Array, arrivals: Array, period: float, end: float
         values = {"latency": f"{1000 * max(0.0, least - base):.0f} ms"}
         if most - least > 0.25 * period:
             values["jitter"] = f"{1000 * (most - least):.0f} ms"
-        evidence = Evidence(f"messages arrive {least:.3f} to {most:.3f} s late", window.begin, window.end)
+        reason = Reason(f"messages arrive {least:.3f} to {most:.3f} s late", window.begin, window.end)
         start, length = (None, None) if whole else (window.begin, window.length)
-        yield FoundFault(target, "delay", values, start, length, evidence)
+        yield FoundFault(target, "delay", values, start, length, reason)
 
 
 def repeated_scans(scans: Scans) -> Mask:
@@ -154,5 +154,5 @@ def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
         begin = max(0.0, window.begin - 1.5 * scans.period)
         until_end = window.end >= end - 1.5 * scans.period
         length = window.end - begin + 0.5 * scans.period
-        evidence = Evidence("the same scan is repeated", window.begin, window.end)
-        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, evidence)
+        reason = Reason("the same scan is repeated", window.begin, window.end)
+        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, reason)

@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import STEP_S, Mask, MotionSteps, RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
 """Minimum motion for the estimate of a scale."""
@@ -17,7 +17,7 @@ MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_RAD_PER_M = 0.02, 0.03, 0.008
 """Smallest differences from 1 of the scales of distances and turns, and smallest turn per meter, that are reported."""
 MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
 """Smallest velocities of the odometry at rest that are reported."""
-MIN_SLIP_SHARE, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
+MIN_SLIP_FRACTION, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
 """Smallest slip that is reported: the share of the distance that is lost, the distance lost in a step, and the time."""
 MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
 """Standard deviations after one meter, and after one radian, that are reported. Good odometry has 0.01."""
@@ -25,7 +25,7 @@ MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
 """Share of the distance that must be lost beyond that in the rest of the drive, if the wheels rolled this far then."""
 REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
 """Motion within a step below which the robot stands, and the number of such steps for a drift."""
-LONG_SHARE = 0.75
+LONG_FRACTION = 0.75
 """Share of the drive from which on a difference lasts the whole drive."""
 CONFIDENCE_SIGMAS = 4.0
 """Smallest estimate that is reported, in its standard deviations."""
@@ -49,9 +49,9 @@ def _slip(steps: MotionSteps, separation: float) -> Iterator[FoundFault]:
     """Yield the times in which the wheels rolled further than the robot drove."""
     measured, true = _wheels(steps.measured, separation), _wheels(steps.true, separation)
     lost = np.abs(measured) - np.abs(true)
-    slips = ((lost > MIN_SLIP_SHARE * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
+    slips = ((lost > MIN_SLIP_FRACTION * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
     for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
-        whole = window.length > LONG_SHARE * float(np.ptp(steps.times))
+        whole = window.length > LONG_FRACTION * float(np.ptp(steps.times))
         if whole or window.length < MIN_SLIP_S:
             continue
         values = _slip_values(measured[window.samples], true[window.samples])
@@ -64,8 +64,8 @@ def _slip(steps: MotionSteps, separation: float) -> Iterator[FoundFault]:
         target = "odom" if _follows_commands(steps, window) else "wheels"
         text = "the wheels roll further than the robot drives"
         begin = None if not before.any() else window.begin
-        evidence = Evidence(text, window.begin, window.end + STEP_S, "medium")
-        yield FoundFault(target, "slip", values, begin, window.length + STEP_S, evidence)
+        reason = Reason(text, window.begin, window.end + STEP_S, "medium")
+        yield FoundFault(target, "slip", values, begin, window.length + STEP_S, reason)
 
 
 def _lost_share(measured: Array, true: Array, chosen: Mask) -> float:
@@ -85,7 +85,7 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
     rolled = np.abs(measured).sum(axis=0)
     shares = 1.0 - (true * np.sign(measured)).sum(axis=0) / np.maximum(rolled, 1e-6)
     shares = np.clip(np.where(rolled > 0.1, shares, 0.0), 0.0, 0.95)
-    if float(shares.max()) < MIN_SLIP_SHARE:
+    if float(shares.max()) < MIN_SLIP_FRACTION:
         return {}
     return {"left": f"{100 * shares[0]:.0f} %", "right": f"{100 * shares[1]:.0f} %"}
 
@@ -112,7 +112,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
     drive = float(steps.times[0]), float(steps.times[-1]) + STEP_S
     if is_linear and is_angular and abs(linear - angular) < 0.3 * abs(linear) and not is_curved:
         text = f"the odometry reports {100 * (1 + linear):.1f} % of the motion"
-        yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, evidence=Evidence(text, *drive))
+        yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, reason=Reason(text, *drive))
     elif is_linear or is_angular or is_curved:
         values: dict[str, object] = {}
         values |= {"linear_scale": round(float(1 + linear), 3)} if is_linear else {}
@@ -122,7 +122,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
             f"the odometry reports {100 * (1 + linear):.1f} % of the distance and {100 * (1 + angular):.1f} % of turns"
         )
         text += f", and turns by {math.degrees(per_meter):.2f} deg per meter" if is_curved else ""
-        yield FoundFault("odom", "bias", values, evidence=Evidence(text, *drive))
+        yield FoundFault("odom", "bias", values, reason=Reason(text, *drive))
     yield from _drift(steps)
     if not skids:
         yield from _noise(measured[:, 0], forward[2], true[:, 0], measured[:, 2], turn[2], true[:, 2], drive)
@@ -151,8 +151,8 @@ def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
     values |= {"angular": f"{angular:.3f} rad/s"} if abs(angular) > MIN_DRIFT_RAD_S else {}
     if values:
         times = steps.times[rest]
-        evidence = Evidence("the odometry moves while the robot stands", float(times[0]), float(times[-1]))
-        yield FoundFault("odom", "drift", values, evidence=evidence)
+        reason = Reason("the odometry moves while the robot stands", float(times[0]), float(times[-1]))
+        yield FoundFault("odom", "drift", values, reason=reason)
 
 
 def _noise(
@@ -174,7 +174,7 @@ def _noise(
         values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE_RAD else {}
     if values:
         text = "the steps of the odometry scatter about the true motion"
-        yield FoundFault("odom", "noise", values, evidence=Evidence(text, *drive, "low"))
+        yield FoundFault("odom", "noise", values, reason=Reason(text, *drive, "low"))
 
 
 BIN_S, MIN_BINS = 0.5, 8
@@ -201,7 +201,7 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     explained = float(np.sum((measured - scale * true) ** 2)) < MAX_ERROR_RATIO * float(np.sum((measured - true) ** 2))
     if abs(scale - 1.0) > MIN_GYRO_SCALE_ERROR and explained:
         text = f"the gyroscope reports {100 * scale:.1f} % of the turns"
-        yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, evidence=Evidence(text, float(times[0])))
+        yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, reason=Reason(text, float(times[0])))
         return
     change = np.abs(np.diff(true, prepend=true[0], append=true[-1]))
     steady = np.maximum(change[1:], change[:-1]) < MAX_RATE_CHANGE_RAD_S
@@ -218,12 +218,12 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
         whole = end >= float(times[-1]) - BIN_S
         from_start = begin <= float(times[0]) + BIN_S
         values = {"gyro": f"{slope:.5f} rad/s^2"}
-        evidence = Evidence(text, begin, end, "medium")
+        reason = Reason(text, begin, end, "medium")
         length = None if whole else end - begin
-        yield FoundFault("imu", "drift", values, None if from_start else begin, length, evidence)
+        yield FoundFault("imu", "drift", values, None if from_start else begin, length, reason)
     elif abs(bias) > MIN_BIAS_RAD_S:
         text = f"the gyroscope reports {bias:.4f} rad/s at rest"
-        yield FoundFault("imu", "bias", {"gyro": f"{bias:.4f} rad/s"}, evidence=Evidence(text, float(times[0])))
+        yield FoundFault("imu", "bias", {"gyro": f"{bias:.4f} rad/s"}, reason=Reason(text, float(times[0])))
 
 
 def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:

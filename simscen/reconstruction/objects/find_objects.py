@@ -9,20 +9,20 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Indices, Polygon
-from simscen.reconstruction.evidence import Evidence
-from simscen.reconstruction.objects.clusters import scan_clusters, share_seen_free, usable_scans
+from simscen.reconstruction.objects.clusters import fraction_seen_free, scan_clusters, usable_scans
 from simscen.reconstruction.objects.found_object import FoundObject, Keyframe
 from simscen.reconstruction.objects.shapes import ObjectShape, fit_shape
 from simscen.reconstruction.objects.tracks import ObjectTrack, track_objects
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.reasons import Reason
+from simscen.reconstruction.static_world import StaticWorld
 
 MIN_DISPLACEMENT_M = 0.4
 """Distance that an object must move to count as moving."""
-MIN_FREED_SHARE = 0.5
+MIN_FREED_FRACTION = 0.5
 """Share of an earlier outline that must be seen free later, or of a later one that was free earlier."""
-SEEN_FREE_SHARE = 0.6
+SEEN_FREE_FRACTION = 0.6
 """Share of the points of an object that beams must pass to show that it is not there."""
 COMPARED_CLUSTERS = 5
 """Number of clusters at the start and at the end of a track that are compared."""
@@ -32,7 +32,7 @@ MERGE_DISTANCE_M = 0.3
 """Distance between the hits of two tracks below which they may be of the same standing object."""
 MIN_CLUSTERS_STANDING = 10
 """Number of clusters that a standing object needs."""
-PART_MARGIN_M, PART_SHARE = 0.15, 0.5
+PART_MARGIN_M, PART_FRACTION = 0.15, 0.5
 """A track belongs to a moving object if this share of its clusters is within this distance of it."""
 MIN_SIZE_M = 0.06
 """Longest side, or radius, below which an object is ignored."""
@@ -41,22 +41,22 @@ MAX_OBJECT_SPEED_M_S = 4.0
 
 
 def find_objects(
-    model: ScanModel, world: Surroundings, has_true_poses: bool, robots: Sequence[FoundObject] = ()
+    compared: ComparedScans, world: StaticWorld, has_true_poses: bool, robots: Sequence[FoundObject] = ()
 ) -> list[FoundObject]:
     """Return the objects that the scans show and the static world does not have, and the other `robots`."""
-    tracks = track_objects(scan_clusters(model, world, has_true_poses))
-    usable = np.flatnonzero(usable_scans(model))
-    moving = [track for track in tracks if _moves(model, track, usable)]
-    standing = _merged([track for track in tracks if track not in moving], model, usable)
+    tracks = track_objects(scan_clusters(compared, world, has_true_poses))
+    usable = np.flatnonzero(usable_scans(compared))
+    moving = [track for track in tracks if _moves(compared, track, usable)]
+    standing = _merged([track for track in tracks if track not in moving], compared, usable)
     moving.sort(key=lambda track: (-len(track.clusters), track.begin))
     found: list[FoundObject] = [*robots]
     for track in moving:
         if not any(_is_part(track, thing) for thing in found):
-            found.append(_found(model, track, usable, moves=True))
+            found.append(_found(compared, track, usable, moves=True))
     known = [*found]
     for track in standing:
         if len(track.clusters) >= MIN_CLUSTERS_STANDING and not any(_is_part(track, thing) for thing in known):
-            found.append(_found(model, track, usable, moves=False))
+            found.append(_found(compared, track, usable, moves=False))
     found = [thing for thing in found[len(robots) :] if max(thing.size) >= MIN_SIZE_M]
     found.sort(key=lambda thing: (thing.keyframes[0][0], *thing.keyframes[0][1:3]))
     kinds = {True: "moving object", False: "object"}
@@ -77,11 +77,11 @@ def object_along(name: str, outline: Polygon, times: Array, poses: Array) -> Fou
     centers = np.column_stack((poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2]))
     length, width = np.round(high - low, 2).tolist()
     keyframes = tuple(simplified(ObjectShape((length, width), times, centers)))
-    evidence = Evidence("its true poses in the log", float(times[0]), float(times[-1]))
-    return FoundObject(name, (length, width), keyframes, None, None, evidence, is_robot=True)
+    reason = Reason("its true poses in the log", float(times[0]), float(times[-1]))
+    return FoundObject(name, (length, width), keyframes, None, None, reason, is_robot=True)
 
 
-def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
+def _moves(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
     """Return whether an object moved, and not only the part of it that was visible."""
     shape = fit_shape(track.clusters, moves=True)
     centers = shape.poses[:, :2]
@@ -96,9 +96,9 @@ def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
     rows_late = usable[(usable >= track.clusters[far].scan - 2) & (usable <= track.clusters[far].scan + 20)]
     rows_early = usable[(usable >= track.clusters[0].scan - 5) & (usable <= track.clusters[0].scan + 3)]
     freed, was_free = (
-        share_seen_free(model, points, rows) for points, rows in ((first, rows_late), (last, rows_early))
+        fraction_seen_free(compared, points, rows) for points, rows in ((first, rows_late), (last, rows_early))
     )
-    return max(_largest(freed), _largest(was_free)) > MIN_FREED_SHARE
+    return max(_largest(freed), _largest(was_free)) > MIN_FREED_FRACTION
 
 
 def median_of_three(values: Array) -> Array:
@@ -114,11 +114,11 @@ def _largest(shares: Array) -> float:
     return float(np.nanmedian(shares)) if np.isfinite(shares).any() else 0.0
 
 
-def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> list[ObjectTrack]:
+def _merged(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
     """Return the tracks of standing objects, with those of one object joined."""
     merged: list[ObjectTrack] = []
     for track in tracks:
-        same = next((earlier for earlier in merged if _is_same(earlier, track, model, usable)), None)
+        same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)
         if same is None:
             merged.append(ObjectTrack([*track.clusters]))
         else:
@@ -126,7 +126,7 @@ def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> lis
     return merged
 
 
-def _is_same(earlier: ObjectTrack, later: ObjectTrack, model: ScanModel, usable: Indices) -> bool:
+def _is_same(earlier: ObjectTrack, later: ObjectTrack, compared: ComparedScans, usable: Indices) -> bool:
     """Return whether two tracks of standing objects touch, and the place was not free in between."""
     a, b = (np.concatenate([cluster.points for cluster in track.clusters]) for track in (earlier, later))
     a, b = a[:: max(1, len(a) // 200)], b[:: max(1, len(b) // 200)]
@@ -134,7 +134,7 @@ def _is_same(earlier: ObjectTrack, later: ObjectTrack, model: ScanModel, usable:
         return False
     first, last = earlier.clusters[-1].scan, later.clusters[0].scan
     between = usable[(usable > first) & (usable < last)]
-    return not len(between) or _largest(share_seen_free(model, b, between)) < SEEN_FREE_SHARE
+    return not len(between) or _largest(fraction_seen_free(compared, b, between)) < SEEN_FREE_FRACTION
 
 
 def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
@@ -146,14 +146,14 @@ def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
     reach = thing.size[0] if thing.is_cylinder else math.hypot(*thing.size) / 2
     inside = np.hypot(*(centers - at).T) < reach + PART_MARGIN_M
     present = (times >= frames[0, 0] - 0.5) & (times <= frames[-1, 0] + 0.5)
-    return float(np.mean(inside & present)) > PART_SHARE
+    return float(np.mean(inside & present)) > PART_FRACTION
 
 
-def _found(model: ScanModel, track: ObjectTrack, usable: Indices, moves: bool) -> FoundObject:
+def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, moves: bool) -> FoundObject:
     shape = fit_shape(track.clusters, moves)
     keyframes = simplified(shape) if moves else [_keyframe(shape, 0)]
-    appears = _appearance(model, track, usable)
-    disappears = _disappearance(model, track, usable)
+    appears = _appearance(compared, track, usable)
+    disappears = _disappearance(compared, track, usable)
     if disappears is not None and moves:
         disappears = max(disappears, keyframes[-1][0] + 0.01)
     seen = f"seen in {len(track.clusters)} scans"
@@ -163,30 +163,30 @@ def _found(model: ScanModel, track: ObjectTrack, usable: Indices, moves: bool) -
     else:
         text = f"{seen} at one place, and not on the map"
     confidence = "high" if len(track.clusters) >= 20 else "medium"
-    evidence = Evidence(text, track.begin, track.end, confidence)
-    return FoundObject("", shape.size, tuple(keyframes), appears, disappears, evidence)
+    reason = Reason(text, track.begin, track.end, confidence)
+    return FoundObject("", shape.size, tuple(keyframes), appears, disappears, reason)
 
 
-def _appearance(model: ScanModel, track: ObjectTrack, usable: Indices) -> float | None:
+def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
     """Return when the object appeared; None if its place was never seen free before it was seen there."""
     points = np.concatenate([cluster.points for cluster in track.clusters[:3]])
     before = usable[usable < track.clusters[0].scan]
     if not len(before):
         return None
-    shares = share_seen_free(model, points, before)
-    free = before[np.nan_to_num(shares, nan=0.0) > SEEN_FREE_SHARE]
-    return float(model.scans.times[free[-1] + 1]) if len(free) else None
+    shares = fraction_seen_free(compared, points, before)
+    free = before[np.nan_to_num(shares, nan=0.0) > SEEN_FREE_FRACTION]
+    return float(compared.scans.times[free[-1] + 1]) if len(free) else None
 
 
-def _disappearance(model: ScanModel, track: ObjectTrack, usable: Indices) -> float | None:
+def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
     """Return when the object disappeared; None if its place is not seen free afterwards."""
     points = np.concatenate([cluster.points for cluster in track.clusters[-3:]])
     after = usable[usable > track.clusters[-1].scan]
     if not len(after):
         return None
-    free = np.nan_to_num(share_seen_free(model, points, after), nan=0.0) > SEEN_FREE_SHARE
+    free = np.nan_to_num(fraction_seen_free(compared, points, after), nan=0.0) > SEEN_FREE_FRACTION
     twice = free & np.append(free[1:], free[-1])
-    return float(model.scans.times[after[np.argmax(twice)]]) if twice.any() else None
+    return float(compared.scans.times[after[np.argmax(twice)]]) if twice.any() else None
 
 
 def _keyframe(shape: ObjectShape, index: int) -> Keyframe:

@@ -9,14 +9,14 @@ import numpy as np
 
 from simscen.core.environment.world_model import WalkingPedestrian
 from simscen.core.geometry import Array
-from simscen.reconstruction.evidence import Evidence
+from simscen.reconstruction.reasons import Reason
 
 Keyframe = tuple[float, float, float, float]
 """Time in s since the start of the drive, x, y, yaw."""
 
 
 @dataclass(frozen=True, eq=False)
-class FoundWalk:
+class FittedPedestrian:
     """Pedestrian of the scenario language that walks like a tracked person.
 
     Attributes:
@@ -58,9 +58,9 @@ class FoundObject:
         keyframes: Poses over time; a single one for an object that stands.
         appears: Time in s at which it appears; None if it is there from the start.
         disappears: Time in s at which it disappears; None if it stays.
-        evidence: Why it is there.
+        reason: Why it is there.
         is_robot: Whether it is another robot, whose poses are in the log.
-        walk: How a pedestrian walks that reproduces the keyframes; None if it is no person or none does.
+        pedestrian: How a pedestrian walks that reproduces the keyframes; None if it is no person or none does.
     """
 
     name: str
@@ -68,9 +68,9 @@ class FoundObject:
     keyframes: tuple[Keyframe, ...]
     appears: float | None = None
     disappears: float | None = None
-    evidence: Evidence = field(default_factory=lambda: Evidence(""))
+    reason: Reason = field(default_factory=lambda: Reason(""))
     is_robot: bool = False
-    walk: FoundWalk | None = None
+    pedestrian: FittedPedestrian | None = None
 
     @property
     def is_moving(self) -> bool:
@@ -99,6 +99,6 @@ class FoundObject:
     @property
     def comment(self) -> str:
         """Why it is there, and as what, in one line."""
-        if self.walk is None:
-            return self.evidence.comment
-        return replace(self.evidence, text=f"{self.evidence.text}; {self.walk.sentence}").comment
+        if self.pedestrian is None:
+            return self.reason.comment
+        return replace(self.reason, text=f"{self.reason.text}; {self.pedestrian.sentence}").comment

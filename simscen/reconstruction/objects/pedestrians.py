@@ -12,9 +12,9 @@ from simscen.core.environment.world_model import Behavior, Unseen, WalkingPedest
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polygons import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
-from simscen.reconstruction.evidence import windows
-from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
-from simscen.reconstruction.objects.walk_trial import WalkTrial
+from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
+from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
+from simscen.reconstruction.reasons import windows
 
 MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
 """Radii of a round object that may be a person."""
@@ -58,41 +58,41 @@ class _Reaction:
     blind_to: frozenset[Unseen] = frozenset()
 
 
-def with_walks(objects: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
+def fit_pedestrians(objects: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
     """Return the objects; those that a pedestrian reproduces have a walk, and their names begin with "person"."""
     people = [thing for thing in objects if is_person(thing)]
     if len(people) > MAX_PEOPLE:
         return [*objects]
     others = [thing for thing in objects if thing not in people]
-    walks = {
-        thing.name: _fitted_walk(thing, [person for person in people if person is not thing], others, trial)
+    fitted = {
+        thing.name: _fit_pedestrian(thing, [person for person in people if person is not thing], others, trial)
         for thing in people
     }
-    found = [replace(thing, walk=walks.get(thing.name)) for thing in objects]
-    while any(thing.walk for thing in found):
-        found = _walked_together(found, trial)
+    found = [replace(thing, pedestrian=fitted.get(thing.name)) for thing in objects]
+    while any(thing.pedestrian for thing in found):
+        found = _simulated_together(found, trial)
         worst = max(found, key=_error)
         if _error(worst) <= 1.0:
             break
-        found = [replace(thing, walk=None) if thing is worst else thing for thing in found]
+        found = [replace(thing, pedestrian=None) if thing is worst else thing for thing in found]
     return [*_named(found)]
 
 
 def _named(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
     count = 0
     for thing in found:
-        if thing.walk is None:
+        if thing.pedestrian is None:
             yield thing
         else:
             count += 1
-            walker = replace(thing.walk.walker, name=f"person {count}")
-            yield replace(thing, name=walker.name, walk=replace(thing.walk, walker=walker))
+            walker = replace(thing.pedestrian.walker, name=f"person {count}")
+            yield replace(thing, name=walker.name, pedestrian=replace(thing.pedestrian, walker=walker))
 
 
 def _error(thing: FoundObject) -> float:
     """Return how far the walk of an object is from its track, in multiples of what is allowed; 0 without a walk."""
-    walk = thing.walk
-    return 0.0 if walk is None else max(walk.rmse / MAX_RMSE_M, walk.time_shift / MAX_TIME_SHIFT_S)
+    pedestrian = thing.pedestrian
+    return 0.0 if pedestrian is None else max(pedestrian.rmse / MAX_RMSE_M, pedestrian.time_shift / MAX_TIME_SHIFT_S)
 
 
 def is_person(thing: FoundObject) -> bool:
@@ -135,9 +135,9 @@ class _Track:
         return x, y
 
 
-def _fitted_walk(
-    thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: WalkTrial
-) -> FoundWalk | None:
+def _fit_pedestrian(
+    thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: PedestrianTrial
+) -> FittedPedestrian | None:
     """Return the simplest walk that reproduces a person while all others move as recorded; None without one."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
@@ -146,11 +146,11 @@ def _fitted_walk(
     def is_lost(time: float, position: tuple[float, float]) -> bool:
         return time > track.times[0] and math.dist(position, track.at(time)) > LOST_M
 
-    def tried(begin: float, walker: WalkingPedestrian) -> FoundWalk:
+    def tried(begin: float, walker: WalkingPedestrian) -> FittedPedestrian:
         walked = trial.positions([(begin, walker)], people, objects, float(track.times[-1]), is_lost)
         return _compared(track, begin, walker, *walked[walker.name])
 
-    best: FoundWalk | None = None
+    best: FittedPedestrian | None = None
     for reaction in _reactions(track, distances, meets):
         if best is not None and best.rmse < GOOD_RMSE_M:
             break
@@ -166,7 +166,7 @@ def _fitted_walk(
     return replace(best, meets_robot=meets)
 
 
-def _better(simple: FoundWalk | None, other: FoundWalk, margin: float) -> FoundWalk:
+def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: float) -> FittedPedestrian:
     return other if simple is None or other.rmse < simple.rmse - margin else simple
 
 
@@ -183,7 +183,7 @@ def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reacti
 
 
 def _walkers(
-    thing: FoundObject, track: _Track, reaction: _Reaction, trial: WalkTrial
+    thing: FoundObject, track: _Track, reaction: _Reaction, trial: PedestrianTrial
 ) -> Iterator[tuple[float, WalkingPedestrian]]:
     """Yield times of appearance and pedestrians that walk along a track, those with the fewest goals first.
 
@@ -222,7 +222,7 @@ def body_radius(thing: FoundObject) -> float:
     return min(max(thing.size[0], MIN_BODY_RADIUS_M), MAX_BODY_RADIUS_M)
 
 
-def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
+def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
     """Return the end (2,) of a track; if it ends in motion, a place farther on, because a pedestrian brakes."""
     end: Array = track.positions[-1]
     motion = end - track.at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
@@ -235,26 +235,28 @@ def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
     return farther if has_room and walls.visible(end[None], farther[None])[0] else end
 
 
-def _walked_together(found: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
+def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
     """Return the objects with their walks in a simulation in which all pedestrians walk at the same time."""
-    walkers = [(thing.walk.begin, thing.walk.walker) for thing in found if thing.walk]
-    objects = [thing for thing in found if not thing.walk]
-    end = max(thing.keyframes[-1][0] for thing in found if thing.walk)
+    walkers = [(thing.pedestrian.begin, thing.pedestrian.walker) for thing in found if thing.pedestrian]
+    objects = [thing for thing in found if not thing.pedestrian]
+    end = max(thing.keyframes[-1][0] for thing in found if thing.pedestrian)
     paths = trial.positions(walkers, [], objects, end)
     together = []
     for thing in found:
-        walk = thing.walk
-        if walk is not None:
-            again = _compared(_Track(thing), walk.begin, walk.walker, *paths[thing.name])
-            walk = replace(again, meets_robot=walk.meets_robot)
-        together.append(replace(thing, walk=walk))
+        pedestrian = thing.pedestrian
+        if pedestrian is not None:
+            again = _compared(_Track(thing), pedestrian.begin, pedestrian.walker, *paths[thing.name])
+            pedestrian = replace(again, meets_robot=pedestrian.meets_robot)
+        together.append(replace(thing, pedestrian=pedestrian))
     return together
 
 
-def _compared(track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array) -> FoundWalk:
+def _compared(
+    track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array
+) -> FittedPedestrian:
     def rmse(shift: float) -> float:
         at = np.column_stack([np.interp(track.times + shift, times, positions[:, axis]) for axis in (0, 1)])
         return float(np.sqrt(np.mean(np.sum((at - track.positions) ** 2, axis=1))))
 
     errors = [(rmse(shift), abs(shift)) for shift in TRIED_SHIFTS_S.tolist()]
-    return FoundWalk(begin, walker, times, positions, rmse(0.0), min(errors)[1])
+    return FittedPedestrian(begin, walker, times, positions, rmse(0.0), min(errors)[1])

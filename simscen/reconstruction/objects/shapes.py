@@ -10,8 +10,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
-from simscen.reconstruction.evidence import windows
 from simscen.reconstruction.objects.clusters import ScanCluster
+from simscen.reconstruction.reasons import windows
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """An object is round if its radius is at most this, and its hits are this close to a circle."""
@@ -58,7 +58,7 @@ def fit_shape(clusters: list[ScanCluster], moves: bool) -> ObjectShape:
 
 def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
     """Return the radius of the cylinder that fits the completely visible clusters, and the error of its hits, in m."""
-    whole = [cluster for cluster in clusters if cluster.is_whole and len(cluster.points) >= 5]
+    whole = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
     if len(whole) < 3:
         return math.inf, math.inf
     radius = float(np.median([_radius_of(cluster) for cluster in whole]))

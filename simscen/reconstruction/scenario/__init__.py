@@ -1,1 +1,1 @@
-"""Contents of the reconstructed scenario: world, robot, goals, criteria, and the text with its evidence."""
+"""Contents of the reconstructed scenario: world, robot, goals, criteria, and the text with its reason."""

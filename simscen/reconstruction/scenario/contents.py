@@ -11,9 +11,9 @@ import numpy as np
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
-from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.scenario.criteria import criteria_of
+from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.scenario.criteria import propose_criteria
 from simscen.reconstruction.scenario.incidents import Incident
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal
 
@@ -40,51 +40,51 @@ UNKNOWN_START_STD_M = 1.5
 
 
 @dataclass(frozen=True)
-class Findings:
+class EstimatedParts:
     """What the estimators found in a drive."""
 
     incidents: Sequence[Incident]
     objects: Sequence[FoundObject] = ()
     faults: Sequence[FoundFault] = ()
-    kidnaps: Sequence[tuple[float, Pose2, Evidence]] = ()
+    kidnaps: Sequence[tuple[float, Pose2, Reason]] = ()
     unknowns: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class GivenParts:
-    """Parts of the scenario that do not depend on estimates: world, map, robot, and stack, each with its evidence."""
+    """Parts of the scenario that do not depend on estimates: world, map, robot, and stack, each with its reason."""
 
     world: str | Mapping[str, Any]
     map: str
     robot: str
     seed: int
     stack: Mapping[str, Any] = field(default_factory=dict)
-    evidence: Mapping[str, Evidence] = field(default_factory=dict)
+    reason: Mapping[str, Reason] = field(default_factory=dict)
     unknowns: Sequence[str] = ()
 
 
-def contents_of(
-    drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, source: str
+def scenario_contents(
+    drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, source: str
 ) -> ScenarioContents:
     """Return the contents of the scenario file."""
     start = start_pose(drive)
-    estimate, estimate_evidence = _estimate(drive, start, bool(given.map == "none"))
+    estimate, estimate_reason = _estimate(drive, start, bool(given.map == "none"))
     goals = [*_goals(drive)]
     invalid = bool(goals) and all(goal.expect for goal in goals)
-    evidence = dict(given.evidence)
-    evidence["start"] = Evidence(f"first pose of the drive, from {drive.pose_source}", 0.0)
-    if estimate_evidence is not None:
-        evidence["estimate"] = estimate_evidence
+    reason = dict(given.reason)
+    reason["start"] = Reason(f"first pose of the drive, from {drive.pose_source}", 0.0)
+    if estimate_reason is not None:
+        reason["estimate"] = estimate_reason
     passing = passing_radius(drive)
     if passing is not None:
         text = f"goals were passed without a stop, at a distance of at most {passing:g} m"
-        evidence["navigation"] = Evidence(text, None, None, "medium")
+        reason["navigation"] = Reason(text, None, None, "medium")
     slowest = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
     time_limit = min(MAX_TIME_LIMIT_S, max(60.0, 2 * drive.duration, drive.duration + slowest))
     return ScenarioContents(
         name=name,
         source=source,
-        summary=[*_summary(drive, findings)],
+        summary=[*_summary(drive, estimated)],
         seed=given.seed,
         world=given.world,
         map=given.map,
@@ -96,12 +96,12 @@ def contents_of(
         goals=goals,
         stops_at_failure=not any(goal.status == "failed" for goal in drive.goals[:-1]),
         time_limit=time_limit,
-        objects=findings.objects,
-        kidnaps=findings.kidnaps,
-        faults=findings.faults,
-        criteria=criteria_of(drive, findings.incidents, findings.faults, invalid),
-        evidence=evidence,
-        unknowns=[*given.unknowns, *findings.unknowns, *drive.notes],
+        objects=estimated.objects,
+        kidnaps=estimated.kidnaps,
+        faults=estimated.faults,
+        criteria=propose_criteria(drive, estimated.incidents, estimated.faults, invalid),
+        reason=reason,
+        unknowns=[*given.unknowns, *estimated.unknowns, *drive.notes],
     )
 
 
@@ -132,8 +132,8 @@ def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
 
 def _estimate(
     drive: RecordedDrive, start: Pose2, mapless: bool
-) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Evidence | None]:
-    """Return the initial estimate of the localizer if it differs from the default, with its evidence."""
+) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Reason | None]:
+    """Return the initial estimate of the localizer if it differs from the default, with its reason."""
     if mapless or not len(drive.belief):
         return None, None
     values = drive.belief.values[0]
@@ -142,11 +142,11 @@ def _estimate(
     time = float(drive.belief.times[0])
     if max(std[:2]) > UNKNOWN_START_STD_M:
         text = f"the first belief has a standard deviation of {max(std[:2]):.1f} m, so the start was unknown"
-        return "unknown", Evidence(text, time, None, "medium")
+        return "unknown", Reason(text, time, None, "medium")
     if pose.distance(start) <= NEAR_TRUTH_M and abs(wrap(pose.yaw - start.yaw)) <= NEAR_TRUTH_RAD:
         return None, None
     text = f"the first belief was {pose.distance(start):.2f} m from the start"
-    return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Evidence(text, time, None, "medium")
+    return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Reason(text, time, None, "medium")
 
 
 def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
@@ -160,16 +160,16 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
         refused = goal.ended is not None and goal.ended - goal.sent < MAX_REFUSAL_S
         expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""
         yield ScenarioGoal(
-            name, goal.pose, _timeout(goal, drive.duration), _goal_evidence(goal), expect, _wait(goal, following)
+            name, goal.pose, _timeout(goal, drive.duration), _goal_reason(goal), expect, _wait(goal, following)
         )
 
 
-def _goal_evidence(goal: RecordedGoal) -> Evidence:
+def _goal_reason(goal: RecordedGoal) -> Reason:
     result = {"unknown": "its result is unknown"}.get(
         goal.status, f"{goal.status}{f' ({goal.error})' if goal.error else ''}"
     )
     confidence = "high" if goal.source.startswith("/") else "medium"
-    return Evidence(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
+    return Reason(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
@@ -187,10 +187,10 @@ def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
     return round(gap, 1) if gap >= MIN_WAIT_S else 0.0
 
 
-def _summary(drive: RecordedDrive, findings: Findings) -> Iterator[str]:
+def _summary(drive: RecordedDrive, estimated: EstimatedParts) -> Iterator[str]:
     yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
-    for incident in findings.incidents:
+    for incident in estimated.incidents:
         x, y = incident.place
         yield f"At {incident.time:.1f} s, at ({x:.2f}, {y:.2f}): {incident.kind}, {incident.detail}."
-    if not findings.incidents:
+    if not estimated.incidents:
         yield "The drive had no incident."

@@ -10,7 +10,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident
 
 TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
@@ -31,14 +31,14 @@ NO_SENSORS = ("cmd_vel", "wheels", "localizer")
 
 @dataclass(frozen=True)
 class ProposedCriterion:
-    """Criterion in the scenario language with the evidence for its limit."""
+    """Criterion in the scenario language with the reason for its limit."""
 
     kind: str
     values: Mapping[str, object]
-    evidence: Evidence
+    reason: Reason
 
 
-def criteria_of(
+def propose_criteria(
     drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], invalid_goals: bool
 ) -> list[ProposedCriterion]:
     """Return criteria for a drive. With `invalid_goals`, all goals are refused as soon as they are sent."""
@@ -55,7 +55,7 @@ def _criteria(
     yield ProposedCriterion("collisions", {"max": 0}, contact)
     if "stuck" in broken:
         yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _broken(broken, "stuck", ""))
-    if drive.has_independent_poses and len(drive.belief):
+    if drive.has_true_poses and len(drive.belief):
         yield _localization(drive, broken)
     if not invalid_goals and not {"goals_reached", "stuck"} & set(broken):
         yield from _efficiency(drive)
@@ -70,14 +70,14 @@ def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
     fastest = float(np.percentile(np.hypot(*drive.odometry.values[:, 3:5].T), SPEED_PERCENTILE))
     if fastest > REST_SPEED_M_S:
         limit = math.ceil(10 * SPEED_MARGIN * fastest) / 10
-        yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Evidence(f"held: at most {fastest:.2f} m/s"))
+        yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Reason(f"held: at most {fastest:.2f} m/s"))
 
 
-def _broken(broken: Mapping[str, Incident], criterion: str, held: str) -> Evidence:
+def _broken(broken: Mapping[str, Incident], criterion: str, held: str) -> Reason:
     incident = broken.get(criterion)
     if incident is None:
-        return Evidence(f"held: {held}")
-    return Evidence(f"broken: {incident.detail}", incident.time)
+        return Reason(f"held: {held}")
+    return Reason(f"broken: {incident.detail}", incident.time)
 
 
 def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
@@ -95,11 +95,11 @@ def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
         return
     took = drive.goals[-1].ended - drive.goals[0].sent
     limit = max(MIN_TIME_LIMIT_S, TIME_MARGIN * took)
-    yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Evidence(f"held: it took {took:.1f} s"))
+    yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Reason(f"held: it took {took:.1f} s"))
     length = path_length(drive.poses.values[:, :2])
     if length > 1.0:
         values = {"max": f"{PATH_MARGIN * length:.1f} m"}
-        yield ProposedCriterion("path_length", values, Evidence(f"held: the robot drove {length:.2f} m"))
+        yield ProposedCriterion("path_length", values, Reason(f"held: the robot drove {length:.2f} m"))
 
 
 def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
@@ -110,7 +110,7 @@ def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[Propo
         stop = time_to_rest(drive, fault.begin, fault.begin + fault.duration)
         if stop is not None and 0.05 < stop < MAX_STOP_S:
             values = {"time": f"{STOP_TIME_FACTOR * stop + 0.2:.1f} s", "after": f"{fault.target}.off"}
-            yield ProposedCriterion("stopped_within", values, Evidence(f"held: the robot stopped after {stop:.2f} s"))
+            yield ProposedCriterion("stopped_within", values, Reason(f"held: the robot stopped after {stop:.2f} s"))
             return
 
 

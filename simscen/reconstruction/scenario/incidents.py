@@ -10,7 +10,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
-from simscen.reconstruction.evidence import windows
+from simscen.reconstruction.reasons import windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
 """A robot with a goal is stuck if it stays within this radius for this time, as in Nav2's progress checker."""
@@ -41,7 +41,7 @@ class Incident:
     criterion: str
 
 
-def incidents_of(drive: RecordedDrive) -> list[Incident]:
+def find_incidents(drive: RecordedDrive) -> list[Incident]:
     """Return the incidents of a drive in order of time."""
     found = [*_contacts(drive), *_standstills(drive), *_lost(drive), *_goals(drive)]
     return sorted(found, key=lambda incident: (incident.time, incident.kind))
@@ -103,7 +103,7 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
     if not len(drive.belief):
         return
     belief = drive.belief
-    if drive.has_independent_poses:
+    if drive.has_true_poses:
         errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
         for window in windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):
             largest = float(errors[window.samples].max())

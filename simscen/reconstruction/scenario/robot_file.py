@@ -19,7 +19,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, Ti
 
 
 @dataclass(frozen=True)
-class KnownRobot:
+class RobotProperties:
     """Properties of a robot.
 
     Attributes:
@@ -39,29 +39,29 @@ class KnownRobot:
     is_known: bool = False
 
 
-UNKNOWN_ROBOT = KnownRobot()
+TYPICAL_ROBOT = RobotProperties()
 
 
-def known_robot(written: str, folder: Path, is_known: bool) -> KnownRobot:
+def robot_properties(written: str, folder: Path, is_known: bool) -> RobotProperties:
     """Return the properties of a robot that a scenario in a folder names. `is_known` if it is the robot of the log."""
     file = folder / written
     name = str(file) if file.is_file() else written
     try:
         spec = load_robot_file(name, default_root([file if file.is_file() else folder / "x"])).robot.spec
     except SimscenError:
-        return UNKNOWN_ROBOT
+        return TYPICAL_ROBOT
     if spec is None:
-        return UNKNOWN_ROBOT
+        return TYPICAL_ROBOT
     lidars = [sensor.lidar for sensor in spec.sensors.values() if sensor.lidar]
-    noise = lidars[0].noise if lidars else UNKNOWN_ROBOT.lidar_noise
-    separation = float(getattr(spec.drive, "wheel_separation", UNKNOWN_ROBOT.separation))
+    noise = lidars[0].noise if lidars else TYPICAL_ROBOT.lidar_noise
+    separation = float(getattr(spec.drive, "wheel_separation", TYPICAL_ROBOT.separation))
     names: dict[str, str] = {}
     for name, sensor in spec.sensors.items():
         kinds = ("lidar", sensor.lidar), ("odom", sensor.odometry), ("imu", sensor.imu)
         names |= {usual: name for usual, given in kinds if given and usual not in names}
     corners = (math.hypot(x, y) for x, y in spec.footprint or ())
-    radius = spec.radius or max(corners, default=UNKNOWN_ROBOT.radius)
-    return KnownRobot(noise, radius, separation, spec.drive.type == "skid_steer", names, is_known)
+    radius = spec.radius or max(corners, default=TYPICAL_ROBOT.radius)
+    return RobotProperties(noise, radius, separation, spec.drive.type == "skid_steer", names, is_known)
 
 
 TICK_RATE_HZ = 240
@@ -89,7 +89,7 @@ class WrittenRobot:
     """A robot file, what it is from in words, and what the log does not show about the robot."""
 
     file: Path
-    evidence: str
+    reason: str
     unknowns: list[str]
 
 

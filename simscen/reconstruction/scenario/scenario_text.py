@@ -1,4 +1,4 @@
-"""Text of a reconstructed scenario: YAML in which a comment gives the evidence for each part."""
+"""Text of a reconstructed scenario: YAML in which a comment gives the reason for each part."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 from simscen.core.geometry import Pose2
 from simscen.loading.files.single_files import CompactDumper
 from simscen.loading.yaml.scalars import to_yaml
-from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
+from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrians import is_person
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 
 MAX_COLUMNS = 118
@@ -37,7 +37,7 @@ class ScenarioGoal:
     name: str
     pose: Pose2
     timeout: float
-    evidence: Evidence
+    reason: Reason
     expect: str = ""
     wait: float = 0.0
 
@@ -62,10 +62,10 @@ class ScenarioContents:
         stops_at_failure: Whether the drive ends at the first failed goal.
         time_limit: Time limit in s.
         objects: Objects and pedestrians that the scenario spawns.
-        kidnaps: Time in s, new pose in the map frame, and evidence of each kidnapping.
+        kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
         faults: Faults of sensors, commands, and localizer.
         criteria: Pass criteria.
-        evidence: Evidence by key of the scenario.
+        reason: Reason by key of the scenario.
         unknowns: What the log does not show.
     """
 
@@ -84,10 +84,10 @@ class ScenarioContents:
     stops_at_failure: bool
     time_limit: float
     objects: Sequence[FoundObject]
-    kidnaps: Sequence[tuple[float, Pose2, Evidence]]
+    kidnaps: Sequence[tuple[float, Pose2, Reason]]
     faults: Sequence[FoundFault]
     criteria: Sequence[ProposedCriterion]
-    evidence: Mapping[str, Evidence]
+    reason: Mapping[str, Reason]
     unknowns: Sequence[str]
 
 
@@ -110,17 +110,17 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     yield "tags: [from-log]"
     yield f"seed: {contents.seed}"
     yield ""
-    yield from _evidence(contents, "world")
+    yield from _reason(contents, "world")
     yield from _entry("world", contents.world)
     if contents.map:
-        yield from _evidence(contents, "map")
+        yield from _reason(contents, "map")
         yield from _entry("map", contents.map)
     yield from _robot(contents)
     if contents.stack:
-        yield from _evidence(contents, "stack")
+        yield from _reason(contents, "stack")
         yield from _entry("stack", dict(contents.stack))
     if contents.passing_radius is not None:
-        yield from _evidence(contents, "navigation")
+        yield from _reason(contents, "navigation")
         yield f"navigation: {{mode: navigate_through_poses, radius: {contents.passing_radius:g} m}}"
     if not contents.stops_at_failure:
         yield "on_goal_failure: continue"
@@ -131,12 +131,12 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
         yield ""
         yield "faults:"
         for fault in contents.faults:
-            yield from _comment(fault.evidence.comment, "  ")
+            yield from _comment(fault.reason.comment, "  ")
             yield f"  - {_flow(_fault_entry(fault))}"
     yield ""
     yield "pass:"
     for criterion in contents.criteria:
-        yield from _comment(criterion.evidence.comment, "  ")
+        yield from _comment(criterion.reason.comment, "  ")
         yield f"  - {criterion.kind}: {_flow(dict(criterion.values))}"
 
 
@@ -151,22 +151,22 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
     )
 
 
-def _evidence(contents: ScenarioContents, key: str) -> list[str]:
-    evidence = contents.evidence.get(key)
-    return [] if evidence is None else _comment(evidence.comment)
+def _reason(contents: ScenarioContents, key: str) -> list[str]:
+    reason = contents.reason.get(key)
+    return [] if reason is None else _comment(reason.comment)
 
 
 def _robot(contents: ScenarioContents) -> Iterator[str]:
     yield ""
-    yield from _evidence(contents, "robot")
+    yield from _reason(contents, "robot")
     yield "robot:"
     yield f"  model: {_text(contents.robot)}"
-    if (start := contents.evidence.get("start")) is not None:
+    if (start := contents.reason.get("start")) is not None:
         yield from _comment(start.comment, "  ")
     yield f"  pose: {_pose(contents.start)}"
     if contents.estimate is None:
         return
-    if (estimate := contents.evidence.get("estimate")) is not None:
+    if (estimate := contents.reason.get("estimate")) is not None:
         yield from _comment(estimate.comment, "  ")
     if isinstance(contents.estimate, str):
         yield f"  initial_estimate: {contents.estimate}"
@@ -180,7 +180,7 @@ def _goals(contents: ScenarioContents) -> Iterator[str]:
     yield ""
     yield "goals:" if contents.goals else "goals: []"
     for goal in contents.goals:
-        yield from _comment(goal.evidence.comment, "  ")
+        yield from _comment(goal.reason.comment, "  ")
         entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:g} s"
         entry += f", expect: {{error_code: {goal.expect}}}" if goal.expect else ""
         entry += f", on_reached: {{wait: {goal.wait:.1f} s}}" if goal.wait else ""
@@ -195,23 +195,23 @@ def _events(contents: ScenarioContents) -> Iterator[str]:
     for thing in contents.objects:
         yield from _comment(thing.comment, "  ")
         yield from _object(thing)
-    for time, pose, evidence in contents.kidnaps:
-        yield from _comment(evidence.comment, "  ")
+    for time, pose, reason in contents.kidnaps:
+        yield from _comment(reason.comment, "  ")
         yield f"  - name: robot is carried off at {time:.1f} s"
         yield f"    when: {{time: {time:.2f} s}}"
         yield f"    do: {{kidnap: {{pose: {_pose(pose)}}}}}"
 
 
 def _object(thing: FoundObject) -> Iterator[str]:
-    yield from _scripted_object(thing) if thing.walk is None else _pedestrian(thing.walk)
+    yield from _scripted_object(thing) if thing.pedestrian is None else _pedestrian(thing.pedestrian)
     if thing.disappears is not None:
         yield f"  - name: {_text(f'{thing.name} disappears')}"
         yield f"    when: {{time: {thing.disappears:.2f} s}}"
         yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
 
 
-def _pedestrian(walk: FoundWalk) -> Iterator[str]:
-    walker = walk.walker
+def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
+    walker = fitted.walker
     goals = ", ".join(f"[{x:.2f}, {y:.2f}]" for x, y in walker.goals)
     keys = [
         f"name: {_text(walker.name)}",
@@ -225,7 +225,7 @@ def _pedestrian(walk: FoundWalk) -> Iterator[str]:
     if walker.blind_to:
         keys.append(f"blind_to: [{', '.join(sorted(walker.blind_to))}]")
     yield f"  - name: {_text(f'{walker.name} appears')}"
-    yield f"    when: {{time: {walk.begin:.2f} s}}"
+    yield f"    when: {{time: {fitted.begin:.2f} s}}"
     yield "    do:"
     yield "      pedestrian:"
     glued = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)

@@ -12,7 +12,7 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans
 from simscen.reconstruction.scenario.criteria import path_length
-from simscen.reconstruction.scenario.incidents import Incident, incidents_of
+from simscen.reconstruction.scenario.incidents import Incident, find_incidents
 from simscen.reconstruction.scenario_from_log import Reconstruction
 from simscen.record.mcap_reader import attached_result
 
@@ -94,7 +94,7 @@ class Verification:
     failed: Sequence[str]
 
     @property
-    def reproduces(self) -> bool:
+    def is_reproduced(self) -> bool:
         """Whether all incidents of the log happened again."""
         return all(incident.is_reproduced for incident in self.incidents)
 
@@ -102,7 +102,7 @@ class Verification:
 def compare_with_run(made: Reconstruction, log: Path) -> Verification:
     """Compare a drive with the log of a run of its reconstructed scenario. Raises InvalidInput for an unusable log."""
     repeated = read_drive(log, DriveOptions())
-    incidents, others = compare_incidents(incidents_of(made.drive), incidents_of(repeated))
+    incidents, others = compare_incidents(find_incidents(made.drive), find_incidents(repeated))
     verdicts = (attached_result(log) or {}).get("verdicts", [])
     failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
     quantities = [*compare_drives(made.drive, repeated)]
@@ -145,7 +145,7 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
     clearances = nearest_return(recorded), nearest_return(repeated)
     if None not in clearances:
         yield _numbers("nearest return of the lidar", float(clearances[0] or 0), float(clearances[1] or 0), "m")
-    seen = share_seen_alike(recorded, repeated, times)
+    seen = fraction_seen_alike(recorded, repeated, times)
     if seen is not None:
         text = f"{100 * seen:.0f} % within {SAME_RANGE_M:g} m"
         yield ComparedQuantity("ranges at the same place", "", "", text)
@@ -212,7 +212,7 @@ def _hits(scans: Scans) -> Array:
     return np.where(scans.is_hit(), scans.ranges, np.nan)
 
 
-def share_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
+def fraction_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
     """Return the share of the beams that show the same while both robots are near the same place; None if never.
 
     Beams are compared with those in the same direction, because the robots may have different headings.

@@ -17,7 +17,7 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
-from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
 """Colors of occupied and unknown cells, and of cells in which the lidar measured something that is not on the map."""
@@ -29,7 +29,7 @@ MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
 """Number of time marks on a path, and their distance as a share of the drawing."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
 """Distance of the edge of a drawing from what it shows, and smallest ratio of its sides."""
-FONT_SHARE = 0.026
+FONT_FRACTION = 0.026
 """Height of the text in a map as a share of the larger side."""
 CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
 """Size of a chart, and of its margins with labels, in units of the SVG."""
@@ -53,7 +53,7 @@ class Box:
     @property
     def font(self) -> float:
         """Height of the text in m."""
-        return FONT_SHARE * max(self.width, self.height)
+        return FONT_FRACTION * max(self.width, self.height)
 
 
 def box_around(drives: Sequence[RecordedDrive], objects: Sequence[FoundObject]) -> Box:
@@ -75,7 +75,7 @@ def drive_map(
     other: RecordedDrive,
     objects: Sequence[FoundObject],
     incidents: Sequence[Incident],
-    world: Surroundings,
+    world: StaticWorld,
     box: Box,
 ) -> str:
     """Return an SVG in map coordinates, with y upward. `name` is the class of the drive: "log" or "run"."""
@@ -156,7 +156,7 @@ def _points(poses: Array) -> str:
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in poses[::step, :2].tolist())
 
 
-def _picture(world: Surroundings, drive: RecordedDrive) -> str:
+def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
     """Return the map, and what the lidar saw that is not on it, as a data URL of a PNG with a clear background."""
     grid = world.grid
     colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
@@ -170,7 +170,7 @@ def _picture(world: Surroundings, drive: RecordedDrive) -> str:
     return f"data:image/png;base64,{base64.b64encode(out.getvalue()).decode()}"
 
 
-def _returns_off_the_map(world: Surroundings, drive: RecordedDrive) -> Array:
+def _returns_off_the_map(world: StaticWorld, drive: RecordedDrive) -> Array:
     """Return the ends (n, 2) of the beams that measured something else than walls."""
     if drive.scans is None or not len(drive.scans):
         return np.empty((0, 2))

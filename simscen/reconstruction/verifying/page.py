@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.static_world import StaticWorld
 from simscen.reconstruction.verifying.comparison import (
     Verification,
     common_times,
@@ -52,7 +52,7 @@ text.goalname { fill: var(--good); } text.objectname { fill: var(--object); } te
 """
 
 
-def verification_page(name: str, world: Surroundings, objects: Sequence[FoundObject], verified: Verification) -> str:
+def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> str:
     """Return the page as HTML. It loads nothing from the network."""
     digest = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
@@ -93,7 +93,7 @@ def _result(verified: Verification) -> Iterator[str]:
     yield f"<p>{text(f'Criteria that fail in the run: {failed}.' if failed else 'All criteria hold in the run.')}</p>"
 
 
-def _maps(world: Surroundings, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
+def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
     recorded = [incident.recorded for incident in verified.incidents]
     repeated = [incident.repeated for incident in verified.incidents if incident.repeated is not None]
     drives = verified.drive, verified.repeated

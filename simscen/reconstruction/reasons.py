@@ -1,4 +1,4 @@
-"""Reconstructed parts of a scenario with the evidence for them: when it was seen, and how sure it is."""
+"""Reconstructed parts of a scenario with the reason for them: when it was seen, and how sure it is."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Reason:
     """Why a part of the scenario is there.
 
     Attributes:
@@ -29,7 +29,7 @@ class Evidence:
 
     @property
     def comment(self) -> str:
-        """The evidence as one line."""
+        """The reason as one line."""
         times = "" if self.begin is None else f", t = {self.begin:.2f} s"
         times += "" if self.begin is None or self.end is None else f" to {self.end:.2f} s"
         return f"{self.text}{times} (confidence: {self.confidence})"
@@ -45,7 +45,7 @@ class FoundFault:
         values: Its parameters by key.
         begin: Start in s; None from the start of the drive.
         duration: Duration in s; None until the end.
-        evidence: Why it is there.
+        reason: Why it is there.
     """
 
     target: str
@@ -53,7 +53,7 @@ class FoundFault:
     values: Mapping[str, object] = field(default_factory=dict)
     begin: float | None = None
     duration: float | None = None
-    evidence: Evidence = field(default_factory=lambda: Evidence(""))
+    reason: Reason = field(default_factory=lambda: Reason(""))
 
 
 @dataclass(frozen=True)

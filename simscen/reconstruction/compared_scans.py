@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Scans
-from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
 """Difference between a range and the world that errors of the pose cause."""
@@ -24,7 +24,7 @@ SMOOTH_STEP_M = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class ScanModel:
+class ComparedScans:
     """Scans of a drive beside what the static world predicts.
 
     Attributes:
@@ -103,18 +103,18 @@ def _over_neighbors(values: Array, choose: np.ufunc) -> Array:
     return result
 
 
-def scan_model(drive: RecordedDrive, scans: Scans, world: Surroundings) -> ScanModel:
+def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> ComparedScans:
     """Compare scans with the static world."""
     poses = lidar_poses(drive, scans)
     expected = world.ranges_from(poses, scans.angles, scans.range_max)
     with np.errstate(invalid="ignore"):
         residuals = np.where(scans.is_hit() & np.isfinite(expected), scans.ranges - expected, np.nan)
     noise = range_noise(residuals, expected)
-    fixed = TRUE_POSE_TOLERANCE_M if drive.has_independent_poses else BELIEVED_POSE_TOLERANCE_M
-    growth = 0.0 if drive.has_independent_poses else BELIEVED_POSE_TOLERANCE_PER_M
+    fixed = TRUE_POSE_TOLERANCE_M if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_M
+    growth = 0.0 if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_PER_M
     reach = np.minimum(expected, scans.range_max)
     tolerance = fixed + NOISE_SIGMAS * np.minimum(noise, 0.3)[:, None] + growth * reach
-    return ScanModel(scans, poses, expected, noise, tolerance)
+    return ComparedScans(scans, poses, expected, noise, tolerance)
 
 
 def range_noise(residuals: Array, expected: Array) -> Array:

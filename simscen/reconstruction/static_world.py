@@ -21,7 +21,7 @@ UNMAPPED_DISTANCE_M = 1e3
 """Distance from walls that counts outside of the map."""
 
 
-class Surroundings:
+class StaticWorld:
     """Static world at the height of the lidar, without anything that the reconstruction has to find."""
 
     def __init__(self, world: World, height: float) -> None:

@@ -21,11 +21,11 @@ NEAR_M = 4.0
 """Distance from a pedestrian within which others count."""
 Walker = tuple[float, WalkingPedestrian]
 """Time in s at which a pedestrian appears, and the pedestrian."""
-GiveUp = Callable[[float, tuple[float, float]], bool]
+IsGivenUp = Callable[[float, tuple[float, float]], bool]
 """Returns whether a pedestrian at a time and a position is so far from its track that the rest does not matter."""
 
 
-class WalkTrial:
+class PedestrianTrial:
     """Simulates pedestrians beside the recorded robot, a disc of `robot_radius` m."""
 
     def __init__(self, drive: RecordedDrive, world: PedestrianMap, robot_radius: float) -> None:
@@ -43,7 +43,7 @@ class WalkTrial:
         people: Sequence[FoundObject],
         objects: Sequence[FoundObject],
         end: float,
-        give_up: GiveUp = lambda _time, _position: False,
+        is_given_up: IsGivenUp = lambda _time, _position: False,
     ) -> dict[str, tuple[Array, Array]]:
         """Return times (n,) and positions (n, 2) of each of `walkers` until `end`, or until one is given up.
 
@@ -64,7 +64,7 @@ class WalkTrial:
             poses = crowd.poses()
             for name, pose in poses.items():
                 paths[name].append((time, pose.x, pose.y))
-            if any(give_up(time, (pose.x, pose.y)) for pose in poses.values()):
+            if any(is_given_up(time, (pose.x, pose.y)) for pose in poses.values()):
                 break
             places = np.array([pose[:2] for pose in poses.values()])
             near = [
