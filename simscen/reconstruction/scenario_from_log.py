@@ -133,7 +133,7 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     robot = robot_properties(given.robot, out.parent, is_known)
     others = [
         object_along(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
-        for name, outline, times, poses in described.others
+        for name, outline, times, poses in described.other_robots
     ]
     estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
     name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")

@@ -1,4 +1,4 @@
-"""The static world of a drive, at the height of the lidar, and its map, built from scans by occupancy grid mapping."""
+"""Computes ranges and distances to walls in the static world of a drive, and builds a map from scans if it has none."""
 
 from __future__ import annotations
 
@@ -16,16 +16,23 @@ from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 MAP_WALL_HEIGHT_M = 1.0
-"""Height of the walls of a map."""
+"""Height of the walls that are made from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
-"""Distance from walls that counts outside of the map."""
+"""Distance to walls that is returned for points outside of the map."""
 
 
 class StaticWorld:
-    """Static world at the height of the lidar, without anything that the reconstruction has to find."""
+    """World without the objects that the reconstruction has to find, in a plane at the height of the lidar.
+
+    Attributes:
+        world: The world.
+        height: Height of the plane in m.
+        grid: Map of the plane.
+        built: The world with its mesh and map.
+    """
 
     def __init__(self, world: World, height: float) -> None:
-        """Take the world, with its objects and doors at their initial poses, and the `height` of the lidar in m."""
+        """Cut the world at `height` m. Its bodies, such as doors, count as walls at their initial poses."""
         bodies = [replace(solid, pose=body.pose.compose(solid.pose)) for body in world.bodies for solid in body.solids]
         self.world, self.height = world, height
         mesh = merge_solids((*world.solids, *bodies))
@@ -36,9 +43,10 @@ class StaticWorld:
         self._distances: Array = np.asarray(distances) * self.grid.resolution
 
     def ranges_from(self, poses: Array, angles: Array, max_range: float) -> Array:
-        """Return the ranges (n, beams) in m at lidar poses (n, 3) in the map frame; inf beyond `max_range` m.
+        """Return the ranges (n, beams) in m that a lidar measures at `poses` (n, 3) in the map frame.
 
-        `angles` (beams,) are the directions of the beams in rad in the frame of the lidar.
+        `angles` (beams,) are the directions of the beams in rad in the frame of the lidar. Ranges beyond `max_range` m
+        are inf.
         """
         directions = poses[:, 2:3] + angles[None, :]
         flat = directions.ravel()
@@ -47,10 +55,7 @@ class StaticWorld:
         return self._scene.cast(origins, rays, max_range).reshape(len(poses), len(angles))
 
     def distance_to_walls(self, points: Array) -> Array:
-        """Return the distance (n,) in m of points (n, 2) to the nearest occupied cell.
-
-        It is UNMAPPED_DISTANCE_M outside of the map.
-        """
+        """Return the distance (n,) in m of `points` (n, 2) in the map frame to the nearest occupied cell."""
         cells = self.grid.cell_of(points)
         inside = self.grid.inside(cells)
         result = np.full(len(points), UNMAPPED_DISTANCE_M)
@@ -59,12 +64,12 @@ class StaticWorld:
 
 
 def world_from_map(grid: OccupancyGrid, name: str) -> World:
-    """Return a world whose walls are the occupied cells of a map."""
+    """Return a world with this name whose walls are the occupied cells of a map."""
     return World(name, tuple(walls_from_map(grid, MAP_WALL_HEIGHT_M)), grid=grid)
 
 
 def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
-    """Return the poses (n, 3) of the lidar in the map frame when it measured each scan."""
+    """Return the poses x, y, yaw (n, 3) of the lidar in the map frame at the times of the scans."""
     base = drive.poses.poses_at(scans.times)
     mount: Pose2 = scans.mount
     c, s = np.cos(base[:, 2]), np.sin(base[:, 2])
@@ -74,7 +79,10 @@ def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams in the map frame; nan or inf where a range is."""
+    """Return the ends (n, beams, 2) of beams in the frame of the lidar `poses` (n, 3); not finite if the range is not.
+
+    `angles` (beams,) are relative to the lidar, and `ranges` (n, beams) are in m.
+    """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):
         x = poses[:, 0:1] + ranges * np.cos(directions)
@@ -83,17 +91,17 @@ def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
 
 
 RESOLUTION_M = 0.05
-"""Size of a cell."""
+"""Cell size of the map that is built from scans."""
 MARGIN_M = 1.0
-"""Free margin around everything that was measured."""
+"""Distance between the border of the map and everything that was measured."""
 MAX_SCANS = 1500
-"""Maximum number of scans that are used; they are evenly spread over the drive."""
+"""Number of scans above which the map is built only from every second, third, … scan."""
 BODY_RADIUS_M = 0.15
-"""Radius of every robot, as far as the map is concerned: where one drove, no wall stands, however its poses drift."""
+"""Cells that were closer to the path than this are free: every robot has at least this radius."""
 MAX_RANGE_M = 15.0
-"""Range beyond which errors of the heading blur the map."""
+"""Longer ranges are not used, because errors of the heading would blur the map."""
 HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
-"""Change of the log odds of a cell at a hit, and where a beam passes, and their largest magnitude.
+"""Change of a cell's log odds by a beam that ends in it and by one that passes it, and largest magnitude of log odds.
 
 Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
 """
@@ -102,7 +110,7 @@ MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
 
 
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
-    """Return the map that the scans of a drive show along its poses; an empty map if there are no scans."""
+    """Return a map built from the scans of a drive at its poses; without scans, a free map around the driven path."""
     path = drive.poses.values[:, :2]
     if drive.scans is None or not len(drive.scans):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
@@ -124,7 +132,7 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
 
 
 def _driven_over(shape: tuple[int, ...], path: Array) -> Mask:
-    """Return which cells are within BODY_RADIUS_M of a `path` (n, 2) relative to the corner of the map."""
+    """Return which cells (rows, columns) are within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
     is_path = np.zeros(shape, dtype=bool)
     is_path.reshape(-1)[_index(path, shape)] = True
     driven: Mask = distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
@@ -137,9 +145,10 @@ def _shape(low: Array, high: Array) -> tuple[int, int]:
 
 
 def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
-    """Add the beams of one scan from `origin` (2,) to `ends` (n, 2), relative to the corner of the map.
+    """Update the log odds of the cells that the beams of one scan pass or hit.
 
-    A cell changes once per scan, because several beams through it write the same value.
+    The beams go from `origin` (2,) to `ends` (n, 2), relative to the corner of the map. A cell changes only once,
+    because all beams through it write the same value.
     """
     reach = np.hypot(*(ends - origin).T)
     steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)

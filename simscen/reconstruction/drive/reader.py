@@ -1,4 +1,4 @@
-"""Reader of logs for a reconstruction: the messages of a log as a RecordedDrive."""
+"""Reads a log and converts its messages to a RecordedDrive."""
 
 from __future__ import annotations
 
@@ -22,22 +22,27 @@ from simscen.record.foreign.transforms import TransformTree, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
+"""Usual names of the base frame, in the order in which they are tried."""
 NO_TRUTH = "none"
+"""Value of DriveOptions.truth to ignore the ground truth of a log."""
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Maximum difference between stamps and times of logging of message clock."""
+"""If the stamps of messages differ more than this from their log times, both are of different clocks."""
 MIN_POSES = 2
-"""Number of poses that a source of poses needs."""
+"""Smallest number of poses with which a topic or transform is used as the source of the poses."""
 DEFAULT_LIDAR_HEIGHT_M, MIN_LIDAR_HEIGHT_M = 0.2, 0.05
-"""Height of a lidar with unknown mount, and smallest height of any lidar."""
+"""Assumed height of a lidar with unknown mount, and lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
-"""Largest coordinate of a footprint; larger polygons are something else."""
+"""Largest coordinate of a usable footprint, in the frame in which it is published."""
 
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """How to read a log: the topic of the ground truth, "none" to ignore it, and topics that differ, by role.
+    """How to read a log.
 
-    `robot` is the robot to read in a log of simscen with several robots.
+    Attributes:
+        truth: Topic of the ground truth, "none" to ignore it; None for the default topic of simscen's own logs.
+        topics: Topics by role, for roles whose topic is not the default.
+        robot: Robot whose messages are read, in a log of simscen with several robots.
     """
 
     truth: str | None = None
@@ -46,7 +51,7 @@ class DriveOptions:
 
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
-    """Read an MCAP file or a rosbag2 folder. Raises InvalidInput if it cannot be used for a reconstruction."""
+    """Read a drive from its first goal on, from an MCAP file or a rosbag2 folder. Raises InvalidInput if unusable."""
     with unusable_log_as_invalid_input(path):
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
@@ -56,7 +61,7 @@ def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
 
 
 class _DriveReader:
-    """Converts the messages of message log."""
+    """Converts the messages of one log to a RecordedDrive and collects notes for the user."""
 
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
@@ -102,7 +107,7 @@ class _DriveReader:
         )
 
     def _clock_offset(self) -> int:
-        """Return how much later the clock of the stamps is in ns, or 0 if it is the clock of logging."""
+        """Return in ns how far the clock of the stamps is ahead of the clock of the log times; 0 for the same clock."""
         differences = [
             message.stamp - message.log_time
             for role in ("scan", "odom", "amcl_pose", "truth")
@@ -114,14 +119,14 @@ class _DriveReader:
         offset = max(differences)
         if abs(offset) <= MAX_CLOCK_DIFFERENCE_NS:
             return 0
-        self._notes.append("stamps and times of logging are of different clocks; delays are relative to the smallest")
+        self._notes.append("stamps and log times are of different clocks; delays are relative to the smallest delay")
         return int(offset)
 
     def _seconds(self, logged: int) -> float:
         return (logged - self._start) / NS_PER_SECOND
 
     def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
-        """Return the times of measurement and of logging in s."""
+        """Return the times of measurement and the log times (n,) of messages, in s since the start."""
         arrivals = np.array([message.log_time - self._start for message in messages], dtype=np.float64) / NS_PER_SECOND
         if not any(message.stamp for message in messages):
             return arrivals, arrivals
@@ -150,7 +155,7 @@ class _DriveReader:
         return self._signal("amcl_pose", rows, 9)
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
-        """Return the best known poses in the map frame, their source, and whether they are a ground truth."""
+        """Return the best known poses in the map frame, their source in words, and whether they are a ground truth."""
         if truth := self._messages.of("truth"):
             return (
                 self._signal("truth", [Pose3(*message.content.pose).plane for message in truth], 3),
@@ -222,7 +227,7 @@ class _DriveReader:
         return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed, frame)
 
     def _mount(self, frame: str) -> tuple[Pose2, float]:
-        """Return the pose of the lidar on the base and its height, from static transforms, or else the first ones."""
+        """Return the pose of the lidar on the base and its height in m, from the first transform of each frame."""
         links: dict[str, StampedPose] = {}
         for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
             for link in message.content:
@@ -250,7 +255,7 @@ class _DriveReader:
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
 
     def _footprint(self, poses: TimedValues) -> Polygon:
-        """Return the footprint in the base frame. It is published in the odom or map frame, where it cannot be used."""
+        """Return the footprint in the base frame, () if unknown. Nav2 publishes it in the odom or map frame."""
         messages = self._messages.of("footprint")
         if not messages:
             return ()
@@ -264,10 +269,11 @@ class _DriveReader:
 
 
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
+"""Roles whose messages do not tell when the drive began and ended, because they may be logged at any time."""
 
 
 def _belief_along_odometry(belief: TimedValues, odometry: TimedValues) -> TimedValues:
-    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the odometry since."""
+    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the later odometry."""
     at_belief = odometry.poses_at(belief.times)
     corrections = [
         Pose2(*pose).compose(Pose2(*odom).inverse())

@@ -1,4 +1,4 @@
-"""Clusters of beams that end before the static world: what each scan shows of objects that are not on the map."""
+"""Groups the hits of each scan that the static world does not explain into clusters, one for each visible object."""
 
 from __future__ import annotations
 
@@ -16,21 +16,26 @@ from simscen.reconstruction.faults.message_stream import repeated_scans
 from simscen.reconstruction.static_world import StaticWorld
 
 MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
-"""Smallest number of hits of a cluster, and largest number of beams between two of them that do not show the object."""
+"""Smallest number of hits of a cluster, and largest number of beams without a hit between two of its hits."""
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
-"""Distance between neighbor hits of one object: in m, and as a multiple of the distance of two beams."""
+"""Largest distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
 TRUE_WALL_DISTANCE_M = 0.12
+"""Distance from a wall within which a hit belongs to the wall, if the poses are true."""
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""Distance from a wall on the map within which a hit belongs to the wall: with true poses, and with estimated poses,
-whose heading errors add a distance per meter of range."""
+"""The same distance for estimated poses: fixed, and per meter of range, because of errors of the heading."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScanCluster:
-    """Hits of one object in one scan: `points` (m, 2) in the map frame, seen from `lidar` (2,) at `time` in s.
+    """Hits of one object in one scan.
 
-    `scan` is the index of the scan, `angle` the angle in rad that the hits cover, and `is_fully_visible` tells whether beams
-    beside it end farther away, so that nothing hides a part of the object.
+    Attributes:
+        scan: Index of the scan.
+        time: Time of the scan in s.
+        points: Hits (m, 2) in the map frame.
+        lidar: Position (2,) of the lidar in the map frame.
+        angle: Angle in rad that the hits cover, seen from the lidar.
+        is_fully_visible: Whether the beams on both sides of the hits end farther away, so that nothing hides the object.
     """
 
     scan: int
@@ -54,7 +59,7 @@ def usable_scans(compared: ComparedScans) -> Mask:
 
 
 def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: bool) -> list[list[ScanCluster]]:
-    """Return the clusters of each scan."""
+    """Return the clusters of each scan, in the order of the scans."""
     unexplained = compared.is_short & ~isolated_returns(compared) & usable_scans(compared)[:, None]
     for first, last, _ in ghost_beams(compared):
         unexplained[:, first : last + 1] = False
@@ -69,7 +74,7 @@ def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: b
 
 
 def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[ScanCluster]:
-    """Yield the clusters of one scan; the ends of a full circle are joined."""
+    """Yield the clusters of the scan `row` that its `beams` (k,) form. In a scan of 360°, they can cross the first beam."""
     if len(beams) < MIN_HITS:
         return
     step = abs(float(compared.scans.angles[1] - compared.scans.angles[0])) if len(compared.scans.angles) > 1 else 0.0
@@ -101,12 +106,15 @@ def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[Sca
 
 
 FREE_MARGIN_M, MIN_VISIBLE_FRACTION = 0.25, 0.3
-"""Distance behind a point at which a beam must end to show that the point is free, and the smallest share of the points
-that must be visible."""
+"""A beam shows that a point is free if it ends at least this far behind the point. A scan counts only if at least this
+fraction of the points is visible."""
 
 
 def fraction_seen_free(compared: ComparedScans, points: Array, rows: Indices) -> Array:
-    """Return for each of `rows` (k,) the share of the points (m, 2) that beams pass, nan if most points are hidden."""
+    """Return for each scan in `rows` (k,) which fraction of the visible `points` (m, 2) is free; nan if few are visible.
+
+    The points are in the map frame. A point is free if a beam passes through it.
+    """
     offsets = points[None, :, :] - compared.poses[rows, None, :2]
     distance = np.hypot(offsets[..., 0], offsets[..., 1])
     direction = np.arctan2(offsets[..., 1], offsets[..., 0]) - compared.poses[rows, None, 2]
