@@ -69,7 +69,7 @@ class ComparedScans:
 
     @cached_property
     def passes_through(self) -> Mask:
-        """Which beams (n, beams) end behind the static world by more than the tolerance, or return nothing from it."""
+        """Which beams (n, beams) end behind the static world by more than the tolerance, or miss it within range."""
         with np.errstate(invalid="ignore"):
             behind = self.is_hit & (self.scans.ranges > self._farthest + self.tolerance)
         return behind | (self.is_missing & (self._farthest + self.tolerance < self.scans.range_max))

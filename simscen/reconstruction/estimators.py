@@ -1,4 +1,7 @@
-"""All estimators in their order: what later ones explain must not be taken for what earlier ones look for."""
+"""Runs all estimators on a drive: they find faults, objects, pedestrians, kidnappings, and incidents.
+
+The order counts: scans that one estimator explains as a fault must not look like an object to the next one.
+"""
 
 from __future__ import annotations
 
@@ -37,11 +40,11 @@ from simscen.run.live_world.pedestrians import PedestrianMap
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
 SENSORS = ("lidar", "odom", "imu")
-"""Usual names of the sensors that faults are found for."""
+"""Targets of faults that are sensors. The robot file can give these sensors other names."""
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
-"""What no estimator looks for."""
+"""Disturbances that no estimator looks for; part of a message to the user."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
-"""Smallest jump of the true pose that is a kidnapping, and longest time between the two poses."""
+"""A jump of the true pose is a kidnapping if it is longer than this distance and takes less than this time."""
 
 
 def run_estimators(
@@ -51,9 +54,10 @@ def run_estimators(
     other_robots: Sequence[FoundObject] = (),
     is_map_built: bool = False,
 ) -> EstimatedParts:
-    """Return everything that the estimators find in a drive.
+    """Return all parts of a scenario that the estimators find in a drive.
 
-    `other_robots` are known to be there. `is_map_built` if the `world` is from the scans of the drive.
+    `world` is the static world; with `is_map_built`, it was built from the scans of the drive itself. `other_robots`
+    have poses in the log; their traces in the scans are not taken for other objects.
     """
     unknowns = [NEVER_ESTIMATED]
     is_calibrated = drive.has_true_poses and not is_map_built
@@ -62,7 +66,7 @@ def run_estimators(
     faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
     faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
     if drive.has_true_poses:
-        faults += odometry_faults(motion_steps(drive), robot.separation, robot.skids)
+        faults += odometry_faults(motion_steps(drive), robot.wheel_separation, robot.skids)
         if not kidnaps:
             faults += gyroscope_faults(drive)
     else:
@@ -70,7 +74,7 @@ def run_estimators(
     if drive.has_true_poses and not is_calibrated:
         unknowns.append("errors of the ranges and of the mount of the lidar, which need a map (--map)")
     unknowns += _unknown_reactions(objects)
-    faults += command_faults(drive, 0.0 if robot.skids else robot.separation)
+    faults += command_faults(drive, 0.0 if robot.skids else robot.wheel_separation)
     faults += localizer_faults(drive)
     faults = _with_sensor_names_of_robot(faults, robot, unknowns)
     return EstimatedParts(find_incidents(drive), objects, faults, kidnaps, unknowns)
@@ -79,7 +83,7 @@ def run_estimators(
 def _with_sensor_names_of_robot(
     faults: list[FoundFault], robot: RobotProperties, unknowns: list[str]
 ) -> list[FoundFault]:
-    """Return the faults with the names that the robot file gives to the sensors, without those of missing sensors."""
+    """Return the faults with the sensor names of the robot file. Faults of other sensors are moved to `unknowns`."""
     if not robot.sensors:
         return faults
     found = []
@@ -99,6 +103,10 @@ def _from_scans(
     unknowns: list[str],
     is_calibrated: bool,
 ) -> tuple[list[FoundFault], list[FoundObject]]:
+    """Return the faults and objects that the scans show, and append to `unknowns` what they cannot show.
+
+    Errors of the mount and of the ranges are estimated only if `is_calibrated`: both poses and walls must be exact.
+    """
     scans = drive.scans
     if scans is None or len(scans) < 3:
         unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
@@ -107,7 +115,7 @@ def _from_scans(
     faults += stuck_scans("lidar", scans, drive.duration)
     if len(scans) > MAX_SCANS:
         step = -(-len(scans) // MAX_SCANS)
-        scans = scans.every(step)
+        scans = scans.subset(slice(None, None, step))
         unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
     compared = compare_scans(drive, scans, world)
     mount = mount_fault(compared, world) if is_calibrated else None
@@ -133,7 +141,7 @@ def _from_scans(
 
 
 def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
-    """Yield what the log does not show about reactions to the robot."""
+    """Yield phrases about reactions of the objects to the robot that the log does not show."""
     if any(thing.is_moving and thing.pedestrian is None for thing in objects):
         yield "whether moving objects react to the robot; those that are no pedestrians follow their recorded tracks"
     apart = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]
@@ -142,7 +150,7 @@ def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
 
 
 def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:
-    """Yield the jumps of the ground truth that the odometry does not measure."""
+    """Yield the time in s, the new pose, and the reason of each sudden jump of the true pose."""
     if not drive.has_true_poses or len(drive.poses) < 2:
         return
     poses, times = drive.poses.values, drive.poses.times

@@ -1,4 +1,4 @@
-"""Entry point of the reconstruction: a log becomes a scenario file."""
+"""Reconstructs a scenario from a log and writes the scenario file; entry point of this package."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import choose_robot, read_description
 from simscen.reconstruction.estimators import run_estimators
-from simscen.reconstruction.objects.find_objects import object_along
+from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, scenario_contents
-from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
+from simscen.reconstruction.scenario.given_parts import (
+    DEFAULT_LIDAR_HEIGHT_M,
+    GivenFiles,
+    choose_world,
+    prepare_given_parts,
+)
 from simscen.reconstruction.scenario.robot_file import robot_properties
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
 from simscen.reconstruction.static_world import StaticWorld
@@ -25,7 +30,7 @@ from simscen.reconstruction.static_world import StaticWorld
 
 @dataclass(frozen=True)
 class ReconstructionOptions:
-    """How to read the log, and files that the user names."""
+    """How to read the log, files that replace those of the log, and the folder in which the files of the log are."""
 
     drive: DriveOptions = field(default_factory=DriveOptions)
     files: GivenFiles = field(default_factory=GivenFiles)
@@ -34,7 +39,7 @@ class ReconstructionOptions:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """A written scenario with the drive that it is from. `files` are all that were written, the scenario first."""
+    """Result of a reconstruction: written files (the scenario first), the recorded drive, and the scenario's parts."""
 
     log: Path
     files: tuple[Path, ...]
@@ -45,11 +50,11 @@ class Reconstruction:
 
     @property
     def file(self) -> Path:
-        """The scenario."""
+        """The scenario file."""
         return self.files[0]
 
     def summary(self) -> Iterator[str]:
-        """Yield lines that say what was found."""
+        """Yield lines for the user: the number of goals and found objects, then each fault and each incident."""
         people = sum(thing.pedestrian is not None for thing in self.estimated.objects)
         moving = sum(thing.is_moving for thing in self.estimated.objects) - people
         standing = len(self.estimated.objects) - moving - people
@@ -70,10 +75,10 @@ class Reconstruction:
 def _write_valid(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, log: Path, out: Path
 ) -> tuple[ScenarioContents, EstimatedParts]:
-    """Write the scenario without the objects and faults that `simscen validate` refuses, such as one inside the robot.
+    """Write the scenario, without objects and faults that make it invalid, such as an object inside the robot.
 
-    Return what was written. What else is refused is listed among what the log does not show. Raises InvalidInput if
-    the scenario cannot be loaded.
+    A pedestrian that makes it invalid first becomes a scripted object. Other problems are added to the unknowns.
+    Returns the written contents and the parts that are left. Raises InvalidInput if the scenario cannot be loaded.
     """
     while True:
         contents = scenario_contents(drive, given, estimated, name, log.name)
@@ -106,7 +111,7 @@ def _write_valid(
 
 
 def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
-    """Return the estimated without the faults that do not fit their sensors. Raises InvalidInput if there are none."""
+    """Return the parts without the faults that the problems refuse. Raises InvalidInput if they refuse no fault."""
     refusals = "\n".join(problem.message for problem in problems)
     refused = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
     if not refused:
@@ -117,9 +122,10 @@ def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) 
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
-    """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError.
+    """Write the scenario file `out`, and next to it the map and robot files that it needs.
 
-    Of a log with several robots, `options.files.robot` names the robot that the scenario has.
+    In a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput for
+    an unusable log or file, and OSError if a file cannot be written.
     """
     robot_of_log = choose_robot(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files
@@ -128,11 +134,11 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     choice = choose_world(drive, described, files, out)
     height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
     static_world = StaticWorld(choice.world, height)
-    given = given_parts(drive, described, choice, files, out, static_world)
+    given = prepare_given_parts(drive, described, choice, files, out, static_world)
     is_known = bool(files.robot) or described.robot is not None
     robot = robot_properties(given.robot, out.parent, is_known)
     others = [
-        object_along(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
+        object_of_robot(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
         for name, outline, times, poses in described.other_robots
     ]
     estimated = run_estimators(drive, static_world, robot, others, choice.is_built)

@@ -70,12 +70,15 @@ def world_from_map(grid: OccupancyGrid, name: str) -> World:
 
 def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
     """Return the poses x, y, yaw (n, 3) of the lidar in the map frame at the times of the scans."""
-    base = drive.poses.poses_at(scans.times)
-    mount: Pose2 = scans.mount
-    c, s = np.cos(base[:, 2]), np.sin(base[:, 2])
-    x = base[:, 0] + c * mount.x - s * mount.y
-    y = base[:, 1] + s * mount.x + c * mount.y
-    return np.column_stack((x, y, base[:, 2] + mount.yaw))
+    return offset_poses(drive.poses.poses_at(scans.times), scans.mount)
+
+
+def offset_poses(poses: Array, offset: Pose2) -> Array:
+    """Return the poses x, y, yaw (n, 3) that have the pose `offset` in the frame of each of `poses` (n, 3)."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = poses[:, 0] + c * offset.x - s * offset.y
+    y = poses[:, 1] + s * offset.x + c * offset.y
+    return np.column_stack((x, y, poses[:, 2] + offset.yaw))
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
@@ -94,8 +97,8 @@ RESOLUTION_M = 0.05
 """Cell size of the map that is built from scans."""
 MARGIN_M = 1.0
 """Distance between the border of the map and everything that was measured."""
-MAX_SCANS = 1500
-"""Number of scans above which the map is built only from every second, third, … scan."""
+TARGET_SCANS = 1500
+"""The scans of a long drive are thinned out evenly to at least this number, and less than twice as many."""
 BODY_RADIUS_M = 0.15
 """Cells that were closer to the path than this are free: every robot has at least this radius."""
 MAX_RANGE_M = 15.0
@@ -115,8 +118,7 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
     if drive.scans is None or not len(drive.scans):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
         return OccupancyGrid(np.zeros(_shape(low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
-    step = max(1, len(drive.scans) // MAX_SCANS)
-    scans = drive.scans.every(step)
+    scans = drive.scans.thinned(TARGET_SCANS)
     poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
     ends = beam_ends(poses, scans.angles, scans.ranges)
     everything = np.concatenate((ends[hits], path))

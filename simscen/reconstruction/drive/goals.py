@@ -15,7 +15,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans, TimedValues
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, TimedValues
 from simscen.reconstruction.reasons import windows
 from simscen.record.foreign.trace_reader import goal_events
 from simscen.record.messages import event_text
@@ -42,13 +42,8 @@ ToSeconds = Callable[[int], float]
 """Converts a log time in ns to s since the start of the drive."""
 
 
-def find_goals(
-    messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues
-) -> tuple[tuple[RecordedGoal, ...], str]:
-    """Return the goals of a drive, and the final result of the navigation, such as "SUCCEEDED"; "" if unknown.
-
-    `poses` are the best known poses in the map frame (n, 3).
-    """
+def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> Iterator[RecordedGoal]:
+    """Return the goals of a drive. `poses` (n, 3) are its best known poses x, y, yaw in the map frame."""
     sent = [
         RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
         for message in messages.of("goal")
@@ -57,13 +52,10 @@ def find_goals(
         (to_seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")
     ]
     if events:
-        return tuple(_with_results_of_events(sent, events)), _result(events)
+        return _with_results_of_events(sent, events)
     if not sent:
         sent = list(_goals_from_plans(messages, to_seconds))
-    status = _with_results_of_actions(sent, messages, to_seconds)
-    if sent:
-        return tuple(status), ""
-    return tuple(goals_from_motion(poses)), ""
+    return _with_results_of_actions(sent, messages, to_seconds) if sent else goals_from_motion(poses)
 
 
 def _with_results_of_events(
@@ -86,11 +78,6 @@ def _with_results_of_events(
             code = str(ending[1].data.get("error_name", "") or "")
             goal = replace(goal, ended=ending[0], status=_STATUS_OF_EVENTS[ending[1].kind], error=code)
         yield goal
-
-
-def _result(events: Sequence[tuple[float, Event]]) -> str:
-    ended = [event.name for _, event in events if event.kind is EventKind.NAVIGATION_ENDED]
-    return ended[-1] if ended else ""
 
 
 def _with_results_of_actions(
@@ -181,6 +168,10 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
         replace(goal, sent=max(0.0, goal.sent - begin), ended=None if goal.ended is None else goal.ended - begin)
         for goal in drive.goals
     )
+    scans = drive.scans
+    if scans is not None:
+        scans = scans.subset(slice(int(np.searchsorted(scans.times, begin)), None))
+        scans = replace(scans, times=scans.times - begin, arrivals=scans.arrivals - begin)
     return replace(
         drive,
         duration=drive.duration - begin,
@@ -191,7 +182,7 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
         commands=_values_from(drive.commands, begin),
         turn_rates=_values_from(drive.turn_rates, begin),
         bumper=_values_from(drive.bumper, begin),
-        scans=None if drive.scans is None else _scans_from(drive.scans, begin),
+        scans=scans,
         goals=goals,
         notes=(*drive.notes, note),
         begin=begin,
@@ -210,14 +201,3 @@ def _values_from(signal: TimedValues, begin: float, keep_last: bool = False) -> 
         first -= 1
     times = np.maximum(signal.times[first:] - begin, 0.0)
     return TimedValues(times, signal.values[first:], np.maximum(signal.arrivals[first:] - begin, 0.0))
-
-
-def _scans_from(scans: Scans, begin: float) -> Scans:
-    first = int(np.searchsorted(scans.times, begin))
-    return replace(
-        scans,
-        times=scans.times[first:] - begin,
-        arrivals=scans.arrivals[first:] - begin,
-        ranges=scans.ranges[first:],
-        is_malformed=scans.is_malformed[first:],
-    )

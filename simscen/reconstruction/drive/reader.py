@@ -85,7 +85,6 @@ class _DriveReader:
         commands = self._signal(
             "cmd_vel", [tuple(message.content.values) for message in self._messages.of("cmd_vel")], 3
         )
-        goals, result = find_goals(self._messages, self._seconds, poses)
         return RecordedDrive(
             name=self._path.stem,
             duration=duration,
@@ -100,8 +99,7 @@ class _DriveReader:
             bumper=self._signal("bumper", [(float(message.content),) for message in self._messages.of("bumper")], 1),
             scans=scans,
             map=self._map(),
-            goals=goals,
-            result=result,
+            goals=tuple(find_goals(self._messages, self._seconds, poses)),
             footprint=self._footprint(poses),
             notes=tuple(self._notes),
         )
@@ -224,7 +222,7 @@ class _DriveReader:
         mount, height = self._mount(frame)
         angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
         limits = first.range_min, first.range_max
-        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed, frame)
+        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed)
 
     def _mount(self, frame: str) -> tuple[Pose2, float]:
         """Return the pose of the lidar on the base and its height in m, from the first transform of each frame."""

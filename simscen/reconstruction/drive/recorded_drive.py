@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +76,7 @@ class Scans:
         mount: Pose of the lidar on the base.
         height: Height of the lidar above the base frame in m.
         is_malformed: Whether a scan (n,) has another number of beams than most; its ranges are nan.
-        frame: Name of the lidar frame.
+
     """
 
     times: Array
@@ -88,7 +88,6 @@ class Scans:
     mount: Pose2
     height: float
     is_malformed: Mask
-    frame: str = "lidar"
 
     def __len__(self) -> int:
         return len(self.times)
@@ -104,17 +103,16 @@ class Scans:
             hit: Mask = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
             return hit
 
-    def every(self, step: int) -> Scans:
-        """Return each scan whose index is a multiple of `step`."""
-        which = slice(None, None, step)
-        times, arrivals, ranges, is_malformed = (
-            self.times[which],
-            self.arrivals[which],
-            self.ranges[which],
-            self.is_malformed[which],
+    def subset(self, which: slice) -> Scans:
+        """Return the scans of a slice of indices."""
+        times, arrivals = self.times[which], self.arrivals[which]
+        return replace(
+            self, times=times, arrivals=arrivals, ranges=self.ranges[which], is_malformed=self.is_malformed[which]
         )
-        limits = self.range_min, self.range_max
-        return Scans(times, arrivals, ranges, self.angles, *limits, self.mount, self.height, is_malformed, self.frame)
+
+    def thinned(self, target: int) -> Scans:
+        """Return evenly spread scans: at least `target` and less than twice as many, or all if there are fewer."""
+        return self.subset(slice(None, None, max(1, len(self) // target)))
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ class RecordedDrive:
         scans: Scans of the lidar frame with the most scans; None without scans.
         map: Last map on the map topic; None without one.
         goals: Goals in the order in which they were sent.
-        result: Final result of the navigation, such as "SUCCEEDED"; "" if unknown.
+
         footprint: Corners (x, y) of the robot's footprint in the base frame, () if unknown.
         notes: Sentences about what the log does not show, or how it was read, for the user.
         begin: Time in s from the start of the log to the start of the drive.
@@ -179,7 +177,7 @@ class RecordedDrive:
     scans: Scans | None = None
     map: OccupancyGrid | None = None
     goals: tuple[RecordedGoal, ...] = ()
-    result: str = ""
+
     footprint: Polygon = ()
     notes: tuple[str, ...] = ()
     begin: float = 0.0

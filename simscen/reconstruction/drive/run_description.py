@@ -35,8 +35,8 @@ class RunDescription:
         has_map: False if the robot drove without a map.
         robot: Name of a shipped robot, or robot file; None if unknown.
         stack: Data of the key `stack` of the scenario.
-        other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each other
-            robot, in a log with several robots.
+        other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each
+            robot that is not reconstructed.
         notes: Remarks for the user about missing files.
     """
 

@@ -1,4 +1,4 @@
-"""Faults between command and motion: late or lost commands, weak motors, and lower speed limits."""
+"""Finds faults between commands and motion: late or ignored commands, weak motors, and reduced speed limits."""
 
 from __future__ import annotations
 
@@ -13,42 +13,45 @@ from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 SAMPLE_PERIOD_S = 0.025
-"""Period at which commands and odometry are compared."""
+"""Period of the samples at which commands and odometry are compared."""
 MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
 """Largest lag that is searched, and smallest one that is reported."""
 NORMAL_LAG_S = 0.09
-"""Lag of a base without faults, which needs a moment to accelerate."""
+"""Lag of a base without faults, which needs this time to accelerate; subtracted from the reported latency."""
 MIN_COMMAND_M_S = 0.1
-"""Speed above which a command, or a motion, counts as driving."""
-IGNORED_FRACTION, MIN_IGNORED_S = 0.1, 0.4
-"""Ratio of driven to commanded speed below which the base ignores a command, for at least this time."""
-KEPT_FRACTION, MIN_KEPT_S = 0.5, 0.6
-"""Ratio of commanded to driven speed below which the base should slow down, for longer than braking takes."""
+"""Speed above which a command, or the base, counts as driving."""
+IGNORED_RATIO, MIN_IGNORED_S = 0.1, 0.4
+"""The base ignores a command if it drives at less than this fraction of the commanded speed for at least this time."""
+KEPT_RATIO, MIN_KEPT_S = 0.5, 0.6
+"""The base keeps its speed if the command is less than this fraction of it for at least this time, longer than braking
+takes."""
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
-"""Time in which a steady command changes by at most this share of its value."""
+"""A command is steady if it changes in this time by at most this fraction of its value."""
 MIN_GAIN_ERROR = 0.08
-"""Smallest difference of a gain from 1 that is reported."""
+"""Smallest deviation of a gain (ratio of driven to commanded speed) from 1 that is reported."""
 MIN_STEADY_SAMPLES = 20
 """Number of samples with a steady command that the estimate of a speed limit or a gain needs."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
-"""Difference of the gains of both sides, and share of the motion that they do not explain, for a fault of one side."""
+"""Smallest difference between the gains of left and right wheels that is reported, and largest fraction of the squared
+speeds that these gains may leave unexplained."""
 MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
-"""Difference between commanded and driven speed above which the base is limited, and largest standard deviation of the
-speeds at one limit."""
+"""Difference between commanded and driven speed above which a speed limit may act, and largest standard deviation of
+the speeds at a limit."""
 SMOOTHING_S = 0.5
-"""Time over which the noise of the odometry is averaged."""
+"""Time over which speeds are averaged to reduce the noise of the odometry."""
 MIN_LIMIT_FALL_M_S = 0.05
-"""Decrease of a speed limit during the drive above which it is a low battery."""
+"""Decrease of the speed limit during the drive above which it is reported as a low battery."""
 MIN_ERROR_DECREASE = 0.02
-"""Decrease of the mean squared error, in squared standard deviations of the command, that shows a lag."""
+"""A lag exists if it reduces the mean squared difference between command and motion by more than this. The velocities
+are divided by the standard deviation of the command."""
 MIN_COMMAND_STD = 0.05
-"""Standard deviation of a commanded velocity, in m/s or rad/s, below which its changes say nothing about the lag."""
+"""Standard deviation of a commanded velocity, in m/s or rad/s, below which the lag cannot be estimated from it."""
 
 
-def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[FoundFault]:
+def command_faults(drive: RecordedDrive, wheel_separation: float = 0.0) -> Iterator[FoundFault]:
     """Yield the faults of the commands and of the base that executes them.
 
-    `separation` is the distance of the wheels in m, 0 for a base without sides.
+    `wheel_separation` is the distance in m between left and right wheels; 0 if the sides cannot be told apart.
     """
     times, commanded, driven = _speeds(drive)
     if len(times) < 80:
@@ -65,14 +68,14 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
     yield from ignored
     if ignored:
         return
-    sides = [*_side_gains(times, commanded, driven, separation)]
+    sides = [*_side_gains(times, commanded, driven, wheel_separation)]
     yield from sides
     if not sides:
         yield from _limits(times, commanded, driven)
 
 
 def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
-    """Return times (n,) with commanded and driven velocities vx, wz (n, 2)."""
+    """Return times (n,), commanded velocities vx, wz (n, 2), and driven velocities vx, wz (n, 2)."""
     commands, odometry = drive.commands, drive.odometry
     if len(commands) < 2 or len(odometry) < 2:
         return np.empty(0), np.empty((0, 2)), np.empty((0, 2))
@@ -85,13 +88,13 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _averaged(speeds: Array) -> Array:
-    """Return speeds (n,) without the noise of the odometry."""
+    """Return the moving average of speeds (n,) over SMOOTHING_S."""
     result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
     return result
 
 
 def _lag(commanded: Array, driven: Array) -> float:
-    """Return the lag in s with which the driven velocity follows the command best."""
+    """Return the lag in s of the driven velocities (n, 2) behind the commanded ones; 0 if none can be shown."""
     best, lag, error_without_lag = -np.inf, 0, -np.inf
     varies = np.std(commanded, axis=0) >= MIN_COMMAND_STD
     if not varies.any():
@@ -108,9 +111,9 @@ def _lag(commanded: Array, driven: Array) -> float:
 
 
 def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
-    """Return the times in which the base stood although it was commanded to drive."""
+    """Return a fault for each time in which the base stood although it was commanded to drive."""
     stands = (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S) & (
-        np.abs(driven[:, 0]) < IGNORED_FRACTION * np.abs(commanded[:, 0])
+        np.abs(driven[:, 0]) < IGNORED_RATIO * np.abs(commanded[:, 0])
     )
     found = []
     for window in windows(stands, times, MIN_IGNORED_S, 0.1):
@@ -120,9 +123,9 @@ def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
 
 
 def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield the times in which the base kept its speed although it was commanded to stop."""
+    """Yield a fault for each time in which the base kept its speed although it was commanded to slow down."""
     speed = _averaged(driven[:, 0])
-    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_FRACTION * np.abs(speed))
+    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_RATIO * np.abs(speed))
     for window in windows(keeps, times, MIN_KEPT_S, 0.1):
         if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
             text = "the base keeps its speed although it is commanded to stop"
@@ -131,11 +134,11 @@ def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]
             yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, reason)
 
 
-def _side_gains(times: Array, commanded: Array, driven: Array, separation: float) -> Iterator[FoundFault]:
-    """Yield the fault that the wheels of one side drive another share of their commands than those of the other."""
-    if separation <= 0.0:
+def _side_gains(times: Array, commanded: Array, driven: Array, wheel_separation: float) -> Iterator[FoundFault]:
+    """Yield the fault that left and right wheels drive at different fractions of their commanded speeds."""
+    if wheel_separation <= 0.0:
         return
-    half = separation / 2
+    half = wheel_separation / 2
     gains, remaining = [], []
     for side in (-half, half):
         command, speed = (_averaged(motion[:, 0] + side * motion[:, 1]) for motion in (commanded, driven))
@@ -151,7 +154,7 @@ def _side_gains(times: Array, commanded: Array, driven: Array, separation: float
 
 
 def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield a lower maximum speed, or a constant ratio between driven and commanded speed."""
+    """Yield a falling speed limit, a constant speed limit, or a gain of the speed; at most one of them."""
     steady = _steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
     if int(steady.sum()) < MIN_STEADY_SAMPLES:
         return
@@ -183,7 +186,11 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
-    """Return the speed at time 0 and in the end, the time until then, and the spread about a limit that falls so."""
+    """Fit a speed limit that falls linearly and is constant afterwards to `speeds` (n,) at `times` (n,).
+
+    Return the limit at time 0 and after the fall in m/s, the time in s at which the fall ends, and the standard
+    deviation of the speeds about the limit in m/s.
+    """
     best = (0.0, 0.0, 0.0, math.inf)
     for drain in np.linspace(times[0], times[-1], 25)[4:].tolist():
         share = np.minimum(times, drain) / drain
@@ -196,7 +203,7 @@ def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, fl
 
 
 def _steady(commanded: Array) -> Mask:
-    """Return when the commanded speed has hardly changed for STEADY_S."""
+    """Return at which samples (n,) the commanded speed has hardly changed for STEADY_S."""
     count = round(STEADY_S / SAMPLE_PERIOD_S)
     speed = np.abs(commanded[:, 0])
     steady = np.zeros(len(speed), dtype=bool)

@@ -1,4 +1,4 @@
-"""Beams that end too early or pass through walls: dust, ghosts that move with the lidar, and glass."""
+"""Finds lidar faults from beams that end too early (dust, ghosts) or pass through walls (glass)."""
 
 from __future__ import annotations
 
@@ -23,20 +23,24 @@ from simscen.reconstruction.static_world import StaticWorld, beam_ends
 from simscen.worlds.geometry.triangulation import merge_solids
 
 MIN_FALSE_FRACTION = 0.015
-"""Share of isolated beams in a scan above which there is dust."""
+"""Fraction of isolated beams in a scan above which the scan shows dust."""
 JUMP_M = 0.3
-"""Difference in range from which on two neighbor beams ended at different things."""
+"""If the ranges of neighbor beams differ by at least this, the beams end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""Number of beams beside a ghost that must not show it, and difference of the ranges of one object."""
+"""A ghost must not be visible this many beams beside its own, where an object is one with a range that differs by less
+than this distance."""
 MIN_GHOST_FRACTION, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
-"""Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
-and distance in m that the lidar must move meanwhile."""
+"""Limits of a ghost: fraction of the scans that show it between its first and its last scan; spread (median deviation)
+of its range in m, or in standard deviations of the noise if that is larger; and distance that the lidar must move."""
 MIN_GHOST_S = 2.0
 """Time for which a ghost must be seen."""
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield dust: single beams that end in free space; and ghosts: objects that move with the lidar."""
+    """Yield faults of dust (single beams that end in free space) and ghosts (objects that move with the lidar).
+
+    `end` is the end of the drive in s.
+    """
     usable = ~invalid_scans(compared)
     isolated = isolated_returns(compared)
     for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
@@ -69,7 +73,7 @@ def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def isolated_returns(compared: ComparedScans) -> Mask:
-    """Return the beams (n, beams) that end before the world, and not where their neighbors end."""
+    """Return which beams (n, beams) end before the static world, but not near the ends of their neighbor beams."""
     ranges = np.where(compared.is_hit, compared.scans.ranges, np.inf)
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(ranges, axis=1))
@@ -80,9 +84,9 @@ def isolated_returns(compared: ComparedScans) -> Mask:
 
 
 def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
-    """Return first and last beam and the range of objects that are fixed in the frame of the lidar.
+    """Return first beam, last beam, and range in m of each ghost: an object that is fixed in the frame of the lidar.
 
-    The robot must have driven while they were seen, so that nothing that stands in the world looks like this.
+    The robot must have driven meanwhile, because until then a standing object looks the same.
     """
     if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
@@ -108,9 +112,10 @@ def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
 
 
 def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
-    """Return whether beams beside a sector usually show the same distance, as of an object that only passes by.
+    """Return whether the object in a sector usually continues beside it, as an object does that only passes by.
 
-    `ranges` (n, beams) are those of beams that end before the world, nan for others.
+    `ranges` (n, beams) are nan for beams that do not end before the static world. The sector reaches from the beam
+    `first` to the beam `last`, and the object is at the range `distance` in m.
     """
     with np.errstate(invalid="ignore"):
         same = np.abs(ranges - distance) < SAME_OBJECT_M
@@ -120,13 +125,16 @@ def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
 
 
 MIN_PASSING_FRACTION, MIN_PASSING_BEAMS = 0.3, 30
-"""Share and number of beams through a wall from which on it counts as transparent."""
+"""A wall is transparent if more than this fraction of its beams, and at least this number of beams, pass through it."""
 MAX_SURFACE_DISTANCE_M = 0.05
-"""Distance from a solid within which an expected beam ends at it."""
+"""A beam is expected to end at a solid if its expected end is at most this far from the solid."""
 
 
 def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> FoundFault | None:
-    """Return the fault of beams that pass through named walls and obstacles of the world, if there is one."""
+    """Return the fault that beams pass through named walls or obstacles of the world; None if they do not.
+
+    Only the `usable` scans (n,) count.
+    """
     rows = np.flatnonzero(usable)
     # A beam without any return may have been lost; only one that ends behind the wall has passed through it.
     through = compared.passes_through[rows] & compared.is_hit[rows]
@@ -138,7 +146,7 @@ def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> Fo
         ends[decided & np.isfinite(compared.expected[rows])],
         through[decided & np.isfinite(compared.expected[rows])],
     )
-    shares = _shares(world.world.solids, points, passed)
+    shares = _passing_fractions(world.world.solids, points, passed)
     names = [
         name
         for name, (count, share) in shares.items()
@@ -154,8 +162,11 @@ def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> Fo
     return FoundFault("lidar", "glass", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
 
 
-def _shares(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str, tuple[int, float]]:
-    """Return for each named solid how many expected beam ends it has, and which share of the beams passes through."""
+def _passing_fractions(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str, tuple[int, float]]:
+    """Return by name of the solid how many beams should end at it, and which fraction of them passes through it.
+
+    `points` (n, 2) are the expected ends of beams in the map frame, and `passed` (n,) tells which of them pass.
+    """
     counts: dict[str, list[int]] = {}
     for solid in solids:
         if not solid.name or solid.name == "map":
@@ -168,7 +179,7 @@ def _shares(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str,
 
 
 def _near(solid: Solid, points: Array) -> Mask:
-    """Return which points (n, 2) are within MAX_SURFACE_DISTANCE_M of the convex hull of a solid, seen from above."""
+    """Return which points (n, 2) are in or near the convex hull of a solid, seen from above."""
     from scipy.spatial import ConvexHull
 
     corners = merge_solids((solid,)).vertices[:, :2]

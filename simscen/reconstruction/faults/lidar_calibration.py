@@ -1,6 +1,6 @@
-"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a scale, or a drift of its ranges.
+"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a wrong scale, or a drift of its ranges.
 
-The errors follow from the differences between its ranges and those expected in the static world.
+The errors are computed from the differences between measured ranges and the ranges expected in the static world.
 """
 
 from __future__ import annotations
@@ -14,32 +14,36 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.reasons import FoundFault, Reason
-from simscen.reconstruction.static_world import StaticWorld
+from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
-MAX_SCANS = 40
-"""Number of scans, evenly spread over the drive, that are compared."""
+TARGET_SCANS = 40
+"""The scans are thinned out evenly to at least this number, and less than twice as many."""
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
-"""Steps of the numerical derivatives."""
+"""Changes of the mount from which the numerical derivatives of the ranges are computed."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
 """Yaw errors of the mount that are tried as starting points of the estimate."""
 MAX_MISFIT_RATIO = 0.7
-"""The estimate starts at a yaw error only if the median difference of the ranges is below this fraction of that at the
-nominal mount."""
+"""The best tried yaw error is the starting point only if its median range difference is less than this fraction of that
+at the nominal mount; otherwise the nominal mount is the starting point."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Difference from the expected range above which a beam is ignored; halved with each step, down to 0.1 m."""
+"""Beams with a larger difference from the expected range are ignored. The limit of the mount is halved with each
+Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
-"""Number of beams that the estimate needs."""
+"""Smallest number of beams from which the mount is estimated."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
 """Smallest error of a mount that is reported. Smaller ones may be errors of the recorded poses or of the walls."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
-"""Smallest bias, difference of the scale from 1, and drift of ranges that are reported."""
+"""Smallest bias of the ranges, deviation of their scale from 1, and drift that are reported."""
 
 
 def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
-    """Return the true pose of the lidar in the frame of its nominal mount (Gauss-Newton on range differences)."""
-    step = max(1, len(compared.scans) // MAX_SCANS)
+    """Return the true pose of the lidar relative to its nominal mount, by Gauss-Newton steps on the range differences.
+
+    It is the identity if too few beams hit the static world.
+    """
+    step = max(1, len(compared.scans) // TARGET_SCANS)
     chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
     error = Pose2(0.0, 0.0, 0.0)
     if not len(chosen):
@@ -50,7 +54,7 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
         return error
 
     def differences(offset: Pose2) -> Array:
-        return ranges - world.ranges_from(_shifted(compared.poses[chosen], offset), angles, reach)
+        return ranges - world.ranges_from(offset_poses(compared.poses[chosen], offset), angles, reach)
 
     with np.errstate(invalid="ignore"):
         misfit = {
@@ -83,15 +87,11 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     return error
 
 
-def _shifted(poses: Array, offset: Pose2) -> Array:
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x = poses[:, 0] + c * offset.x - s * offset.y
-    y = poses[:, 1] + s * offset.x + c * offset.y
-    return np.column_stack((x, y, poses[:, 2] + offset.yaw))
-
-
 def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | None:
-    """Return the fault of a lidar that is not where its mount says, or None. The poses must be ground truth."""
+    """Return the fault that the lidar has another pose on the robot than its mount; None if the error is small.
+
+    The poses of the drive must be a ground truth.
+    """
     error = mount_error(compared, world)
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
@@ -107,15 +107,15 @@ def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | Non
 
 
 def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> ComparedScans:
-    """Return the compared with the lidar moved to its estimated true pose, at which its scans fit the walls."""
+    """Return the scans compared again, with the lidar at its estimated true pose on the robot."""
     error = mount_error(compared, world)
-    poses = _shifted(compared.poses, error)
+    poses = offset_poses(compared.poses, error)
     expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
     return replace(compared, poses=poses, expected=expected)
 
 
 def range_error_faults(compared: ComparedScans) -> Iterator[FoundFault]:
-    """Yield a constant error, a wrong scale, or a drift of all ranges."""
+    """Yield the fault of a drift, a wrong scale, or a constant error (bias) of all ranges; at most one of them."""
     residuals = np.where(np.abs(np.nan_to_num(compared.residuals, nan=9.0)) < OUTLIER_M, compared.residuals, np.nan)
     rows = np.isfinite(residuals).sum(axis=1) >= 20
     if int(rows.sum()) < 10:

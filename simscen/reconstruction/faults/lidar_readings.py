@@ -1,4 +1,7 @@
-"""Faults in the contents of scans: invalid scans, missing beams, a limited range, rain, and noise."""
+"""Finds lidar faults from the ranges in the scans: invalid scans, missing beams, a limited range, rain, and noise.
+
+In all functions, `end` is the end of the drive in s.
+"""
 
 from __future__ import annotations
 
@@ -14,30 +17,32 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 LIDAR = "lidar"
+"""Target of the faults."""
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
-"""Additional noise that is reported: at least this in m, and this multiple of the nominal noise."""
+"""Noise is reported if it exceeds the nominal noise by more than this distance, and this multiple of nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""Factor of the noise, and additional noise in m, that is reported if the noise of the lidar is known."""
+"""If the nominal noise is exact, noise is reported above this multiple of it that exceeds it by this distance."""
 MIN_NOISE_S = 2.0
 """Shortest time with additional noise that is reported."""
 MIN_INVALID_SCANS = 2
-"""Number of invalid scans from which on they are reported."""
+"""Smallest number of invalid scans that is reported."""
 MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
-"""A scan is invalid if a smaller share of its beams than the first hits something, and a larger share than the second
+"""A scan is invalid if less than the first fraction of its beams hits anything, although more than the second fraction
 should hit the static world."""
 MIN_NAN_FRACTION = 0.03
-"""Share of beams without a return above which beams are missing."""
+"""Fraction of nan ranges in a scan above which beams are missing."""
 BLIND_FRACTION = 0.95
-"""Share of the scans in which a beam of a blind sector returns nothing."""
+"""A beam is blind if it returns nan in more than this fraction of the scans."""
 MIN_SECTOR_BEAMS = 3
-"""Number of neighboring beams that form a sector."""
+"""Smallest number of neighboring beams that form a sector."""
 MIN_MISSING_FRACTION, MAX_NEAR_FRACTION = 0.03, 0.1
-"""Share of beams that miss the static world above which the range is limited, and largest share of these beams whose
-range is below the limit."""
+"""The range may be limited if more than the first fraction of beams returns nothing where the static world is in range.
+At most the second fraction of these beams may have an expected range below the limit."""
 MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
-"""Shortest time of a fault, and longest interruption within it."""
+"""Shortest duration of a fault, and longest interruption within it."""
 RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
-"""Model of the fault `rain` (Goodin et al., 2019): extinction α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)²."""
+"""Model of the fault `rain` (Goodin et al., 2019) for the rain rate R in mm/h and the range z in m: extinction
+α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)² m."""
 WHITE_REFLECTIVITY = 0.9
 """Reflectivity of a surface that the lidar just detects at its maximum range in clear air, as in the fault `rain`."""
 HEAVY_RAIN_MM_H = 25.0
@@ -45,7 +50,7 @@ HEAVY_RAIN_MM_H = 25.0
 
 
 def invalid_scans(compared: ComparedScans) -> Mask:
-    """Return which scans (n,) are meaningless: of the wrong length, or with hardly a valid range."""
+    """Return which scans (n,) are invalid: they have the wrong number of beams, or hardly any valid range."""
     hits = compared.is_hit.mean(axis=1)
     expected = np.isfinite(compared.expected).mean(axis=1)
     result: Mask = compared.scans.is_malformed | (
@@ -55,7 +60,7 @@ def invalid_scans(compared: ComparedScans) -> Mask:
 
 
 def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield the fault of invalid scans among valid ones, or of a time with invalid scans alone."""
+    """Yield at most one fault that covers all invalid scans, with the probability of an invalid scan in its time."""
     invalid, times = invalid_scans(compared), compared.scans.times
     if int(invalid.sum()) < MIN_INVALID_SCANS:
         return
@@ -76,7 +81,7 @@ def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def _content(compared: ComparedScans, index: int) -> str:
-    """Return the name of the content of an invalid scan."""
+    """Return the content of the invalid scan `index` as a value of the fault `garbage`, such as "nan" or "short"."""
     ranges = compared.scans.ranges[index]
     if compared.scans.is_malformed[index]:
         return "short"
@@ -90,7 +95,7 @@ def _content(compared: ComparedScans, index: int) -> str:
 
 
 def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield the faults of beams that return nan: blind sectors, and beams that are lost at random."""
+    """Yield faults of beams that return nan: blind sectors, and beams that are lost at random."""
     usable = ~invalid_scans(compared)
     missing = np.isnan(compared.scans.ranges)
     blind = np.zeros(missing.shape[1], dtype=bool)
@@ -118,7 +123,7 @@ def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
-    """Return the directions of two beams in degrees, with as many decimals as tell neighboring beams apart."""
+    """Return the directions of the beams `first` and `last` in degrees, rounded so that neighbor beams still differ."""
     spacing = float(np.degrees(abs(angles[1] - angles[0])))
     decimals = max(0, math.ceil(-math.log10(spacing)))
     begin, end = (f"{math.degrees(angles[index]):.{decimals}f}" for index in (first, last))
@@ -126,13 +131,16 @@ def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
 
 
 def mask_runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last index of the runs in which a mask (n,) holds."""
+    """Return the first and last index of each run of true values in a mask (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> Iterator[FoundFault]:
-    """Yield the fault that far objects return nothing: a range limit or, with noise that grows with range, rain."""
+    """Yield faults that far objects return nothing: rain if the ranges are also noisy, otherwise a range limit.
+
+    `nominal_noise` is the standard deviation of the lidar's ranges in m.
+    """
     usable = ~invalid_scans(compared)
     near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)
     lost = compared.is_missing & near
@@ -161,7 +169,10 @@ def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> I
 
 
 def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[str, object]:
-    """Return the parameters of rain in which objects up to `limit` m are seen, with this noise per meter of range."""
+    """Return the parameters of the fault `rain` in which objects up to `limit` m are seen.
+
+    `noise_per_meter` is the standard deviation per meter of range, and `range_max` m the range in clear air.
+    """
     share = math.sqrt(min(1.0, noise_per_meter / RAIN_NOISE_PER_M))
     rate = HEAVY_RAIN_MM_H if share > 0.99 else min(HEAVY_RAIN_MM_H, -math.log(1.0 - share))
     alpha = RAIN_ALPHA * rate**RAIN_EXPONENT
@@ -170,7 +181,10 @@ def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[
 
 
 def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
-    """Yield the times in which ranges have more noise than the lidar has, or than good lidars if its is not known."""
+    """Yield a fault for each time in which ranges have more noise than `nominal_noise` m.
+
+    If `is_known`, this is the noise of the lidar itself. Otherwise it is a typical value, and only much more counts.
+    """
     usable = ~invalid_scans(compared)
     noise = median_filter(compared.noise, size=5, mode="nearest")
     limit = nominal_noise + max(MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR * nominal_noise)
@@ -186,7 +200,7 @@ def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_k
 
 
 def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Window]:
-    """Return the times in which a mask holds for the usable scans; the others count as the scan before them."""
+    """Return the time windows in which `mask` (n,) holds for the usable scans; other scans count as the one before."""
     held = mask.copy()
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
     held = held[newest] & usable[newest]
@@ -196,7 +210,10 @@ def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Wi
 def lidar_fault_in_window(
     kind: str, values: Mapping[str, object], window: Window, compared: ComparedScans, end: float, text: str
 ) -> FoundFault:
-    """Return a fault of the lidar in a window; without a start and a duration if it lasts the whole drive."""
+    """Return a fault of the lidar in a time window. Its reason is `text`.
+
+    It has no start if the window begins with the drive, and no duration if the window ends with the drive.
+    """
     times, period = compared.scans.times, compared.scans.period
     from_start = window.begin <= float(times[0]) + 3 * period
     until_end = window.end >= min(end, float(times[-1])) - 5 * period

@@ -1,4 +1,7 @@
-"""Faults of the stream of messages of a sensor: outages, lost messages, delays, and repeated messages."""
+"""Finds outages, lost messages, delays, and low rates from the times of a sensor's messages, and finds repeated scans.
+
+In all functions, `target` is the name of the sensor, and `end` is the end of the drive in s.
+"""
 
 from __future__ import annotations
 
@@ -11,32 +14,32 @@ from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_perio
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_OUTAGE_PERIODS = 4.5
-"""Time between two messages, in periods, from which on it is an outage and not a few lost messages."""
+"""A longer gap between two messages, in periods, is an outage and not a few lost messages."""
 MIN_GAP_PERIODS = 1.5
-"""Time between two messages, in periods, from which on messages are missing in between."""
+"""In a longer gap between two messages, in periods, messages are missing."""
 MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
-"""Share and number of missing messages from which on they are reported."""
+"""Lost messages are reported above this fraction of all messages, and from this number on."""
 MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
-"""Where messages are lost, most steps are within a fifth of a period of two, three, … periods. Otherwise the sensor
-measures irregularly."""
+"""Messages are lost if more than the second fraction of the gaps is a multiple of the period, with errors below the
+first fraction of a period. Otherwise the sensor measures irregularly."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
-"""Delays below both are those of normal drivers and networks."""
+"""Delays above the larger of these, in periods and in s, are reported; drivers and networks cause smaller ones."""
 MIN_OUTAGES_INTERMITTENT = 3
-"""Number of outages from which on they are one intermittent fault."""
+"""Number of outages from which on they are reported as one intermittent fault."""
 SLOW_FACTOR = 1.6
-"""Ratio of the period in a part of the drive to the usual period from which on the sensor was slow there."""
+"""The sensor is slow while its period is longer than this multiple of the usual period."""
 MIN_REPEATED_SCANS = 3
-"""Number of equal scans in a row that are reported."""
+"""Smallest number of repeated scans in a row that is reported."""
 MIN_EQUAL_BEAMS = 20
-"""Number of beams with a return that the comparison of two scans needs."""
+"""Number of beams with a return in both scans that the comparison of two scans needs."""
 
 
 def stream_faults(
     target: str, times: Array, arrivals: Array, end: float, nominal_period: float | None = None
 ) -> Iterator[FoundFault]:
-    """Yield the faults of a stream whose messages were measured at `times` (n,) and logged at `arrivals` (n,).
+    """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s.
 
-    `end` is the end of the drive in s, and `nominal_period` the period of the sensor in s, if it is known.
+    `nominal_period` is the period of the sensor in s; if None, it is estimated from the times.
     """
     if len(times) < 3:
         return
@@ -92,7 +95,7 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
 
 
 def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
-    """Return the fault of a stream that is regular, but slower than usual, for at least half a second."""
+    """Return the fault that the sensor measured for some time at a regular, but lower rate; None if it did not."""
     steps = np.diff(times)
     is_slow = steps > SLOW_FACTOR * period
     if not is_slow.all() and not _is_regular(steps[~is_slow]):
@@ -135,7 +138,7 @@ def _delay(target: str, times: Array, arrivals: Array, period: float, end: float
 
 
 def repeated_scans(scans: Scans) -> Mask:
-    """Return which scans (n,) repeat the ranges of the previous one, which noise makes impossible."""
+    """Return which scans (n,) have exactly the ranges of the previous scan, which noise prevents for new scans."""
     same = np.zeros(len(scans), dtype=bool)
     if len(scans) < 2:
         return same
@@ -147,7 +150,7 @@ def repeated_scans(scans: Scans) -> Mask:
 
 
 def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
-    """Yield the times in which a lidar repeated its last scan."""
+    """Yield a fault for each time in which a lidar repeated its last scan."""
     for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
         if window.last - window.first + 1 < MIN_REPEATED_SCANS:
             continue

@@ -35,7 +35,7 @@ class ScanCluster:
         points: Hits (m, 2) in the map frame.
         lidar: Position (2,) of the lidar in the map frame.
         angle: Angle in rad that the hits cover, seen from the lidar.
-        is_fully_visible: Whether the beams on both sides of the hits end farther away, so that nothing hides the object.
+        is_fully_visible: Whether the beams on both sides of the hits end farther away: nothing hides the object.
     """
 
     scan: int
@@ -53,7 +53,7 @@ class ScanCluster:
 
 
 def usable_scans(compared: ComparedScans) -> Mask:
-    """Return which scans (n,) show the static_world at their time."""
+    """Return which scans (n,) are neither invalid nor a repetition of the previous scan."""
     result: Mask = ~invalid_scans(compared) & ~repeated_scans(compared.scans)
     return result
 
@@ -74,7 +74,7 @@ def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: b
 
 
 def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[ScanCluster]:
-    """Yield the clusters of the scan `row` that its `beams` (k,) form. In a scan of 360°, they can cross the first beam."""
+    """Yield the clusters of `beams` (k,) of the scan `row`. In a scan of 360°, a cluster can contain both ends."""
     if len(beams) < MIN_HITS:
         return
     step = abs(float(compared.scans.angles[1] - compared.scans.angles[0])) if len(compared.scans.angles) > 1 else 0.0
@@ -111,9 +111,9 @@ fraction of the points is visible."""
 
 
 def fraction_seen_free(compared: ComparedScans, points: Array, rows: Indices) -> Array:
-    """Return for each scan in `rows` (k,) which fraction of the visible `points` (m, 2) is free; nan if few are visible.
+    """Return for each scan in `rows` (k,) which fraction of the visible points is free; nan if few are visible.
 
-    The points are in the map frame. A point is free if a beam passes through it.
+    `points` (m, 2) are in the map frame. A point is free if a beam passes through it.
     """
     offsets = points[None, :, :] - compared.poses[rows, None, :2]
     distance = np.hypot(offsets[..., 0], offsets[..., 1])

@@ -1,4 +1,4 @@
-"""World, map, robot, and stack of a reconstructed scenario: from options, the header of the log, or its messages."""
+"""Chooses world, map, robot, and stack of a reconstructed scenario: from options, log header, or messages, in order."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Height at which the world is cut for a log without scans."""
+"""Height of the plane in which the walls of the world are seen, for a log without scans."""
 WALL_MARGIN_M = 0.05
-"""Distance that a wall can be nearer than the center of its cell."""
-MAX_NOISE_SCANS = 100
-"""Number of scans, evenly spread over the drive, from which the noise of a lidar is computed."""
+"""Amount by which a wall can be nearer than the center of its map cell."""
+NOISE_SCANS = 100
+"""For computing the noise of a lidar, the scans are thinned out evenly to at least this number."""
 MAX_EQUAL_MAP_DIFFERENCE = 0.002
-"""Share of cells in which two maps of the same world may differ."""
+"""Largest fraction of cells in which two maps of the same world may differ."""
 
 
 @dataclass(frozen=True)
 class GivenFiles:
-    """Files that the user names instead of what the log says."""
+    """World, map, and robot that the user names; they replace those of the log. `robot` is a file or a name."""
 
     world: Path | None = None
     map: Path | None = None
@@ -49,7 +49,16 @@ class GivenFiles:
 
 @dataclass
 class WorldChoice:
-    """World of the scenario: how it is written, as data, and why. `is_built` if it is from the scans of the log."""
+    """World and map of the scenario, each with its reason.
+
+    Attributes:
+        written: Value of the key `world` in the scenario: a path, or an inline world.
+        world: The world itself.
+        map: Value of the key `map`: a path, "none", or "" for the map of the world.
+        is_built: Whether the walls were built from the scans of the log.
+        unknowns: What the log does not show about the world.
+        files: Files that were written beside the scenario.
+    """
 
     written: str | Mapping[str, Any]
     world: World
@@ -59,13 +68,12 @@ class WorldChoice:
     is_built: bool = False
     unknowns: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
-    """Files that were written beside the scenario."""
 
 
 def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return the world and the map, and write those that the log contains beside the scenario `out`.
+    """Return the world and the map of the scenario file `out`, and write beside it those that need a new file.
 
-    Raises InvalidInput for an unusable file, and OSError.
+    Raises InvalidInput for an unusable file, and OSError if a file cannot be written.
     """
     if files.world is not None:
         choice = _world_of_file(files.world, out, Reason("given with --world"))
@@ -91,7 +99,7 @@ def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFi
 
 
 def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return a world whose walls are those of a map: a given one, that on /map, or one built from the scans."""
+    """Return a world whose walls are those of a map: the given map, the map in the log, or one built from the scans."""
     if files.map is not None:
         loaded = load_world_file(files.map, default_root([files.map]))
         if loaded.map is None:
@@ -136,13 +144,13 @@ def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
-    """Return whether the robot's map has other walls than the world."""
+    """Return whether the robot's map `given` has other walls than the map that is `drawn` from the world."""
     if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
         return True
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
 
 
-def given_parts(
+def prepare_given_parts(
     drive: RecordedDrive,
     described: RunDescription,
     choice: WorldChoice,
@@ -150,45 +158,44 @@ def given_parts(
     out: Path,
     static_world: StaticWorld,
 ) -> GivenParts:
-    """Return the parts of the scenario that are not estimated. Writes a robot file if no robot is named."""
-    reason = {"world": choice.reason}
+    """Return the parts of the scenario that are not estimated. Write a robot file if neither user nor log names one."""
+    reasons = {"world": choice.reason}
     if choice.map_reason is not None:
-        reason["map"] = choice.map_reason
+        reasons["map"] = choice.map_reason
     unknowns = [*choice.unknowns, *described.notes]
     stack = dict(described.stack)
     if files.robot:
         robot = relative_path(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
-        reason["robot"] = Reason("given with --robot")
+        reasons["robot"] = Reason("given with --robot")
     elif described.robot is not None:
         robot = relative_path(described.robot, out) if isinstance(described.robot, Path) else described.robot
-        reason["robot"] = Reason("robot in the header of the log")
+        reasons["robot"] = Reason("robot in the header of the log")
     else:
         clearance = float(static_world.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
         file = out.with_name(f"{_stem(out)}.robot.yaml")
         written = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
         choice.files.append(written.file)
         robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
-        reason["robot"] = Reason(written.reason, None, None, "medium")
+        reasons["robot"] = Reason(written.reason, None, None, "medium")
     if stack:
-        reason["stack"] = Reason("configuration of the stack in the header of the log")
+        reasons["stack"] = Reason("configuration of the stack in the header of the log")
     elif described.robot is None:
         unknowns.append("parameters of the navigation stack, besides the speed; the defaults are used")
         speed = observed_limits(drive)[0]
         stack = {"controller": {"type": "regulated_pure_pursuit", "desired_linear_vel": speed}}
-        reason["stack"] = Reason(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
-    return GivenParts(choice.written, choice.map, robot, described.seed, stack, reason, unknowns)
+        reasons["stack"] = Reason(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
+    return GivenParts(choice.written, choice.map, robot, described.seed, stack, reasons, unknowns)
 
 
 def _lidar_noise(drive: RecordedDrive, static_world: StaticWorld) -> float:
-    """Return the usual noise of the ranges in m."""
+    """Return the median standard deviation of the range noise in m; the typical one without scans."""
     if drive.scans is None or len(drive.scans) < 3:
         return TYPICAL_ROBOT.lidar_noise
-    scans = drive.scans.every(max(1, len(drive.scans) // MAX_NOISE_SCANS))
-    return float(np.median(compare_scans(drive, scans, static_world).noise))
+    return float(np.median(compare_scans(drive, drive.scans.thinned(NOISE_SCANS), static_world).noise))
 
 
 def relative_path(file: Path, out: Path) -> str:
-    """Return the path of a file relative to the folder of the scenario."""
+    """Return the path of a file relative to the folder of the scenario file `out`."""
     return os.path.relpath(file.resolve(), out.parent.resolve())
 
 

@@ -1,4 +1,4 @@
-"""Text of a reconstructed scenario: YAML in which a comment gives the reason for each part."""
+"""Formats a reconstructed scenario as YAML, with a comment for each part that gives the reason for it."""
 
 from __future__ import annotations
 
@@ -19,19 +19,24 @@ from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 
 MAX_COLUMNS = 118
+"""Maximum length of a line."""
 OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
-"""Heights of objects and people, which a planar lidar does not see."""
+"""Assumed heights of objects and people, which a planar lidar does not see."""
 NO_BREAK_SPACE = "\x00"
-"""Placeholder for a space at which no line is broken."""
+"""Placeholder for a space at which lines must not be broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
 
 
 @dataclass(frozen=True)
 class ScenarioGoal:
-    """Goal of the reconstructed scenario: `pose` in the map frame; `timeout` and `wait`, at the goal, in s.
+    """Goal of the reconstructed scenario.
 
-    `expect` is the error code with which the goal is expected to fail, "" if it must be reached.
+    Attributes:
+        pose: Pose in the map frame.
+        timeout: Timeout in s.
+        expect: Name of the error code with which the goal must fail, "" if it must be reached.
+        wait: Time in s for which the robot waits at the goal.
     """
 
     name: str
@@ -44,7 +49,7 @@ class ScenarioGoal:
 
 @dataclass(frozen=True)
 class ScenarioContents:
-    """Everything that the text of a scenario holds.
+    """Contents of a scenario file.
 
     Attributes:
         name: Name of the scenario.
@@ -54,19 +59,20 @@ class ScenarioContents:
         world: World file, or an inline world.
         map: Map file or "none"; "" for the map of the world.
         robot: Robot file or name of a shipped robot.
-        start: True start pose.
-        estimate: Initial estimate with standard deviations x, y, yaw; None for the default, "unknown" for anywhere.
-        stack: Configuration of the stack.
-        passing_radius: Distance in m at which a pose counts as passed; None if the robot stops at each goal.
-        goals: Goals in their order.
-        stops_at_failure: Whether the drive ends at the first failed goal.
+        start: True start pose in the map frame.
+        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
+            not know where the robot is; None for the default.
+        stack: Value of the key `stack`.
+        passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
+        goals: Goals in the order in which they are sent.
+        stops_at_failure: Whether the run ends at the first failed goal.
         time_limit: Time limit in s.
         objects: Objects and pedestrians that the scenario spawns.
         kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
         faults: Faults of sensors, commands, and localizer.
         criteria: Pass criteria.
-        reason: Reason by key of the scenario.
-        unknowns: What the log does not show.
+        reasons: Reasons by key of the scenario, for parts without a reason of their own.
+        unknowns: Phrases about what the log does not show.
     """
 
     name: str
@@ -87,12 +93,12 @@ class ScenarioContents:
     kidnaps: Sequence[tuple[float, Pose2, Reason]]
     faults: Sequence[FoundFault]
     criteria: Sequence[ProposedCriterion]
-    reason: Mapping[str, Reason]
+    reasons: Mapping[str, Reason]
     unknowns: Sequence[str]
 
 
 def scenario_text(contents: ScenarioContents) -> str:
-    """Return the scenario as YAML."""
+    """Return the YAML text of the scenario file."""
     return "\n".join(_lines(contents)) + "\n"
 
 
@@ -152,7 +158,7 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
 
 
 def _reason(contents: ScenarioContents, key: str) -> list[str]:
-    reason = contents.reason.get(key)
+    reason = contents.reasons.get(key)
     return [] if reason is None else _comment(reason.comment)
 
 
@@ -161,12 +167,12 @@ def _robot(contents: ScenarioContents) -> Iterator[str]:
     yield from _reason(contents, "robot")
     yield "robot:"
     yield f"  model: {_text(contents.robot)}"
-    if (start := contents.reason.get("start")) is not None:
+    if (start := contents.reasons.get("start")) is not None:
         yield from _comment(start.comment, "  ")
     yield f"  pose: {_pose(contents.start)}"
     if contents.estimate is None:
         return
-    if (estimate := contents.reason.get("estimate")) is not None:
+    if (estimate := contents.reasons.get("estimate")) is not None:
         yield from _comment(estimate.comment, "  ")
     if isinstance(contents.estimate, str):
         yield f"  initial_estimate: {contents.estimate}"
@@ -267,7 +273,7 @@ def _pose(pose: Pose2) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text as a YAML scalar that is also valid in flow style."""
+    """Return a string as a YAML scalar, with quotes if it is not plain in flow style."""
     plain = to_yaml({"x": text}).removeprefix("x: ").rstrip("\n")
     return plain if _PLAIN.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
 
@@ -279,7 +285,7 @@ def _entry(key: str, value: Any) -> list[str]:
 
 
 def _flow(value: Any) -> str:
-    """Return a value in YAML's flow style, on one line."""
+    """Return a mapping, sequence, or scalar in YAML's flow style, on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):

@@ -56,13 +56,13 @@ def test_scans_are_compared_only_where_both_robots_are_at_one_place():
 
 
 def test_the_same_incident_nearby_is_reproduced():
-    ((found,), others) = compare_incidents([STUCK], [replace(STUCK, time=11.0, place=(3.2, 2.0))])
+    ((found,), others) = compare_incidents([STUCK], [replace(STUCK, time=11.0, position=(3.2, 2.0))])
     assert found.is_reproduced and not others
     assert found.sentence == "reproduced: stuck at 10.00 s (the robot stayed), 1.00 s later and 0.20 m away"
 
 
 def test_an_incident_far_away_is_only_similar():
-    ((found,), _) = compare_incidents([STUCK], [replace(STUCK, place=(6.0, 2.0))])
+    ((found,), _) = compare_incidents([STUCK], [replace(STUCK, position=(6.0, 2.0))])
     assert not found.is_reproduced
     assert found.sentence.startswith("only similar")
 

@@ -33,7 +33,7 @@ def contents(**changes):
         "kidnaps": [],
         "faults": [],
         "criteria": [ProposedCriterion("goals_reached", {}, Reason("held: all goals were reached"))],
-        "reason": {},
+        "reasons": {},
         "unknowns": ["the footprint"],
     }
     return ScenarioContents(**{**values, **changes})
@@ -89,7 +89,7 @@ def test_a_carried_robot_is_kidnapped(tmp_path):
 
 
 def test_goals_that_were_passed_without_a_stop_have_the_radius_of_the_log(tmp_path):
-    scenario, text = loaded(tmp_path, passing_radius=0.5, reason={"navigation": SEEN})
+    scenario, text = loaded(tmp_path, passing_radius=0.5, reasons={"navigation": SEEN})
     assert scenario.spec.navigation.mode == "navigate_through_poses"
     assert scenario.spec.navigation.radius == 0.5
     assert "# seen in 40 scans" in text
