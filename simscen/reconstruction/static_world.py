@@ -22,14 +22,7 @@ UNMAPPED_DISTANCE_M = 1e3
 
 
 class StaticWorld:
-    """World without the objects that the reconstruction has to find, in a plane at the height of the lidar.
-
-    Attributes:
-        world: The world.
-        height: Height of the plane in m.
-        grid: Map of the plane.
-        built: The world with its mesh and map.
-    """
+    """World without the objects that the reconstruction has to find, and its map at the height of the lidar in m."""
 
     def __init__(self, world: World, height: float) -> None:
         """Cut the world at `height` m. Its bodies, such as doors, count as walls at their initial poses."""
@@ -43,10 +36,9 @@ class StaticWorld:
         self._distances: Array = np.asarray(distances) * self.grid.resolution
 
     def ranges_from(self, poses: Array, angles: Array, max_range: float) -> Array:
-        """Return the ranges (n, beams) in m that a lidar measures at `poses` (n, 3) in the map frame.
+        """Return the ranges (n, beams) in m from lidar `poses` (n, 3) in the map frame; inf beyond `max_range` m.
 
-        `angles` (beams,) are the directions of the beams in rad in the frame of the lidar. Ranges beyond `max_range` m
-        are inf.
+        `angles` (beams,) are the directions of the beams in rad in the frame of the lidar.
         """
         directions = poses[:, 2:3] + angles[None, :]
         flat = directions.ravel()
@@ -147,10 +139,9 @@ def _shape(low: Array, high: Array) -> tuple[int, int]:
 
 
 def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
-    """Update the log odds of the cells that the beams of one scan pass or hit.
+    """Update the log odds of each cell that beams from `origin` (2,) to `ends` (n, 2) pass or hit, once per scan.
 
-    The beams go from `origin` (2,) to `ends` (n, 2), relative to the corner of the map. A cell changes only once,
-    because all beams through it write the same value.
+    Coordinates are relative to the corner of the map.
     """
     reach = np.hypot(*(ends - origin).T)
     steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -78,26 +79,23 @@ class _DriveReader:
             self._notes.append("the log is truncated; the scenario covers what it holds")
 
     def drive(self) -> RecordedDrive:
-        odometry, belief = self._odometry(), self._belief()
+        odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
+        belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
         poses, source, independent = self._poses(odometry, belief)
-        scans = self._scans()
-        duration = (self._end - self._start) / NS_PER_SECOND
-        commands = self._signal(
-            "cmd_vel", [tuple(message.content.values) for message in self._messages.of("cmd_vel")], 3
-        )
+
         return RecordedDrive(
             name=self._path.stem,
-            duration=duration,
+            duration=self._seconds(self._end),
             poses=poses,
             pose_source=source,
             has_true_poses=independent,
             belief=belief,
             corrections=self._poses_of_tf("map", "odom") or no_values(3),
             odometry=odometry,
-            commands=commands,
-            turn_rates=self._signal("imu", [(message.content.turn_rate,) for message in self._messages.of("imu")], 1),
-            bumper=self._signal("bumper", [(float(message.content),) for message in self._messages.of("bumper")], 1),
-            scans=scans,
+            commands=self._signal("cmd_vel", 3, lambda twist: twist.values),
+            turn_rates=self._signal("imu", 1, lambda imu: (imu.turn_rate,)),
+            bumper=self._signal("bumper", 1, lambda is_pressed: (float(is_pressed),)),
+            scans=self._scans(),
             map=self._map(),
             goals=tuple(find_goals(self._messages, self._seconds, poses)),
             footprint=self._footprint(poses),
@@ -131,35 +129,21 @@ class _DriveReader:
         stamps = np.array([message.stamp - self._stamp_start for message in messages], dtype=np.float64) / NS_PER_SECOND
         return stamps, arrivals
 
-    def _signal(self, role: str, rows: Sequence[Sequence[float]], columns: int) -> TimedValues:
+    def _signal(self, role: str, columns: int, row_of: Callable[[Any], Sequence[float]]) -> TimedValues:
+        """Return the values of the messages of a role; `row_of` returns the columns for a decoded message."""
         messages = self._messages.of(role)
         if not messages:
             return no_values(columns)
         times, arrivals = self._times(messages)
+        rows = [tuple(row_of(message.content)) for message in messages]
         values = np.array(rows, dtype=np.float64).reshape(len(messages), columns)
         order = np.argsort(times, kind="stable")
         return TimedValues(times[order], values[order], arrivals[order])
 
-    def _odometry(self) -> TimedValues:
-        messages = self._messages.of("odom")
-        rows = [
-            (*Pose3(*message.content.pose).plane, *(message.content.twist or (0.0, 0.0, 0.0))) for message in messages
-        ]
-        return self._signal("odom", rows, 6)
-
-    def _belief(self) -> TimedValues:
-        messages = self._messages.of("amcl_pose")
-        rows = [(*Pose3(*message.content.pose).plane, *message.content.covariance) for message in messages]
-        return self._signal("amcl_pose", rows, 9)
-
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
         """Return the best known poses in the map frame, their source in words, and whether they are a ground truth."""
-        if truth := self._messages.of("truth"):
-            return (
-                self._signal("truth", [Pose3(*message.content.pose).plane for message in truth], 3),
-                "ground truth",
-                True,
-            )
+        if self._messages.of("truth"):
+            return self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane), "ground truth", True
         for base in BASE_FRAMES:
             poses = self._poses_of_tf("map", base)
             if poses is not None:

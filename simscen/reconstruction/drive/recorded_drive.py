@@ -35,10 +35,7 @@ class TimedValues:
         return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
 
     def poses_at(self, times: Array) -> Array:
-        """Return the poses x, y, yaw (m, 3) at `times` (m,), by linear interpolation of the first three columns.
-
-        Before the first pose and after the last one, these two are returned.
-        """
+        """Return the poses x, y, yaw (m, 3) at `times` (m,), by linear interpolation of the first three columns."""
         columns = [np.interp(times, self.times, self.values[:, axis]) for axis in (0, 1)]
         yaw = np.interp(times, self.times, np.unwrap(self.values[:, 2]))
         return np.column_stack((*columns, wrap_array(yaw)))
@@ -105,10 +102,8 @@ class Scans:
 
     def subset(self, which: slice) -> Scans:
         """Return the scans of a slice of indices."""
-        times, arrivals = self.times[which], self.arrivals[which]
-        return replace(
-            self, times=times, arrivals=arrivals, ranges=self.ranges[which], is_malformed=self.is_malformed[which]
-        )
+        names = ("times", "arrivals", "ranges", "is_malformed")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     def thinned(self, target: int) -> Scans:
         """Return evenly spread scans: at least `target` and less than twice as many, or all if there are fewer."""
@@ -120,7 +115,6 @@ class RecordedGoal:
     """Goal of the drive.
 
     Attributes:
-        name: Name, "" if unknown.
         pose: Pose in the map frame.
         sent: Time in s at which it was accepted or, if unknown, sent.
         ended: Time in s of its result; None if the log has no result.
@@ -143,7 +137,6 @@ class RecordedDrive:
     """Everything that the reconstruction uses from a log. Units are m, rad, m/s, and rad/s.
 
     Attributes:
-        name: Name of the log.
         duration: Time in s of the last message.
         poses: Best known poses x, y, yaw (n, 3) of the base in the map frame.
         pose_source: Source of `poses` in words.
@@ -155,7 +148,6 @@ class RecordedDrive:
         turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1).
         bumper: 1 while the bumper is pressed, otherwise 0 (n, 1).
         scans: Scans of the lidar frame with the most scans; None without scans.
-        map: Last map on the map topic; None without one.
         goals: Goals in the order in which they were sent.
 
         footprint: Corners (x, y) of the robot's footprint in the base frame, () if unknown.

@@ -30,11 +30,11 @@ class RunDescription:
     """Description of the run. The defaults are those for logs of real robots.
 
     Attributes:
-        seed: Seed of the run.
+
         world: World file, or the data of an inline world without its objects; None if unknown.
         has_map: False if the robot drove without a map.
         robot: Name of a shipped robot, or robot file; None if unknown.
-        stack: Data of the key `stack` of the scenario.
+
         other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each
             robot that is not reconstructed.
         notes: Remarks for the user about missing files.

@@ -23,8 +23,7 @@ MIN_COMMAND_M_S = 0.1
 IGNORED_RATIO, MIN_IGNORED_S = 0.1, 0.4
 """The base ignores a command if it drives at less than this fraction of the commanded speed for at least this time."""
 KEPT_RATIO, MIN_KEPT_S = 0.5, 0.6
-"""The base keeps its speed if the command is less than this fraction of it for at least this time, longer than braking
-takes."""
+"""The base keeps its speed if the command is below this fraction of it for this time, which is longer than braking."""
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
 """A command is steady if it changes in this time by at most this fraction of its value."""
 MIN_GAIN_ERROR = 0.08
@@ -32,11 +31,9 @@ MIN_GAIN_ERROR = 0.08
 MIN_STEADY_SAMPLES = 20
 """Number of samples with a steady command that the estimate of a speed limit or a gain needs."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
-"""Smallest difference between the gains of left and right wheels that is reported, and largest fraction of the squared
-speeds that these gains may leave unexplained."""
+"""Smallest reported difference between the gains of both sides, and largest fraction of squared speed they may miss."""
 MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
-"""Difference between commanded and driven speed above which a speed limit may act, and largest standard deviation of
-the speeds at a limit."""
+"""Deficit to the commanded speed above which a limit may act, and largest standard deviation of speeds at a limit."""
 SMOOTHING_S = 0.5
 """Time over which speeds are averaged to reduce the noise of the odometry."""
 MIN_LIMIT_FALL_M_S = 0.05
@@ -186,10 +183,9 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
-    """Fit a speed limit that falls linearly and is constant afterwards to `speeds` (n,) at `times` (n,).
+    """Fit a limit that falls linearly and then is constant to `speeds` (n,) at `times` (n,).
 
-    Return the limit at time 0 and after the fall in m/s, the time in s at which the fall ends, and the standard
-    deviation of the speeds about the limit in m/s.
+    Return the limit at time 0, the final limit, the time from which on it is constant, and the standard deviation.
     """
     best = (0.0, 0.0, 0.0, math.inf)
     for drain in np.linspace(times[0], times[-1], 25)[4:].tolist():

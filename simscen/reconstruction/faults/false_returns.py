@@ -27,8 +27,7 @@ MIN_FALSE_FRACTION = 0.015
 JUMP_M = 0.3
 """If the ranges of neighbor beams differ by at least this, the beams end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""A ghost must not be visible this many beams beside its own, where an object is one with a range that differs by less
-than this distance."""
+"""A ghost is not visible this many beams beside its own. Ranges that differ by less than this show the same object."""
 MIN_GHOST_FRACTION, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
 """Limits of a ghost: fraction of the scans that show it between its first and its last scan; spread (median deviation)
 of its range in m, or in standard deviations of the noise if that is larger; and distance that the lidar must move."""
@@ -37,10 +36,7 @@ MIN_GHOST_S = 2.0
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield faults of dust (single beams that end in free space) and ghosts (objects that move with the lidar).
-
-    `end` is the end of the drive in s.
-    """
+    """Yield dust (single beams end in free space) and ghosts (objects move with the lidar); the drive ends at `end` s."""
     usable = ~invalid_scans(compared)
     isolated = isolated_returns(compared)
     for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
@@ -84,10 +80,7 @@ def isolated_returns(compared: ComparedScans) -> Mask:
 
 
 def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
-    """Return first beam, last beam, and range in m of each ghost: an object that is fixed in the frame of the lidar.
-
-    The robot must have driven meanwhile, because until then a standing object looks the same.
-    """
+    """Return first beam, last beam, and range in m of each object that does not move relative to the driving robot."""
     if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
     short = compared.is_short & ~invalid_scans(compared)[:, None]

@@ -137,10 +137,7 @@ def mask_runs(mask: Mask) -> list[tuple[int, int]]:
 
 
 def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> Iterator[FoundFault]:
-    """Yield faults that far objects return nothing: rain if the ranges are also noisy, otherwise a range limit.
-
-    `nominal_noise` is the standard deviation of the lidar's ranges in m.
-    """
+    """Yield faults that far objects return nothing: rain if there is more than the nominal noise in m, else a limit."""
     usable = ~invalid_scans(compared)
     near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)
     lost = compared.is_missing & near
@@ -210,10 +207,7 @@ def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Wi
 def lidar_fault_in_window(
     kind: str, values: Mapping[str, object], window: Window, compared: ComparedScans, end: float, text: str
 ) -> FoundFault:
-    """Return a fault of the lidar in a time window. Its reason is `text`.
-
-    It has no start if the window begins with the drive, and no duration if the window ends with the drive.
-    """
+    """Return a lidar fault with the reason `text`. Start and duration are None where the window reaches the drive's."""
     times, period = compared.scans.times, compared.scans.period
     from_start = window.begin <= float(times[0]) + 3 * period
     until_end = window.end >= min(end, float(times[-1])) - 5 * period

@@ -60,10 +60,7 @@ def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -> Iterator[FoundFault]:
-    """Yield the jump at the sample `out` of the belief if the error stays large until the end of the drive.
-
-    `belief` and `truth` (n, 3) are estimated and true poses x, y, yaw at the same times.
-    """
+    """Yield the jump of `belief` (n, 3) at the sample `out` if it stays away from `truth` (n, 3) until the end."""
     begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
     stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
@@ -86,10 +83,7 @@ def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
 
 
 def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the outages in which the robot drove: times without an estimated pose.
-
-    If there are no gaps between the estimates, yield the times in which the localizer did not correct the odometry.
-    """
+    """Yield times without an estimated pose while the robot drove or, if there are none, without corrected odometry."""
     times = drive.belief.times
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
     gaps = np.flatnonzero(np.diff(times) > limit)

@@ -71,10 +71,7 @@ def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
 
 
 def _lost_fraction(measured: Array, true: Array, chosen: Mask) -> float:
-    """Return which fraction of the rolled distance is lost in the `chosen` steps (n,), on the side that loses more.
-
-    `measured` and `true` (n, 2) are the distances of the left and right wheels.
-    """
+    """Return which fraction of the wheels' distances (n, 2) is lost in the `chosen` steps (n,), for the worse side."""
     rolled = np.abs(measured[chosen]).sum(axis=0)
     lost = (np.abs(measured[chosen]) - np.abs(true[chosen])).sum(axis=0)
     return float((lost / np.maximum(rolled, 1e-6)).max()) if rolled.max() > MIN_ROLLED_M else 0.0
@@ -96,10 +93,7 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
 
 
 def _follows_commands(steps: MotionSteps, window: Window) -> bool:
-    """Return whether the true motion in a time window is closer to the commands than the measured motion.
-
-    In this case, only the odometry is wrong; otherwise, the wheels slip.
-    """
+    """Return whether the true motion is closer to the commands than the odometry: then, only the odometry is wrong."""
     commanded = float(np.abs(steps.commanded[window.samples][:, 0]).sum())
     true, measured = (float(np.abs(motion[window.samples][:, 0]).sum()) for motion in (steps.true, steps.measured))
     return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
@@ -137,10 +131,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
 
 
 def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Fit `matrix` (n, k) times a solution to `values` (n,) by least squares.
-
-    Return the solution (k,), its standard deviations (k,), and the predicted values (n,).
-    """
+    """Return the least-squares solution (k,), its standard deviations (k,), and the predicted values (n,)."""
     solution: Array = np.asarray(np.linalg.lstsq(matrix, values, rcond=None)[0], dtype=np.float64)
     predicted: Array = np.asarray(matrix @ solution, dtype=np.float64)
     variance = float(np.sum((values - predicted) ** 2)) / max(1, len(values) - matrix.shape[1])
@@ -253,10 +244,7 @@ def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _ramp(times: Array, errors: Array) -> tuple[float, float, float, float]:
-    """Fit a constant, plus a ramp between two times, to `errors` (n,) in rad/s. The ramp starts at zero.
-
-    Return the two times in s, the slope in rad/s², and the remaining sum of squared errors.
-    """
+    """Return begin and end in s, slope in rad/s², and remaining sum of squares of the ramp that fits `errors` best."""
     best = (float(times[0]), float(times[-1]), 0.0, float(np.sum((errors - errors.mean()) ** 2)))
     stride = max(1, len(times) // 40)
     for first in range(0, len(times) - MIN_BINS // 2, stride):

@@ -31,7 +31,6 @@ class ScanCluster:
 
     Attributes:
         scan: Index of the scan.
-        time: Time of the scan in s.
         points: Hits (m, 2) in the map frame.
         lidar: Position (2,) of the lidar in the map frame.
         angle: Angle in rad that the hits cover, seen from the lidar.

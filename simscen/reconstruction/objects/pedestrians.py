@@ -139,10 +139,7 @@ class _Track:
 def _fit_pedestrian(
     thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: PedestrianTrial
 ) -> FittedPedestrian | None:
-    """Return the simplest pedestrian that reproduces `thing` while all others move as recorded; None without one.
-
-    `people` are other objects that may be people, and `objects` all the rest.
-    """
+    """Return the simplest pedestrian that reproduces `thing` while other `people` and `objects` move as recorded."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
     meets = bool(distances.min() < MEETING_DISTANCE_M)
@@ -176,10 +173,7 @@ def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: fl
 
 
 def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reaction]:
-    """Yield possible reactions of a person to the robot, the simplest first.
-
-    `distances` (n,) are those from the robot along the track; `meets` tells whether they are small enough to evade it.
-    """
+    """Yield possible reactions to the robot, the simplest first. `distances` (n,) from the track to it are in m."""
     yield _Reaction()
     if meets:
         yield _Reaction(blind_to=frozenset({"robots"}))

@@ -57,10 +57,7 @@ def fit_shape(clusters: list[ScanCluster], is_moving: bool) -> ObjectShape:
 
 
 def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
-    """Return the radius in m of the cylinder that fits the fully visible clusters, and the error in m of their hits.
-
-    Both are inf if there are too few of these clusters.
-    """
+    """Return radius and mean error in m of the cylinder that fits the fully visible clusters; inf for few clusters."""
     whole = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
     if len(whole) < 3:
         return math.inf, math.inf

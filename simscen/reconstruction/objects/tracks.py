@@ -59,10 +59,7 @@ class ObjectTrack:
             self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
 
     def distance_to(self, cluster: ScanCluster) -> float:
-        """Return the distance in m of a cluster from the hits and the center that the track predicts for its time.
-
-        Returns inf for a cluster that is far away.
-        """
+        """Return the distance in m of a cluster from the hits and center that the track predicts; inf if it is far."""
         last = self.clusters[-1]
         predicted = last.points + self.velocity * (cluster.time - last.time)
         if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:
@@ -74,10 +71,7 @@ class ObjectTrack:
 
 
 def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
-    """Return the tracks of all objects that were seen often enough, in order of their start.
-
-    `scans` are the clusters of each scan.
-    """
+    """Return the tracks of all objects that were seen often enough in `scans`, the clusters of each scan."""
     active: list[ObjectTrack] = []
     done: list[ObjectTrack] = []
     for clusters in scans:
@@ -132,10 +126,7 @@ def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
 
 
 def _link_distance(before: ObjectTrack, after: ObjectTrack) -> float | None:
-    """Return the distance in m between the start of a track and the position that an earlier track predicts for it.
-
-    Returns None if the distance or the time in between is too large.
-    """
+    """Return how far in m a track starts from where an earlier one leads; None if that is too far or too late."""
     gap = after.begin - before.end
     if not 0.0 < gap <= MAX_LINK_S:
         return None

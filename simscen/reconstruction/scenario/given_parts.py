@@ -51,13 +51,8 @@ class GivenFiles:
 class WorldChoice:
     """World and map of the scenario, each with its reason.
 
-    Attributes:
-        written: Value of the key `world` in the scenario: a path, or an inline world.
-        world: The world itself.
-        map: Value of the key `map`: a path, "none", or "" for the map of the world.
-        is_built: Whether the walls were built from the scans of the log.
-        unknowns: What the log does not show about the world.
-        files: Files that were written beside the scenario.
+    `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` tells whether the walls
+    were built from the scans of the log. `files` were written beside the scenario.
     """
 
     written: str | Mapping[str, Any]

@@ -30,13 +30,9 @@ _PLAIN = re.compile(r"[\w./ %-]+")
 
 @dataclass(frozen=True)
 class ScenarioGoal:
-    """Goal of the reconstructed scenario.
+    """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
 
-    Attributes:
-        pose: Pose in the map frame.
-        timeout: Timeout in s.
-        expect: Name of the error code with which the goal must fail, "" if it must be reached.
-        wait: Time in s for which the robot waits at the goal.
+    `expect` is the name of the error code with which the goal must fail, "" if it must be reached.
     """
 
     name: str
@@ -52,25 +48,20 @@ class ScenarioContents:
     """Contents of a scenario file.
 
     Attributes:
-        name: Name of the scenario.
         source: Name of the log.
         summary: Sentences about the drive.
-        seed: Seed of the run.
         world: World file, or an inline world.
         map: Map file or "none"; "" for the map of the world.
         robot: Robot file or name of a shipped robot.
         start: True start pose in the map frame.
         estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
             not know where the robot is; None for the default.
-        stack: Value of the key `stack`.
+
         passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
         goals: Goals in the order in which they are sent.
         stops_at_failure: Whether the run ends at the first failed goal.
-        time_limit: Time limit in s.
         objects: Objects and pedestrians that the scenario spawns.
         kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
-        faults: Faults of sensors, commands, and localizer.
-        criteria: Pass criteria.
         reasons: Reasons by key of the scenario, for parts without a reason of their own.
         unknowns: Phrases about what the log does not show.
     """

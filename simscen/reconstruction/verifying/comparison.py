@@ -77,9 +77,7 @@ class Verification:
 
     Attributes:
         drive: Recorded drive.
-        repeated: Drive of the run.
-        log: Log of the run.
-        quantities: Rows of the comparison.
+        repeated: Drive of the run, with the log `log`.
         incidents: Incidents of the recorded drive with those of the run.
         new_incidents: Incidents of the run without a match in the recorded drive.
         failed: Names of the criteria that did not pass in the run.
@@ -112,10 +110,7 @@ def compare_with_run(made: Reconstruction, log: Path) -> Verification:
 def compare_incidents(
     recorded: Sequence[Incident], repeated: Sequence[Incident]
 ) -> tuple[list[ComparedIncident], list[Incident]]:
-    """Match each recorded incident with the incident of its kind in the run that is nearest in time.
-
-    Return the matched incidents, and the incidents of the run without a match.
-    """
+    """Return each recorded incident with its match in the run, and the incidents of the run without a match."""
     left = [*repeated]
     compared = []
     for incident in recorded:
@@ -191,10 +186,7 @@ def distances_to_path(points: Array, path: Array) -> Array:
 
 
 def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
-    """Return the times (n,) in s of all scans with a return, and the smallest range (n,) in m of each.
-
-    Returns None for a log with fewer than MIN_SCANS scans.
-    """
+    """Return times (n,) in s and smallest ranges (n,) in m of all scans with a return; None with few scans."""
     if drive.scans is None or len(drive.scans) < MIN_SCANS:
         return None
     nearest = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
