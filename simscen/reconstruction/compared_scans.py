@@ -28,7 +28,6 @@ class ComparedScans:
     """Measured scans with the ranges that are expected in the static world.
 
     Attributes:
-
         poses: Poses x, y, yaw (n, 3) of the lidar in the map frame.
         expected: Expected ranges (n, beams) in m; inf beyond the maximum range of the lidar.
         noise: Standard deviation (n,) of the range noise of each scan in m.

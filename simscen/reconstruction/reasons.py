@@ -1,4 +1,4 @@
-"""Reasons for the parts of a reconstructed scenario, found faults, and time windows in which a condition holds."""
+"""Faults found in a log, reasons for parts of the scenario, and time windows in which a condition holds."""
 
 from __future__ import annotations
 

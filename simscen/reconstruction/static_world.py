@@ -74,9 +74,9 @@ def offset_poses(poses: Array, offset: Pose2) -> Array:
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams in the frame of the lidar `poses` (n, 3); not finite if the range is not.
+    """Return the ends (n, beams, 2) of beams in the frame in which the `poses` (n, 3) of the lidar are given.
 
-    `angles` (beams,) are relative to the lidar, and `ranges` (n, beams) are in m.
+    `angles` (beams,) are relative to the lidar. The ends of beams are not finite if their `ranges` (n, beams) are not.
     """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):

@@ -115,10 +115,7 @@ def _goals_from_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[
 
 
 def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
-    """Yield a goal for each stop of at least MIN_STOP_S, each bend of the path between stops, and the end of the drive.
-
-    `poses` (n, 3) are x, y, yaw in the map frame.
-    """
+    """Yield a goal for each stop of at least MIN_STOP_S, each bend of the path between stops, and the last pose."""
     if len(poses) < 2:
         return
     steps = np.maximum(np.diff(poses.times), 1e-6)
@@ -159,7 +156,8 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
         return drive
     begin = drive.goals[0].sent
     if drive.goals[0].status == "reached" and not drive.goals[0].source.startswith("/"):
-        begin = _first_motion(drive.poses) - LEAD_S
+        moved = np.hypot(*(drive.poses.values[:, :2] - drive.poses.values[0, :2]).T) > 0.05
+        begin = float(drive.poses.times[np.argmax(moved)]) - LEAD_S
     begin = max(begin, float(drive.poses.times[0]))
     if begin < MIN_IDLE_S:
         return drive
@@ -187,11 +185,6 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
         notes=(*drive.notes, note),
         begin=begin,
     )
-
-
-def _first_motion(poses: TimedValues) -> float:
-    moved = np.flatnonzero(np.hypot(*(poses.values[:, :2] - poses.values[0, :2]).T) > 0.05)
-    return float(poses.times[moved[0]]) if len(moved) else float(poses.times[0])
 
 
 def _values_from(signal: TimedValues, begin: float, keep_last: bool = False) -> TimedValues:

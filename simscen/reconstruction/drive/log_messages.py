@@ -95,10 +95,7 @@ _DECODERS: Mapping[str, Decoders] = {
 
 @dataclass
 class LogMessages:
-    """Messages of a log by role, in order of log time, and the message types of all topics of the log.
-
-    `is_complete` is False if the log is truncated.
-    """
+    """Messages of a log by role, in order of log time, and message types by topic. Truncated logs are not complete."""
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)

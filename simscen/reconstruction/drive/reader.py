@@ -81,14 +81,13 @@ class _DriveReader:
     def drive(self) -> RecordedDrive:
         odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
         belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
-        poses, source, independent = self._poses(odometry, belief)
-
+        poses, source, is_truth = self._poses(odometry, belief)
         return RecordedDrive(
             name=self._path.stem,
             duration=self._seconds(self._end),
             poses=poses,
             pose_source=source,
-            has_true_poses=independent,
+            has_true_poses=is_truth,
             belief=belief,
             corrections=self._poses_of_tf("map", "odom") or no_values(3),
             odometry=odometry,

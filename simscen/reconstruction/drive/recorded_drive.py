@@ -17,10 +17,7 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class TimedValues:
-    """Signal with `values` (n, k) measured at the ascending `times` (n,) and logged at the times `arrivals` (n,).
-
-    Both times are in s since the start of the drive.
-    """
+    """Signal with `values` (n, k) measured at the ascending `times` (n,) and logged at the times `arrivals` (n,)."""
 
     times: Array
     values: Array
@@ -149,7 +146,6 @@ class RecordedDrive:
         bumper: 1 while the bumper is pressed, otherwise 0 (n, 1).
         scans: Scans of the lidar frame with the most scans; None without scans.
         goals: Goals in the order in which they were sent.
-
         footprint: Corners (x, y) of the robot's footprint in the base frame, () if unknown.
         notes: Sentences about what the log does not show, or how it was read, for the user.
         begin: Time in s from the start of the log to the start of the drive.

@@ -21,20 +21,15 @@ from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log, invalid_log, read_log
 from simscen.sim.body.outline import circle
 
-OBJECT_KEYS = ("objects",)
-"""Keys of an inline world that are not used, because the reconstruction derives their content from the scans."""
-
 
 @dataclass(frozen=True)
 class RunDescription:
     """Description of the run. The defaults are those for logs of real robots.
 
     Attributes:
-
         world: World file, or the data of an inline world without its objects; None if unknown.
         has_map: False if the robot drove without a map.
         robot: Name of a shipped robot, or robot file; None if unknown.
-
         other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each
             robot that is not reconstructed.
         notes: Remarks for the user about missing files.
@@ -96,7 +91,7 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
             notes.append(f"the world `{world}` of the run is not below {root}; use --root or --world")
         world = file if file.is_file() else None
     elif isinstance(world, Mapping):
-        world = {key: value for key, value in world.items() if key not in OBJECT_KEYS}
+        world = {key: value for key, value in world.items() if key != "objects"}
     model: str | Path | None = named
     if named.endswith((".yaml", ".yml", ".urdf", ".xacro")):
         file = (scenario_folder / named).resolve()

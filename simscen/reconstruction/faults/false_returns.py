@@ -36,7 +36,10 @@ MIN_GHOST_S = 2.0
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield dust (single beams end in free space) and ghosts (objects move with the lidar); the drive ends at `end` s."""
+    """Yield dust (single beams that end in free space) and ghosts (objects that move with the lidar).
+
+    `end` is the end of the drive in s.
+    """
     usable = ~invalid_scans(compared)
     isolated = isolated_returns(compared)
     for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
@@ -80,7 +83,7 @@ def isolated_returns(compared: ComparedScans) -> Mask:
 
 
 def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
-    """Return first beam, last beam, and range in m of each object that does not move relative to the driving robot."""
+    """Return first beam, last beam, and range in m of each object that moves with the lidar while the robot drives."""
     if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
     short = compared.is_short & ~invalid_scans(compared)[:, None]
@@ -124,10 +127,7 @@ MAX_SURFACE_DISTANCE_M = 0.05
 
 
 def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> FoundFault | None:
-    """Return the fault that beams pass through named walls or obstacles of the world; None if they do not.
-
-    Only the `usable` scans (n,) count.
-    """
+    """Return the fault that beams of `usable` scans (n,) pass through named walls or obstacles; None if they do not."""
     rows = np.flatnonzero(usable)
     # A beam without any return may have been lost; only one that ends behind the wall has passed through it.
     through = compared.passes_through[rows] & compared.is_hit[rows]
@@ -135,11 +135,8 @@ def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> Fo
         return None
     ends = beam_ends(compared.poses[rows], compared.scans.angles, compared.expected[rows])
     decided = through | compared.is_explained[rows]
-    points, passed = (
-        ends[decided & np.isfinite(compared.expected[rows])],
-        through[decided & np.isfinite(compared.expected[rows])],
-    )
-    shares = _passing_fractions(world.world.solids, points, passed)
+    decided &= np.isfinite(compared.expected[rows])
+    shares = _passing_fractions(world.world.solids, ends[decided], through[decided])
     names = [
         name
         for name, (count, share) in shares.items()

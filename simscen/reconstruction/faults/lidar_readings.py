@@ -16,12 +16,10 @@ from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
-LIDAR = "lidar"
-"""Target of the faults."""
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
 """Noise is reported if it exceeds the nominal noise by more than this distance, and this multiple of nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""If the nominal noise is exact, noise is reported above this multiple of it that exceeds it by this distance."""
+"""If the noise of the lidar is known, noise is reported above this multiple of it that exceeds it by this distance."""
 MIN_NOISE_S = 2.0
 """Shortest time with additional noise that is reported."""
 MIN_INVALID_SCANS = 2
@@ -77,7 +75,7 @@ def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
         values["probability"] = f"{100 * share:.0f} %"
     begin, length = float(times[first]), float(times[last] - times[first]) + compared.scans.period
     reason = Reason(f"{len(indices)} scans have no valid ranges", begin, float(times[last]))
-    yield FoundFault(LIDAR, "garbage", values, None if whole else begin, None if whole else length, reason)
+    yield FoundFault("lidar", "garbage", values, None if whole else begin, None if whole else length, reason)
 
 
 def _content(compared: ComparedScans, index: int) -> str:
@@ -207,11 +205,14 @@ def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Wi
 def lidar_fault_in_window(
     kind: str, values: Mapping[str, object], window: Window, compared: ComparedScans, end: float, text: str
 ) -> FoundFault:
-    """Return a lidar fault with the reason `text`. Start and duration are None where the window reaches the drive's."""
+    """Return a lidar fault with the reason `text`. Its start is None if the window begins with the drive.
+
+    Its duration is None if the window ends with the drive.
+    """
     times, period = compared.scans.times, compared.scans.period
     from_start = window.begin <= float(times[0]) + 3 * period
     until_end = window.end >= min(end, float(times[-1])) - 5 * period
     begin = None if from_start else max(0.0, window.begin - 0.5 * period)
     duration = None if until_end else window.end - (begin or 0.0) + 0.5 * period
     confidence = "high" if window.last - window.first >= 10 else "medium"
-    return FoundFault(LIDAR, kind, values, begin, duration, Reason(text, window.begin, window.end, confidence))
+    return FoundFault("lidar", kind, values, begin, duration, Reason(text, window.begin, window.end, confidence))

@@ -46,8 +46,7 @@ def stream_faults(
     period = nominal_period or usual_period(times)
     if period <= 0.0:
         return
-    late = list(_delay(target, times, arrivals, period, end))
-    yield from late
+    yield from _delay(target, times, arrivals, period, end)
     yield from _gaps(target, times, period, end)
 
 

@@ -111,7 +111,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
     is_linear = abs(linear) > max(MIN_SCALE_ERROR, CONFIDENCE_SIGMAS * forward[1][0])
     is_angular = abs(angular) > max(MIN_TURN_SCALE_ERROR, CONFIDENCE_SIGMAS * turn[1][0])
     is_curved = abs(per_meter) > max(MIN_TURN_RAD_PER_M, CONFIDENCE_SIGMAS * turn[1][1])
-    drive = _whole_drive(steps)
+    drive = float(steps.times[0]), float(steps.times[-1]) + STEP_S
     if is_linear and is_angular and abs(linear - angular) < 0.3 * abs(linear) and not is_curved:
         text = f"the odometry reports {100 * (1 + linear):.1f} % of the motion"
         yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, reason=Reason(text, *drive))
@@ -127,7 +127,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
         yield FoundFault("odom", "bias", values, reason=Reason(text, *drive))
     yield from _drift(steps)
     if not skids:
-        yield from _noise(steps, forward[2], turn[2])
+        yield from _noise(steps, forward[2], turn[2], drive)
 
 
 def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
@@ -157,8 +157,8 @@ def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
         yield FoundFault("odom", "drift", values, reason=reason)
 
 
-def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array) -> Iterator[FoundFault]:
-    """Yield the fault that the measured motion scatters about the distances and turns (n,) that a fit predicts."""
+def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array, drive: tuple[float, float]) -> Iterator[FoundFault]:
+    """Yield the fault that measured motion scatters about the fitted distances and turns (n,) in the whole drive."""
     values: dict[str, object] = {}
     distance, turned = steps.true[:, 0], steps.true[:, 2]
     moved, rotated = np.abs(distance) > 0.05, np.abs(turned) > 0.05
@@ -169,12 +169,8 @@ def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array) -> Iterator[
         angular = float(np.std((steps.measured[:, 2] - turn_fit)[rotated] / np.sqrt(np.abs(turned[rotated]))))
         values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE_RAD else {}
     if values:
-        reason = Reason("the steps of the odometry scatter about the true motion", *_whole_drive(steps), "low")
-        yield FoundFault("odom", "noise", values, reason=reason)
-
-
-def _whole_drive(steps: MotionSteps) -> tuple[float, float]:
-    return float(steps.times[0]), float(steps.times[-1]) + STEP_S
+        text = "the steps of the odometry scatter about the true motion"
+        yield FoundFault("odom", "noise", values, reason=Reason(text, *drive, "low"))
 
 
 BIN_S, MIN_BINS = 0.5, 8
@@ -229,11 +225,9 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
 def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     """Return the start times (n,) of bins in s, and the mean turn rates (n,) in rad/s of gyroscope and true poses."""
     imu = drive.turn_rates
-    if len(imu) < 2 or len(drive.poses) < 2:
+    if len(imu) < 2 or len(drive.poses) < 2 or imu.times[-1] - imu.times[0] <= BIN_S:
         return np.empty(0), np.empty(0), np.empty(0)
     edges = np.arange(float(imu.times[0]), float(imu.times[-1]), BIN_S)
-    if len(edges) < 2:
-        return np.empty(0), np.empty(0), np.empty(0)
     index = np.searchsorted(edges, imu.times, side="right") - 1
     inside = (index >= 0) & (index < len(edges) - 1)
     count = np.bincount(index[inside], minlength=len(edges) - 1)

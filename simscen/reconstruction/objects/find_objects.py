@@ -44,10 +44,7 @@ MAX_OBJECT_SPEED_M_S = 4.0
 def find_objects(
     compared: ComparedScans, world: StaticWorld, has_true_poses: bool, robots: Sequence[FoundObject] = ()
 ) -> list[FoundObject]:
-    """Return the other `robots`, and after them the objects that the scans show and the static world does not have.
-
-    `has_true_poses` tells whether the poses of the scans are a ground truth.
-    """
+    """Return the other `robots`, and after them the objects that the scans show and the static world does not have."""
     tracks = track_objects(scan_clusters(compared, world, has_true_poses))
     usable = np.flatnonzero(usable_scans(compared))
     moving = [track for track in tracks if _has_moved(compared, track, usable)]
@@ -151,15 +148,15 @@ def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
     return float(np.mean(inside & present)) > PART_FRACTION
 
 
-def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, moves: bool) -> FoundObject:
-    shape = fit_shape(track.clusters, moves)
-    keyframes = keyframes_of(shape) if moves else [_keyframe(shape, 0)]
+def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
+    shape = fit_shape(track.clusters, is_moving)
+    keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
     appears = _appearance(compared, track, usable)
     disappears = _disappearance(compared, track, usable)
-    if disappears is not None and moves:
+    if disappears is not None and is_moving:
         disappears = max(disappears, keyframes[-1][0] + 0.01)
     seen = f"seen in {len(track.clusters)} scans"
-    if moves:
+    if is_moving:
         length = float(np.hypot(*np.diff(shape.poses[:, :2], axis=0).T).sum())
         text = f"{seen}, moved {length:.1f} m"
     else:

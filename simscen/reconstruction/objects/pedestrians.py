@@ -139,7 +139,7 @@ class _Track:
 def _fit_pedestrian(
     thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: PedestrianTrial
 ) -> FittedPedestrian | None:
-    """Return the simplest pedestrian that reproduces `thing` while other `people` and `objects` move as recorded."""
+    """Return the simplest pedestrian that reproduces `thing` while all others move as recorded; None if none does."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
     meets = bool(distances.min() < MEETING_DISTANCE_M)

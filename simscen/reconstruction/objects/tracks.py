@@ -81,12 +81,9 @@ def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
         done += [track for track in active if time - track.end > MAX_UNSEEN_S]
         active = [track for track in active if time - track.end <= MAX_UNSEEN_S]
         _associate(active, clusters)
-    tracks = [track for track in (*done, *active) if _is_object(track)]
+    tracks = [track for track in (*done, *active) if len(track.clusters) >= MIN_CLUSTERS]
+    tracks = [track for track in tracks if track.end - track.begin >= MIN_TRACK_S]
     return _linked(sorted(tracks, key=lambda track: (track.begin, *track.clusters[0].center.tolist())))
-
-
-def _is_object(track: ObjectTrack) -> bool:
-    return len(track.clusters) >= MIN_CLUSTERS and track.end - track.begin >= MIN_TRACK_S
 
 
 def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:

@@ -1,4 +1,4 @@
-"""Combines a drive, the given parts, and the estimated parts to the contents of the scenario file."""
+"""Combines a drive, the given parts, and the estimated parts into the contents of the scenario file."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def scenario_contents(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, source: str
 ) -> ScenarioContents:
     """Return the contents of a scenario file with the name `name`; `source` is the name of the log."""
-    start = start_pose(drive)
+    start = Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
     estimate, estimate_reason = _estimate(drive, start, bool(given.map == "none"))
     goals = [*_goals(drive)]
     is_refusal_expected = bool(goals) and all(goal.expect for goal in goals)
@@ -112,11 +112,6 @@ def scenario_contents(
     )
 
 
-def start_pose(drive: RecordedDrive) -> Pose2:
-    """Return the best known pose at the start of the drive, in the map frame."""
-    return Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
-
-
 def passing_radius(drive: RecordedDrive) -> float | None:
     """Return the distance in m at which goals counted as passed; None if the robot passed no goal without a stop.
 
@@ -138,13 +133,13 @@ def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
 
 
 def _estimate(
-    drive: RecordedDrive, start: Pose2, mapless: bool
+    drive: RecordedDrive, start: Pose2, is_mapless: bool
 ) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Reason | None]:
     """Return the initial estimate of the localizer and the reason for it; None for both if it is the default.
 
     The estimate is "unknown", or a pose with the standard deviations of x, y (m), and yaw (rad).
     """
-    if mapless or not len(drive.belief):
+    if is_mapless or not len(drive.belief):
         return None, None
     values = drive.belief.values[0]
     pose = Pose2(*values[:3].tolist())

@@ -1,4 +1,4 @@
-"""Chooses world, map, robot, and stack of a reconstructed scenario: from options, log header, or messages, in order."""
+"""Chooses world, map, robot, and stack: from the user's options, else the log header, else the messages of the log."""
 
 from __future__ import annotations
 

@@ -107,6 +107,7 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
     unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
     assumed = max(MIN_RADIUS_M, min(DEFAULT_RADIUS_M, math.floor(100 * clearance) / 100))
     radius = max((math.hypot(*corner) for corner in drive.footprint), default=assumed)
+    half_width = max((abs(y) for _, y in drive.footprint), default=radius)
     outline: dict[str, Any] = {"radius": radius}
     body: dict[str, Any] = {"cylinder": [round(radius, 3), round(BODY_TOP_M - BODY_BOTTOM_M, 3)], "z": BODY_BOTTOM_M}
     if drive.footprint:
@@ -125,7 +126,7 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
         "drive": {
             "type": "differential",
             "wheel_radius": WHEEL_RADIUS_M,
-            "wheel_separation": round(SEPARATION_PER_HALF_WIDTH * _half_width(drive, radius), 3),
+            "wheel_separation": round(SEPARATION_PER_HALF_WIDTH * half_width, 3),
         },
         "limits": {
             "linear": speed,
@@ -165,11 +166,6 @@ def _velocities(poses: TimedValues) -> TimedValues:
     steps = np.diff(poses.poses_at(times), axis=0) / VELOCITY_STEP_S
     turns = np.diff(np.unwrap(poses.poses_at(times)[:, 2])) / VELOCITY_STEP_S
     return TimedValues(times[1:], np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), turns)), times[1:])
-
-
-def _half_width(drive: RecordedDrive, radius: float) -> float:
-    """Return half the width of the robot in m; `radius` if the footprint is unknown."""
-    return max((abs(y) for _, y in drive.footprint), default=radius)
 
 
 def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:

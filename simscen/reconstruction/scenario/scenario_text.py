@@ -56,7 +56,6 @@ class ScenarioContents:
         start: True start pose in the map frame.
         estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
             not know where the robot is; None for the default.
-
         passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
         goals: Goals in the order in which they are sent.
         stops_at_failure: Whether the run ends at the first failed goal.

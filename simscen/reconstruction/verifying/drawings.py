@@ -83,7 +83,9 @@ def drive_map(
     x, y, _ = grid.origin
     image = _picture(world, drive)
     shapes = [f'<image href="{image}" x="{x:.3f}" y="{-y - height:.3f}" width="{width:.3f}" height="{height:.3f}"/>']
-    shapes.append(f'<polyline class="other {_other(name)}" points="{_points(other.poses.values)}"/>')
+    shapes.append(
+        f'<polyline class="other {"run" if name == "log" else "log"}" points="{_points(other.poses.values)}"/>'
+    )
     shapes += [part for thing in objects for part in _object(thing, box)]
     shapes.append(f'<polyline class="path {name}" points="{_points(drive.poses.values)}"/>')
     shapes += _time_marks(drive, name, box)
@@ -101,10 +103,6 @@ def drive_map(
         shapes.append(_label(at_x, at_y + beside, label, box, "incidentname"))
     view = f"{box.x:.3f} {-box.y - box.height:.3f} {box.width:.3f} {box.height:.3f}"
     return f'<svg role="img" aria-label="{escape(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
-
-
-def _other(name: str) -> str:
-    return "run" if name == "log" else "log"
 
 
 def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
