@@ -163,6 +163,7 @@ class _DriveReader:
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
 
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
+        """Return the poses x, y, yaw of the frame `inner` in `outer`; None if tf does not contain them."""
         try:
             found = self._transforms.between(outer, inner)
         except UnusableLog as error:

@@ -82,6 +82,7 @@ def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Arr
 
 
 def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) -> RunDescription:
+    """Return the description of a run from its log header and the data `written` in its scenario."""
     scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
     world, named = written.get("world"), written.get("robot", {}).get("model", "turtlebot")

@@ -51,6 +51,7 @@ def stream_faults(
 
 
 def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield the faults that gaps between messages show: a low rate, or else outages and lost messages."""
     edges = np.append(times, max(end, float(times[-1])))
     steps = np.diff(edges)
     steps[-1] = max(steps[-1], period)
@@ -117,6 +118,7 @@ def _is_regular(steps: Array) -> bool:
 
 
 def _delay(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield a fault for each time in which messages were logged late."""
     delays = arrivals - times
     limit = max(MIN_DELAY_S, MIN_DELAY_PERIODS * period)
     usual = max(0.0, float(np.percentile(delays, 2)))

@@ -149,6 +149,7 @@ def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
 
 
 def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
+    """Return the object of a track, still without a name."""
     shape = fit_shape(track.clusters, is_moving)
     keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
     appears = _appearance(compared, track, usable)

@@ -142,7 +142,7 @@ def _fit_pedestrian(
     """Return the simplest pedestrian that reproduces `thing` while all others move as recorded; None if none does."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
-    meets = bool(distances.min() < MEETING_DISTANCE_M)
+    meets_robot = bool(distances.min() < MEETING_DISTANCE_M)
 
     def is_lost(time: float, position: tuple[float, float]) -> bool:
         return time > track.times[0] and math.dist(position, track.at(time)) > LOST_M
@@ -152,7 +152,7 @@ def _fit_pedestrian(
         return _compared(track, begin, walker, *walked[walker.name])
 
     best: FittedPedestrian | None = None
-    for reaction in _reactions(track, distances, meets):
+    for reaction in _reactions(track, distances, meets_robot):
         if best is not None and best.rmse < GOOD_RMSE_M:
             break
         for begin, walker in _walkers(thing, track, reaction, trial):
@@ -164,7 +164,7 @@ def _fit_pedestrian(
     for factor in SPEED_FACTORS:
         faster = replace(best.walker, speed=round(factor * track.speed, 2))
         best = _better(best, tried(best.begin, faster), MIN_RMSE_DECREASE_M / 2)
-    return replace(best, meets_robot=meets)
+    return replace(best, meets_robot=meets_robot)
 
 
 def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: float) -> FittedPedestrian:
@@ -172,10 +172,10 @@ def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: fl
     return other if simple is None or other.rmse < simple.rmse - margin else simple
 
 
-def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reaction]:
+def _reactions(track: _Track, distances: Array, meets_robot: bool) -> Iterator[_Reaction]:
     """Yield possible reactions to the robot, the simplest first. `distances` (n,) from the track to it are in m."""
     yield _Reaction()
-    if meets:
+    if meets_robot:
         yield _Reaction(blind_to=frozenset({"robots"}))
     for stop in windows(track.speeds < MOVING_SPEED_M_S, track.times, MIN_STOP_S):
         walks_before_and_after = stop.first > 0 and stop.last < len(track.times) - 1

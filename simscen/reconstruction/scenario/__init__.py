@@ -1,1 +1,1 @@
-"""Contents of the reconstructed scenario: world, robot, goals, criteria, and the text with its reason."""
+"""Creates the contents of the reconstructed scenario (world, robot, goals, criteria) and its YAML text."""

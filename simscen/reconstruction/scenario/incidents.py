@@ -121,6 +121,7 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
 
 
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
         name = goal.name or f"goal-{number + 1}"
         if goal.status == "failed" and goal.ended is not None:
