@@ -1,1 +1,1 @@
-"""Reads a recorded drive from a log: its messages as arrays, its goals, and the description of the run in the header."""
+"""Reads a recorded drive from a log: its messages as arrays, its goals, and the description in the log header."""
