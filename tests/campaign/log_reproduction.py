@@ -29,7 +29,7 @@ from simscen.record.log_reader import Log, read_log
 
 ROOT = Path(__file__).parents[2]
 CAN_FAIL = ROOT / "tests" / "scenarios" / "can_fail"
-MIN_FRACTION = 0.8
+MIN_SHARE = 0.8
 
 
 class Loader(yaml.SafeLoader):
@@ -156,7 +156,7 @@ def _report(runs: Path, root: Path, work: Path, text: str) -> int:
         again += same
         print(f"{'✓' if same else '✗'} {name:55} {_line(one, other, before, after, own)}", flush=True)
     print(f"{again} of {count} runs come out as the log did")
-    return 0 if again >= MIN_FRACTION * count else 1
+    return 0 if again >= MIN_SHARE * count else 1
 
 
 def _line(one: Log, other: Log, before: set[str], after: set[str], own: set[str]) -> str:
