@@ -32,7 +32,7 @@ def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the first jump of the belief away from the true pose and back, or one jump without a way back."""
+    """Yield the first jump of the belief away from the true pose and back, or a single jump away that lasts."""
     if not drive.has_true_poses:
         return
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
@@ -60,7 +60,7 @@ def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -> Iterator[FoundFault]:
-    """Yield the jump of `belief` (n, 3) at the sample `out` if it stays away from `truth` (n, 3) until the end."""
+    """Yield the jump of the poses `belief` (n, 3) at the index `out` if they never return to `truth` (n, 3)."""
     begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
     stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
@@ -83,7 +83,7 @@ def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
 
 
 def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield times without an estimated pose while the robot drove or, if there are none, without corrected odometry."""
+    """Yield the outages in which the robot drove: gaps between estimates or, without gaps, missing corrections."""
     times = drive.belief.times
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
     gaps = np.flatnonzero(np.diff(times) > limit)
