@@ -34,7 +34,7 @@ def test_a_pressed_bumper_is_a_contact_at_its_time_and_place():
     (contact,) = find_incidents(drive(bumper=drives.signal(times, (times > 4.0) & (times < 4.3))))
     assert (contact.kind, contact.criterion) == ("contact", "collisions")
     assert contact.time == pytest.approx(4.05, abs=0.06)
-    assert contact.place == pytest.approx(tuple(drives.poses(np.array([4.05]))[0, :2]), abs=0.05)
+    assert contact.position == pytest.approx(tuple(drives.poses(np.array([4.05]))[0, :2]), abs=0.05)
 
 
 def test_a_belief_far_from_the_truth_is_lost():
