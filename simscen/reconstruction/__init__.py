@@ -1,1 +1,1 @@
-"""Reconstruction of scenarios from recorded drives: poses, goals, obstacles, and sensor faults from a log."""
+"""Reconstructs scenarios from recorded drives: goals, objects, faults, and criteria from a log."""

@@ -1,4 +1,7 @@
-"""All estimators in their order: what later ones explain must not be taken for what earlier ones look for."""
+"""Runs all estimators on a drive: they find faults, objects, pedestrians, kidnappings, and incidents.
+
+The order counts: scans that one estimator explains as a fault must not look like an object to the next one.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Pose2
+from simscen.reconstruction.compared_scans import compare_scans
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_steps
-from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
 from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_corrected_mount
@@ -25,59 +28,62 @@ from simscen.reconstruction.faults.odometry import gyroscope_faults, odometry_fa
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.objects.find_objects import find_objects
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.objects.pedestrians import with_walks
-from simscen.reconstruction.objects.walk_trial import WalkTrial
-from simscen.reconstruction.scan_model import scan_model
-from simscen.reconstruction.scenario.contents import Findings
-from simscen.reconstruction.scenario.incidents import incidents_of
-from simscen.reconstruction.scenario.robot_file import UNKNOWN_ROBOT, KnownRobot
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
+from simscen.reconstruction.objects.pedestrians import fit_pedestrians
+from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.scenario.contents import EstimatedParts
+from simscen.reconstruction.scenario.incidents import find_incidents
+from simscen.reconstruction.scenario.robot_file import TYPICAL_ROBOT, RobotProperties
+from simscen.reconstruction.static_world import StaticWorld
 from simscen.run.live_world.pedestrians import PedestrianMap
 
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
 SENSORS = ("lidar", "odom", "imu")
-"""Usual names of the sensors that faults are found for."""
-NEVER_KNOWN = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
-"""What no estimator looks for."""
+"""Targets of faults that are sensors. The robot file can give these sensors other names."""
+NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
+"""Disturbances that no estimator looks for; part of a message to the user."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
-"""Smallest jump of the true pose that is a kidnapping, and longest time between the two poses."""
+"""A jump of the true pose is a kidnapping if it is longer than this distance and takes less than this time."""
 
 
-def find_all(
+def run_estimators(
     drive: RecordedDrive,
-    world: Surroundings,
-    robot: KnownRobot = UNKNOWN_ROBOT,
+    world: StaticWorld,
+    robot: RobotProperties = TYPICAL_ROBOT,
     other_robots: Sequence[FoundObject] = (),
     is_map_built: bool = False,
-) -> Findings:
-    """Return everything that the estimators find in a drive.
+) -> EstimatedParts:
+    """Return all parts of a scenario that the estimators find in a drive.
 
-    `other_robots` are known to be there. `is_map_built` if the `world` is from the scans of the drive.
+    `world` is the static world; with `is_map_built`, it was built from the scans of the drive itself. `other_robots`
+    have poses in the log; their traces in the scans are not taken for other objects.
     """
-    unknowns = [NEVER_KNOWN]
-    is_calibrated = drive.has_independent_poses and not is_map_built
+    unknowns = [NEVER_ESTIMATED]
+    is_calibrated = drive.has_true_poses and not is_map_built
     faults, objects = _from_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
     kidnaps = list(_kidnaps(drive))
     faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
     faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
-    if drive.has_independent_poses:
-        faults += odometry_faults(motion_steps(drive), robot.separation, robot.skids)
+    if drive.has_true_poses:
+        faults += odometry_faults(motion_steps(drive), robot.wheel_separation, robot.skids)
         if not kidnaps:
             faults += gyroscope_faults(drive)
     else:
         unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
-    if drive.has_independent_poses and not is_calibrated:
+    if drive.has_true_poses and not is_calibrated:
         unknowns.append("errors of the ranges and of the mount of the lidar, which need a map (--map)")
     unknowns += _unknown_reactions(objects)
-    faults += command_faults(drive, 0.0 if robot.skids else robot.separation)
+    faults += command_faults(drive, 0.0 if robot.skids else robot.wheel_separation)
     faults += localizer_faults(drive)
-    faults = _on_own_sensors(faults, robot, unknowns)
-    return Findings(incidents_of(drive), objects, faults, kidnaps, unknowns)
+    faults = _with_sensor_names_of_robot(faults, robot, unknowns)
+    return EstimatedParts(find_incidents(drive), objects, faults, kidnaps, unknowns)
 
 
-def _on_own_sensors(faults: list[FoundFault], robot: KnownRobot, unknowns: list[str]) -> list[FoundFault]:
-    """Return the faults with the names that the robot file gives to the sensors, without those of missing sensors."""
+def _with_sensor_names_of_robot(
+    faults: list[FoundFault], robot: RobotProperties, unknowns: list[str]
+) -> list[FoundFault]:
+    """Return the faults with the sensor names of the robot file. Faults of other sensors are moved to `unknowns`."""
     if not robot.sensors:
         return faults
     found = []
@@ -91,12 +97,16 @@ def _on_own_sensors(faults: list[FoundFault], robot: KnownRobot, unknowns: list[
 
 def _from_scans(
     drive: RecordedDrive,
-    world: Surroundings,
-    robot: KnownRobot,
+    world: StaticWorld,
+    robot: RobotProperties,
     other_robots: Sequence[FoundObject],
     unknowns: list[str],
     is_calibrated: bool,
 ) -> tuple[list[FoundFault], list[FoundObject]]:
+    """Return the faults and objects that the scans show, and append to `unknowns` what they cannot show.
+
+    Errors of the mount and of the ranges are estimated only if `is_calibrated`: both poses and walls must be exact.
+    """
     scans = drive.scans
     if scans is None or len(scans) < 3:
         unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
@@ -105,47 +115,47 @@ def _from_scans(
     faults += stuck_scans("lidar", scans, drive.duration)
     if len(scans) > MAX_SCANS:
         step = -(-len(scans) // MAX_SCANS)
-        scans = scans.every(step)
+        scans = scans.subset(slice(None, None, step))
         unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
-    model = scan_model(drive, scans, world)
-    mount = mount_fault(model, world) if is_calibrated else None
+    compared = compare_scans(drive, scans, world)
+    mount = mount_fault(compared, world) if is_calibrated else None
     if mount is not None:
         faults.append(mount)
-        model = with_corrected_mount(model, world)
-    faults += invalid_scan_faults(model, drive.duration)
-    faults += missing_beam_faults(model, drive.duration)
-    limits = [*range_faults(model, drive.duration, robot.lidar_noise)]
+        compared = with_corrected_mount(compared, world)
+    faults += invalid_scan_faults(compared, drive.duration)
+    faults += missing_beam_faults(compared, drive.duration)
+    limits = [*range_faults(compared, drive.duration, robot.lidar_noise)]
     faults += limits
-    false_returns = [*false_return_faults(model, drive.duration)]
+    false_returns = [*false_return_faults(compared, drive.duration)]
     faults += false_returns
     if not any(fault.kind == "rain" for fault in limits):
         # Single beams that end early look like a little noise.
         is_known = robot.is_known and not false_returns
-        faults += noise_faults(model, drive.duration, robot.lidar_noise, is_known)
+        faults += noise_faults(compared, drive.duration, robot.lidar_noise, is_known)
     if is_calibrated:
-        faults += range_error_faults(model)
-    glass = glass_fault(model, world, usable_scans(model))
+        faults += range_error_faults(compared)
+    glass = glass_fault(compared, world, usable_scans(compared))
     faults += [] if glass is None else [glass]
-    objects = find_objects(model, world, drive.has_independent_poses, other_robots)
-    return faults, with_walks(objects, WalkTrial(drive, PedestrianMap(world.built), robot.radius))
+    objects = find_objects(compared, world, drive.has_true_poses, other_robots)
+    return faults, fit_pedestrians(objects, PedestrianTrial(drive, PedestrianMap(world.built), robot.radius))
 
 
 def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
-    """Yield what the log does not show about reactions to the robot."""
-    if any(thing.is_moving and thing.walk is None for thing in objects):
+    """Yield phrases about reactions of the objects to the robot that the log does not show."""
+    if any(thing.is_moving and thing.pedestrian is None for thing in objects):
         yield "whether moving objects react to the robot; those that are no pedestrians follow their recorded tracks"
-    apart = [thing.name for thing in objects if thing.walk is not None and not thing.walk.meets_robot]
+    apart = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]
     if apart:
         yield f"whether {', '.join(apart)} would evade the robot, which was never near; pedestrians do"
 
 
-def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Evidence]]:
-    """Yield the jumps of the ground truth that the odometry does not measure."""
-    if not drive.has_independent_poses or len(drive.poses) < 2:
+def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:
+    """Yield the time in s, the new pose, and the reason of each sudden jump of the true pose."""
+    if not drive.has_true_poses or len(drive.poses) < 2:
         return
     poses, times = drive.poses.values, drive.poses.times
     jumps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     steps = np.diff(times)
     for index in np.flatnonzero((jumps > MIN_KIDNAP_M) & (steps < MAX_KIDNAP_S)).tolist():
         text = f"the true pose jumps by {jumps[index]:.2f} m"
-        yield float(times[index + 1]), Pose2(*poses[index + 1].tolist()), Evidence(text, float(times[index + 1]))
+        yield float(times[index + 1]), Pose2(*poses[index + 1].tolist()), Reason(text, float(times[index + 1]))

@@ -1,4 +1,4 @@
-"""Entry point of the reconstruction: a log becomes a scenario file."""
+"""Reconstructs a scenario from a log and writes the scenario file; entry point of this package."""
 
 from __future__ import annotations
 
@@ -14,18 +14,23 @@ from simscen.loading.world_cache import WorldCache
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import choose_robot, read_description
-from simscen.reconstruction.estimators import find_all
-from simscen.reconstruction.objects.find_objects import object_along
-from simscen.reconstruction.scenario.contents import Findings, GivenParts, contents_of
-from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
-from simscen.reconstruction.scenario.robot_file import known_robot
+from simscen.reconstruction.estimators import run_estimators
+from simscen.reconstruction.objects.find_objects import object_of_robot
+from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, scenario_contents
+from simscen.reconstruction.scenario.given_parts import (
+    DEFAULT_LIDAR_HEIGHT_M,
+    GivenFiles,
+    choose_world,
+    prepare_given_parts,
+)
+from simscen.reconstruction.scenario.robot_file import robot_properties
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.static_world import StaticWorld
 
 
 @dataclass(frozen=True)
 class ReconstructionOptions:
-    """How to read the log, and files that the user names."""
+    """How to read the log, files that replace those of the log, and the folder in which the files of the log are."""
 
     drive: DriveOptions = field(default_factory=DriveOptions)
     files: GivenFiles = field(default_factory=GivenFiles)
@@ -34,92 +39,93 @@ class ReconstructionOptions:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """A written scenario with the drive that it is from. `files` are all that were written, the scenario first."""
+    """Result of a reconstruction: written files (the scenario first), the recorded drive, and the scenario's parts."""
 
     log: Path
     files: tuple[Path, ...]
     drive: RecordedDrive
-    findings: Findings
+    estimated: EstimatedParts
     contents: ScenarioContents
-    surroundings: Surroundings
+    static_world: StaticWorld
 
     @property
     def file(self) -> Path:
-        """The scenario."""
+        """The scenario file."""
         return self.files[0]
 
     def summary(self) -> Iterator[str]:
-        """Yield lines that say what was found."""
-        people = sum(thing.walk is not None for thing in self.findings.objects)
-        moving = sum(thing.is_moving for thing in self.findings.objects) - people
-        standing = len(self.findings.objects) - moving - people
+        """Yield lines for the user: the number of goals and found objects, then each fault and each incident."""
+        people = sum(thing.pedestrian is not None for thing in self.estimated.objects)
+        moving = sum(thing.is_moving for thing in self.estimated.objects) - people
+        standing = len(self.estimated.objects) - moving - people
         counts = (
             (len(self.contents.goals), "goal"),
             (people, "pedestrian"),
             (moving, "moving object"),
             (standing, "standing object"),
-            (len(self.findings.faults), "fault"),
+            (len(self.estimated.faults), "fault"),
         )
         yield "found " + ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts)
-        for fault in self.findings.faults:
-            yield f"  {fault.target}.{fault.kind}: {fault.evidence.comment}"
-        for incident in self.findings.incidents:
+        for fault in self.estimated.faults:
+            yield f"  {fault.target}.{fault.kind}: {fault.reason.comment}"
+        for incident in self.estimated.incidents:
             yield f"  incident at {incident.time:.2f} s: {incident.kind}, {incident.detail}"
 
 
 def _write_valid(
-    drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, log: Path, out: Path
-) -> tuple[ScenarioContents, Findings]:
-    """Write the scenario without the objects and faults that `simscen validate` refuses, such as one inside the robot.
+    drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, log: Path, out: Path
+) -> tuple[ScenarioContents, EstimatedParts]:
+    """Write the scenario, without objects and faults that make it invalid, such as an object inside the robot.
 
-    Return what was written. What else is refused is listed among what the log does not show. Raises InvalidInput if
-    the scenario cannot be loaded.
+    A pedestrian that makes it invalid first becomes a scripted object. Other problems are added to the unknowns.
+    Returns the written contents and the parts that are left. Raises InvalidInput if the scenario cannot be loaded.
     """
     while True:
-        contents = contents_of(drive, given, findings, name, log.name)
+        contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
         loaded = try_variations(out, default_root([out]))
         if isinstance(loaded, list):
-            findings = _without_refused_faults(findings, loaded)
+            estimated = _without_refused_faults(estimated, loaded)
             continue
         wrong = {problem.message for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"}
-        refused = {thing.name for thing in findings.objects if any(f"`{thing.name}`" in message for message in wrong)}
+        refused = {thing.name for thing in estimated.objects if any(f"`{thing.name}`" in message for message in wrong)}
         if not refused:
             break
-        walking = {thing.name for thing in findings.objects if thing.walk is not None}
+        walking = {thing.name for thing in estimated.objects if thing.pedestrian is not None}
         objects = [
-            replace(thing, walk=None) if thing.name in refused else thing
-            for thing in findings.objects
+            replace(thing, pedestrian=None) if thing.name in refused else thing
+            for thing in estimated.objects
             if thing.name not in refused - walking
         ]
         unknowns = [
             f"how {name} fits, which was left out because it makes the scenario invalid"
             for name in sorted(refused - walking)
         ]
-        findings = replace(findings, objects=objects, unknowns=[*findings.unknowns, *unknowns])
+        estimated = replace(estimated, objects=objects, unknowns=[*estimated.unknowns, *unknowns])
     if wrong:
         unknowns = [f"what to correct, so that the scenario can run: {message}" for message in wrong]
-        findings = replace(findings, unknowns=[*findings.unknowns, *sorted(unknowns)])
-        contents = contents_of(drive, given, findings, name, log.name)
+        estimated = replace(estimated, unknowns=[*estimated.unknowns, *sorted(unknowns)])
+        contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
-    return contents, findings
+    return contents, estimated
 
 
-def _without_refused_faults(findings: Findings, problems: list[Problem]) -> Findings:
-    """Return the findings without the faults that do not fit their sensors. Raises InvalidInput if there are none."""
+def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
+    """Return the parts without the faults that the problems refuse. Raises InvalidInput if they refuse no fault."""
     refusals = "\n".join(problem.message for problem in problems)
-    refused = [fault for fault in findings.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
+    refused = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
     if not refused:
         raise InvalidInput(problems)
-    unknowns = [f"how to write the fault that {fault.target} has: {fault.evidence.comment}" for fault in refused]
-    faults = [fault for fault in findings.faults if fault not in refused]
-    return replace(findings, faults=faults, unknowns=[*findings.unknowns, *unknowns])
+    unknowns = [f"how to write the fault that {fault.target} has: {fault.reason.comment}" for fault in refused]
+    faults = [fault for fault in estimated.faults if fault not in refused]
+    return replace(estimated, faults=faults, unknowns=[*estimated.unknowns, *unknowns])
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
-    """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError.
+    """Write the scenario file `out`, and next to it the map and robot files that it needs.
 
-    Of a log with several robots, `options.files.robot` names the robot that the scenario has.
+    In a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput for
+    an unusable log or file, and OSError if a file cannot be written.
     """
     robot_of_log = choose_robot(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files
@@ -127,15 +133,15 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     described = read_description(log, options.root or Path.cwd(), robot_of_log)
     choice = choose_world(drive, described, files, out)
     height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
-    surroundings = Surroundings(choice.world, height)
-    given = given_parts(drive, described, choice, files, out, surroundings)
+    static_world = StaticWorld(choice.world, height)
+    given = prepare_given_parts(drive, described, choice, files, out, static_world)
     is_known = bool(files.robot) or described.robot is not None
-    robot = known_robot(given.robot, out.parent, is_known)
+    robot = robot_properties(given.robot, out.parent, is_known)
     others = [
-        object_along(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
-        for name, outline, times, poses in described.others
+        object_of_robot(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
+        for name, outline, times, poses in described.other_robots
     ]
-    findings = find_all(drive, surroundings, robot, others, choice.is_built)
+    estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
     name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
-    contents, findings = _write_valid(drive, given, findings, name, log, out)
-    return Reconstruction(log, (out, *choice.files), drive, findings, contents, surroundings)
+    contents, estimated = _write_valid(drive, given, estimated, name, log, out)
+    return Reconstruction(log, (out, *choice.files), drive, estimated, contents, static_world)

@@ -103,7 +103,7 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
     row.goals = max(errors, default=0.0) if len(errors) >= len(accepted) else float("inf")
     spec = spec_of_text(log.header.scenario, file.name)
     row.ordered = {(fault.sensor, fault.kind) for fault in spec.faults}
-    row.found = {(fault.target, fault.kind) for fault in made.findings.faults}
+    row.found = {(fault.target, fault.kind) for fault in made.estimated.faults}
     if ("map", "shift") in row.ordered or ("map", "outdated") in row.ordered:
         row.found |= {one for one in row.ordered if one[0] == "map"} if made.contents.map else set()
     _compare_objects(row, log, made)
@@ -112,13 +112,13 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
 
 def _compare_objects(row: Row, log: Log, made: Reconstruction) -> None:
     moved = {name: track for name, track in log.trace.objects.items() if _moved(track)}
-    moving = [thing for thing in made.findings.objects if thing.is_moving]
+    moving = [thing for thing in made.estimated.objects if thing.is_moving]
     for name, track in sorted(moved.items()):
         seen = _times_seen(track, log, made)
         if len(seen) * 0.1 >= MIN_SEEN_S and _moved_while(track, log, seen):
             fits = [_fit(thing, track, log, seen) for thing in moving]
             row.objects[name] = min(fits, key=_rank, default=(float("inf"), float("inf"), 0.0))
-    row.pedestrians = sum(thing.walk is not None for thing in moving)
+    row.pedestrians = sum(thing.pedestrian is not None for thing in moving)
     row.spurious = max(0, len(moving) - len(moved))
 
 
@@ -142,13 +142,13 @@ def _times_seen(track: Samples, log: Log, made: Reconstruction) -> np.ndarray:
     """Return the times, every 0.1 s, at which the static world does not hide the center of an object."""
     rate = log.trace.tick_rate
     times = np.arange(track.ticks[0] / rate, min(track.ticks[-1], log.trace.end) / rate, 0.1)
-    if not len(times) or made.surroundings is None or made.drive.scans is None:
+    if not len(times) or made.static_world is None or made.drive.scans is None:
         return times[:0]
     places, robot = _position(track, rate, times), made.drive.poses.poses_at(times)
     offset = places - robot[:, :2]
     distance = np.hypot(*offset.T)
     poses = np.column_stack((robot[:, :2], np.arctan2(offset[:, 1], offset[:, 0])))
-    free = made.surroundings.ranges_from(poses, np.zeros(1), made.drive.scans.range_max)[:, 0]
+    free = made.static_world.ranges_from(poses, np.zeros(1), made.drive.scans.range_max)[:, 0]
     return times[(distance < free) & (distance < 8.0)]
 
 
@@ -158,8 +158,8 @@ def _fit(thing: FoundObject, track: Samples, log: Log, seen: np.ndarray) -> tupl
     Of a pedestrian, the simulated motion counts, and not the track.
     """
     frames = np.array([frame[:3] for frame in thing.keyframes])
-    if thing.walk is not None:
-        frames = np.column_stack((thing.walk.times, thing.walk.positions))
+    if thing.pedestrian is not None:
+        frames = np.column_stack((thing.pedestrian.times, thing.pedestrian.positions))
     inside = seen[(seen >= frames[0, 0]) & (seen <= frames[-1, 0])]
     if len(inside) < 5:
         return float("inf"), float("inf"), 0.0

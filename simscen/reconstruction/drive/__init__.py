@@ -1,1 +1,1 @@
-"""The recorded drive: messages of a log as arrays, goals, and what the header of the log says about the run."""
+"""Reads a recorded drive from a log: its messages as arrays, its goals, and the description in the log header."""

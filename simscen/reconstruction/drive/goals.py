@@ -1,7 +1,7 @@
-"""Goals of a drive, and the part of a recording in which the robot drives to them.
+"""Finds the goals of a drive in its log, and cuts off the part of the drive before the first goal.
 
-Goals come from goal messages and the status of actions; without messages, from the ends of plans; without plans, from
-stops and bends of the path.
+Goals are read from goal messages. If the log has none, they are the ends of the plans; if it has no plans either, the
+stops and bends of the driven path.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans, TimedValues
-from simscen.reconstruction.evidence import windows
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, TimedValues
+from simscen.reconstruction.reasons import windows
 from simscen.record.foreign.trace_reader import goal_events
 from simscen.record.messages import event_text
 
 SAME_GOAL_M = 0.05
-"""Maximum distance between the ends of two plans to one goal."""
+"""Two successive plans whose ends are at most this far apart lead to the same goal."""
 STOPPED_SPEED_M_S, STOPPED_TURN_RAD_S = 0.03, 0.05
-"""Speeds below which the robot stands."""
+"""Speeds below which the robot counts as standing still."""
 MIN_STOP_S = 2.0
 """Minimum duration of a stop that counts as a goal."""
 MIN_LEG_M = 0.5
 """Minimum distance between two stops that count as goals."""
 MIN_BEND_M = 0.5
-"""Minimum distance of the path from the straight line between two stops at which its farthest point counts as another
-goal."""
+"""If the path between two stops deviates from a straight line by more than this, its farthest point is also a goal."""
 STOP_SOURCE, BEND_SOURCE = "the robot stopped there", "its path bends there"
-_ENDINGS = {
+"""Values of RecordedGoal.source for goals that are derived from the driven path."""
+_STATUS_OF_EVENTS = {
     EventKind.GOAL_REACHED: "reached",
     EventKind.GOAL_PASSED: "passed",
     EventKind.GOAL_FAILED: "failed",
     EventKind.GOAL_CANCELED: "canceled",
 }
 ToSeconds = Callable[[int], float]
-"""Converts a time of logging in ns to s since the start of the drive."""
+"""Converts a log time in ns to s since the start of the drive."""
 
 
-def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
-    """Return the goals of a drive and the final result of the navigation, "" if unknown."""
+def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> Iterator[RecordedGoal]:
+    """Return the goals of a drive. `poses` (n, 3) are its best known poses x, y, yaw in the map frame."""
     sent = [
         RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
         for message in messages.of("goal")
@@ -52,17 +52,16 @@ def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -
         (to_seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")
     ]
     if events:
-        return tuple(_with_events(sent, events)), _result(events)
+        return _with_results_of_events(sent, events)
     if not sent:
-        sent = list(_ends_of_plans(messages, to_seconds))
-    status = _with_status(sent, messages, to_seconds)
-    if sent:
-        return tuple(status), ""
-    return tuple(ends_of_motion(poses)), ""
+        sent = list(_goals_from_plans(messages, to_seconds))
+    return _with_results_of_actions(sent, messages, to_seconds) if sent else goals_from_motion(poses)
 
 
-def _with_events(sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]) -> Iterator[RecordedGoal]:
-    """Yield the goals with their names and results from the events of the navigator."""
+def _with_results_of_events(
+    sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]
+) -> Iterator[RecordedGoal]:
+    """Yield the accepted goals, with their names and results from the events of simscen's navigator."""
     accepted = [(time, event) for time, event in events if event.kind is EventKind.GOAL_ACCEPTED]
     poses = list(sent)
     for time, event in accepted:
@@ -71,23 +70,20 @@ def _with_events(sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Eve
             continue
         poses.remove(match)
         ending = next(
-            ((t, e) for t, e in events if e.kind in _ENDINGS and e.name == event.name and t >= time),
+            ((t, e) for t, e in events if e.kind in _STATUS_OF_EVENTS and e.name == event.name and t >= time),
             None,
         )
         goal = replace(match, name=event.name, source="/goal_pose and the events of the navigator")
         if ending is not None:
             code = str(ending[1].data.get("error_name", "") or "")
-            goal = replace(goal, ended=ending[0], status=_ENDINGS[ending[1].kind], error=code)
+            goal = replace(goal, ended=ending[0], status=_STATUS_OF_EVENTS[ending[1].kind], error=code)
         yield goal
 
 
-def _result(events: Sequence[tuple[float, Event]]) -> str:
-    ended = [event.name for _, event in events if event.kind is EventKind.NAVIGATION_ENDED]
-    return ended[-1] if ended else ""
-
-
-def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
-    """Yield the goals with the results of their actions, if the log has as many actions as goals."""
+def _with_results_of_actions(
+    sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds
+) -> Iterator[RecordedGoal]:
+    """Yield the goals with the results of their Nav2 actions; unchanged if these cannot be matched with the goals."""
     states = [(message.log_time, message.content) for message in messages.of("status")]
     names = [str(number) for number in range(len(sent))]
     events = goal_events(states, names) if states and sent else "no status"
@@ -97,16 +93,16 @@ def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds
     for name, goal in zip(names, sent, strict=True):
         own = [event for event in events if event.name == name]
         accepted = next((to_seconds(event.tick) for event in own if event.kind is EventKind.GOAL_ACCEPTED), goal.sent)
-        ending = next((event for event in own if event.kind in _ENDINGS), None)
+        ending = next((event for event in own if event.kind in _STATUS_OF_EVENTS), None)
         source = f"{goal.source} and the action's status"
         if ending is None:
             yield replace(goal, sent=accepted, source=source)
         else:
-            status = _ENDINGS[ending.kind]
+            status = _STATUS_OF_EVENTS[ending.kind]
             yield replace(goal, sent=accepted, ended=to_seconds(ending.tick), status=status, source=source)
 
 
-def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
+def _goals_from_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
     """Yield a goal for each plan that ends elsewhere than the previous one."""
     last: Pose2 | None = None
     for message in messages.of("plan"):
@@ -118,8 +114,8 @@ def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[Rec
         last = end
 
 
-def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
-    """Yield goals where the robot stopped for MIN_STOP_S, where its path bends in between, and where the drive ends."""
+def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
+    """Yield a goal for each stop of at least MIN_STOP_S, each bend of the path between stops, and the last pose."""
     if len(poses) < 2:
         return
     steps = np.maximum(np.diff(poses.times), 1e-6)
@@ -149,18 +145,19 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 
 
 MIN_IDLE_S = 1.0
-"""Shorter times before the first goal are kept."""
+"""The time before the first goal is only cut off if it is at least this long."""
 LEAD_S = 0.5
-"""Time before the first motion that is kept if the log has no goal messages."""
+"""Time before the first motion that is kept if goals are derived from the motion."""
 
 
-def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
-    """Return the drive from its first goal on. All times count from that moment."""
+def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
+    """Return the drive without the time before its first goal, with all times relative to the new start."""
     if not drive.goals:
         return drive
     begin = drive.goals[0].sent
     if drive.goals[0].status == "reached" and not drive.goals[0].source.startswith("/"):
-        begin = _first_motion(drive.poses) - LEAD_S
+        moved = np.hypot(*(drive.poses.values[:, :2] - drive.poses.values[0, :2]).T) > 0.05
+        begin = float(drive.poses.times[np.argmax(moved)]) - LEAD_S
     begin = max(begin, float(drive.poses.times[0]))
     if begin < MIN_IDLE_S:
         return drive
@@ -169,43 +166,31 @@ def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
         replace(goal, sent=max(0.0, goal.sent - begin), ended=None if goal.ended is None else goal.ended - begin)
         for goal in drive.goals
     )
+    scans = drive.scans
+    if scans is not None:
+        scans = scans.subset(slice(int(np.searchsorted(scans.times, begin)), None))
+        scans = replace(scans, times=scans.times - begin, arrivals=scans.arrivals - begin)
     return replace(
         drive,
         duration=drive.duration - begin,
-        poses=_after(drive.poses, begin, keep_last=True),
-        belief=_after(drive.belief, begin, keep_last=True),
-        corrections=_after(drive.corrections, begin),
-        odometry=_after(drive.odometry, begin),
-        commands=_after(drive.commands, begin),
-        turn_rates=_after(drive.turn_rates, begin),
-        bumper=_after(drive.bumper, begin),
-        scans=None if drive.scans is None else _scans_after(drive.scans, begin),
+        poses=_values_from(drive.poses, begin, keep_last=True),
+        belief=_values_from(drive.belief, begin, keep_last=True),
+        corrections=_values_from(drive.corrections, begin),
+        odometry=_values_from(drive.odometry, begin),
+        commands=_values_from(drive.commands, begin),
+        turn_rates=_values_from(drive.turn_rates, begin),
+        bumper=_values_from(drive.bumper, begin),
+        scans=scans,
         goals=goals,
         notes=(*drive.notes, note),
         begin=begin,
     )
 
 
-def _first_motion(poses: TimedValues) -> float:
-    moved = np.flatnonzero(np.hypot(*(poses.values[:, :2] - poses.values[0, :2]).T) > 0.05)
-    return float(poses.times[moved[0]]) if len(moved) else float(poses.times[0])
-
-
-def _after(signal: TimedValues, begin: float, keep_last: bool = False) -> TimedValues:
-    """Return the values from `begin` on; with `keep_last`, also the value that holds then."""
+def _values_from(signal: TimedValues, begin: float, keep_last: bool = False) -> TimedValues:
+    """Return the values from `begin` on; with `keep_last`, also the newest value before `begin`, at time 0."""
     first = int(np.searchsorted(signal.times, begin))
     if keep_last and first > 0 and (first == len(signal) or signal.times[first] > begin):
         first -= 1
     times = np.maximum(signal.times[first:] - begin, 0.0)
     return TimedValues(times, signal.values[first:], np.maximum(signal.arrivals[first:] - begin, 0.0))
-
-
-def _scans_after(scans: Scans, begin: float) -> Scans:
-    first = int(np.searchsorted(scans.times, begin))
-    return replace(
-        scans,
-        times=scans.times[first:] - begin,
-        arrivals=scans.arrivals[first:] - begin,
-        ranges=scans.ranges[first:],
-        malformed=scans.malformed[first:],
-    )

@@ -1,4 +1,7 @@
-"""Collection of the messages of a log that a reconstruction uses, decoded and by role."""
+"""Reads and decodes the messages of a log that a reconstruction uses, by the role of their topic.
+
+A role is the use that simscen makes of a topic, such as `odom` or `goal`; each role has a default topic.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from simscen.record.messages.decode import MessageReader, decode_checked
 
 
 class LoggedMessage(NamedTuple):
-    """A decoded message, with the time at which it was logged and its stamp in ns; 0 if it has no stamp."""
+    """A decoded message with its log time and the stamp of its header in ns; the stamp is 0 if it has none."""
 
     log_time: int
     stamp: int
@@ -26,7 +29,7 @@ class LoggedMessage(NamedTuple):
 
 
 class ImuMessage(NamedTuple):
-    """Turn rate in rad/s about the vertical axis of sensor_msgs/msg/Imu."""
+    """Used part of sensor_msgs/msg/Imu: stamp in ns, frame, and turn rate in rad/s about the vertical axis."""
 
     stamp: int
     frame: str
@@ -42,13 +45,13 @@ EXTRA_TOPICS = {
     "footprint": "/local_costmap/published_footprint",
     "events": topics.EVENTS.name,
 }
-"""Default topics by role, besides those of TOPICS."""
+"""Default topics of the roles that only a reconstruction uses; the other roles are in TOPICS."""
 TOPIC_ROLES = (*TOPICS, *(role for role in EXTRA_TOPICS if role != "events"))
-"""Names of the topics in `--topic NAME=TOPIC`."""
+"""Roles that users can give another topic with `--topic NAME=TOPIC`; only simscen itself writes events."""
 
 
-def imu(reader: MessageReader) -> ImuMessage:
-    """Decode the turn rate of sensor_msgs/msg/Imu."""
+def decode_imu(reader: MessageReader) -> ImuMessage:
+    """Decode sensor_msgs/msg/Imu."""
     stamp, frame = reader.header()
     reader.take("13d")
     turn_rate = reader.take("3d")[2]
@@ -56,15 +59,15 @@ def imu(reader: MessageReader) -> ImuMessage:
     return ImuMessage(stamp, frame, turn_rate)
 
 
-def polygon_stamped(reader: MessageReader) -> list[tuple[float, float]]:
-    """Decode the corners of geometry_msgs/msg/PolygonStamped, without their heights."""
+def decode_polygon(reader: MessageReader) -> list[tuple[float, float]]:
+    """Decode the corners (x, y in m) of geometry_msgs/msg/PolygonStamped."""
     reader.header()
     corners = (reader.take("3f") for _ in range(reader.count()))
     return [(x, y) for x, y, _ in corners]
 
 
 Decoders = Mapping[str, Callable[[bytes], Any]]
-
+"""Functions that decode a serialized message, by message type."""
 _POSES: Decoders = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
 _TRANSFORMS: Decoders = {topics.TF.type: partial(decode_checked, decode.transforms)}
 _DECODERS: Mapping[str, Decoders] = {
@@ -82,40 +85,40 @@ _DECODERS: Mapping[str, Decoders] = {
     "tf": _TRANSFORMS,
     "tf_static": _TRANSFORMS,
     "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
-    "imu": {topics.IMU_TYPE: partial(decode_checked, imu)},
+    "imu": {topics.IMU_TYPE: partial(decode_checked, decode_imu)},
     "bumper": {topics.BUMPER_TYPE: lambda data: bool(MessageReader(data).take("?")[0])},
     "map": {topics.MAP.type: lambda data: decode.occupancy_grid(MessageReader(data))[1]},
-    "footprint": {"geometry_msgs/msg/PolygonStamped": partial(decode_checked, polygon_stamped)},
+    "footprint": {"geometry_msgs/msg/PolygonStamped": partial(decode_checked, decode_polygon)},
     "events": {topics.EVENTS.type: lambda data: MessageReader(data).string()},
 }
 
 
 @dataclass
 class LogMessages:
-    """Messages of a log by role, in the order of logging, and the message types of all its topics."""
+    """Messages of a log by role, in order of log time, and message types by topic. Truncated logs are not complete."""
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     is_complete: bool = True
 
     def of(self, role: str) -> list[LoggedMessage]:
-        """Return the messages of a role."""
+        """Return the messages of a role; none if the log has none."""
         return self.by_role.get(role, [])
 
 
 def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, robot: str = "") -> LogMessages:
-    """Read the messages of an MCAP file or a rosbag2 folder.
+    """Read the messages of an MCAP file or a rosbag2 folder. Raises UnusableLog if it cannot be read.
 
-    `renamed` are topics that differ from the defaults, by role, and `truth` is the topic of the ground truth. Scans are
-    found on any topic if the default topic has none. In a log of simscen with several robots, `robot` is the one whose
-    messages are read; its name is removed from topics and frames. Raises UnusableLog.
+    `renamed` maps roles to topics that differ from the defaults. `truth` is the topic of the ground truth, None for
+    none. If the topic for scans has none, scans of another topic are used. In a log of simscen with several robots,
+    only the messages of `robot` are read, and its name is removed from topics and frames.
     """
     prefix = f"/{robot}" if robot else ""
     names = {**TOPICS, **EXTRA_TOPICS, **renamed}
     roles = {prefix + names[role].removeprefix(prefix): role for role in sorted(names)}
     if truth:
         roles[prefix + truth.removeprefix(prefix)] = "truth"
-    stream = open_messages(path, _AnyTopic(roles) if path.is_dir() else roles)
+    stream = open_messages(path, _RolesAndScans(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
     for raw in stream:
@@ -134,8 +137,8 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     return messages
 
 
-class _AnyTopic:
-    """Container that also accepts topics of other names whose messages may be scans."""
+class _RolesAndScans:
+    """Container of the topics to read: those with a role, and all with "scan" in their name."""
 
     def __init__(self, roles: Mapping[str, str]) -> None:
         self._roles = roles
@@ -155,7 +158,7 @@ def _decoded(raw: RawMessage, role: str) -> LoggedMessage:
 
 
 def _without_robot(message: LoggedMessage, robot: str) -> LoggedMessage:
-    """Return a message without the name of the robot in its frames."""
+    """Return a message whose frame names do not contain the name of the robot; unchanged if `robot` is ""."""
     if not robot:
         return message
     frames = RobotFrames(robot)

@@ -1,19 +1,20 @@
-"""Reader of logs for a reconstruction: the messages of a log as a RecordedDrive."""
+"""Reads a log and converts its messages to a RecordedDrive."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.reconstruction.drive.goals import from_first_goal, goals_of
+from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
 from simscen.record import topics
@@ -22,22 +23,27 @@ from simscen.record.foreign.transforms import TransformTree, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
+"""Usual names of the base frame, in the order in which they are tried."""
 NO_TRUTH = "none"
+"""Value of DriveOptions.truth to ignore the ground truth of a log."""
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Maximum difference between stamps and times of logging of message clock."""
+"""If the stamps of messages differ more than this from their log times, both are of different clocks."""
 MIN_POSES = 2
-"""Number of poses that a source of poses needs."""
+"""Smallest number of poses with which a topic or transform is used as the source of the poses."""
 DEFAULT_LIDAR_HEIGHT_M, MIN_LIDAR_HEIGHT_M = 0.2, 0.05
-"""Height of a lidar with unknown mount, and smallest height of any lidar."""
+"""Assumed height of a lidar with unknown mount, and lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
-"""Largest coordinate of a footprint; larger polygons are something else."""
+"""Largest coordinate of a usable footprint, in the frame in which it is published."""
 
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """How to read a log: the topic of the ground truth, "none" to ignore it, and topics that differ, by role.
+    """How to read a log.
 
-    `robot` is the robot to read in a log of simscen with several robots.
+    Attributes:
+        truth: Topic of the ground truth, "none" to ignore it; None for the default topic of simscen's own logs.
+        topics: Topics by role, for roles whose topic is not the default.
+        robot: Robot whose messages are read, in a log of simscen with several robots.
     """
 
     truth: str | None = None
@@ -46,17 +52,17 @@ class DriveOptions:
 
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
-    """Read an MCAP file or a rosbag2 folder. Raises InvalidInput if it cannot be used for a reconstruction."""
+    """Read a drive from its first goal on, from an MCAP file or a rosbag2 folder. Raises InvalidInput if unusable."""
     with unusable_log_as_invalid_input(path):
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
         messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth, options.robot)
-        return from_first_goal(_DriveReader(path, messages).drive())
+        return trim_to_first_goal(_DriveReader(path, messages).drive())
 
 
 class _DriveReader:
-    """Converts the messages of message log."""
+    """Converts the messages of one log to a RecordedDrive and collects notes for the user."""
 
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
@@ -73,36 +79,30 @@ class _DriveReader:
             self._notes.append("the log is truncated; the scenario covers what it holds")
 
     def drive(self) -> RecordedDrive:
-        odometry, belief = self._odometry(), self._belief()
-        poses, source, independent = self._poses(odometry, belief)
-        scans = self._scans()
-        duration = (self._end - self._start) / NS_PER_SECOND
-        commands = self._signal(
-            "cmd_vel", [tuple(message.content.values) for message in self._messages.of("cmd_vel")], 3
-        )
-        goals, result = goals_of(self._messages, self._seconds, poses)
+        odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
+        belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
+        poses, source, is_truth = self._poses(odometry, belief)
         return RecordedDrive(
             name=self._path.stem,
-            duration=duration,
+            duration=self._seconds(self._end),
             poses=poses,
             pose_source=source,
-            has_independent_poses=independent,
+            has_true_poses=is_truth,
             belief=belief,
             corrections=self._poses_of_tf("map", "odom") or no_values(3),
             odometry=odometry,
-            commands=commands,
-            turn_rates=self._signal("imu", [(message.content.turn_rate,) for message in self._messages.of("imu")], 1),
-            bumper=self._signal("bumper", [(float(message.content),) for message in self._messages.of("bumper")], 1),
-            scans=scans,
+            commands=self._signal("cmd_vel", 3, lambda twist: twist.values),
+            turn_rates=self._signal("imu", 1, lambda imu: (imu.turn_rate,)),
+            bumper=self._signal("bumper", 1, lambda is_pressed: (float(is_pressed),)),
+            scans=self._scans(),
             map=self._map(),
-            goals=goals,
-            result=result,
+            goals=tuple(find_goals(self._messages, self._seconds, poses)),
             footprint=self._footprint(poses),
             notes=tuple(self._notes),
         )
 
     def _clock_offset(self) -> int:
-        """Return how much later the clock of the stamps is in ns, or 0 if it is the clock of logging."""
+        """Return in ns how far the clock of the stamps is ahead of the clock of the log times; 0 for the same clock."""
         differences = [
             message.stamp - message.log_time
             for role in ("scan", "odom", "amcl_pose", "truth")
@@ -114,49 +114,35 @@ class _DriveReader:
         offset = max(differences)
         if abs(offset) <= MAX_CLOCK_DIFFERENCE_NS:
             return 0
-        self._notes.append("stamps and times of logging are of different clocks; delays are relative to the smallest")
+        self._notes.append("stamps and log times are of different clocks; delays are relative to the smallest delay")
         return int(offset)
 
     def _seconds(self, logged: int) -> float:
         return (logged - self._start) / NS_PER_SECOND
 
     def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
-        """Return the times of measurement and of logging in s."""
+        """Return the times of measurement and the log times (n,) of messages, in s since the start."""
         arrivals = np.array([message.log_time - self._start for message in messages], dtype=np.float64) / NS_PER_SECOND
         if not any(message.stamp for message in messages):
             return arrivals, arrivals
         stamps = np.array([message.stamp - self._stamp_start for message in messages], dtype=np.float64) / NS_PER_SECOND
         return stamps, arrivals
 
-    def _signal(self, role: str, rows: Sequence[Sequence[float]], columns: int) -> TimedValues:
+    def _signal(self, role: str, columns: int, row_of: Callable[[Any], Sequence[float]]) -> TimedValues:
+        """Return the values of the messages of a role; `row_of` returns the columns for a decoded message."""
         messages = self._messages.of(role)
         if not messages:
             return no_values(columns)
         times, arrivals = self._times(messages)
+        rows = [tuple(row_of(message.content)) for message in messages]
         values = np.array(rows, dtype=np.float64).reshape(len(messages), columns)
         order = np.argsort(times, kind="stable")
         return TimedValues(times[order], values[order], arrivals[order])
 
-    def _odometry(self) -> TimedValues:
-        messages = self._messages.of("odom")
-        rows = [
-            (*Pose3(*message.content.pose).plane, *(message.content.twist or (0.0, 0.0, 0.0))) for message in messages
-        ]
-        return self._signal("odom", rows, 6)
-
-    def _belief(self) -> TimedValues:
-        messages = self._messages.of("amcl_pose")
-        rows = [(*Pose3(*message.content.pose).plane, *message.content.covariance) for message in messages]
-        return self._signal("amcl_pose", rows, 9)
-
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
-        """Return the best known poses in the map frame, their source, and whether they are a ground truth."""
-        if truth := self._messages.of("truth"):
-            return (
-                self._signal("truth", [Pose3(*message.content.pose).plane for message in truth], 3),
-                "ground truth",
-                True,
-            )
+        """Return the best known poses in the map frame, their source in words, and whether they are a ground truth."""
+        if self._messages.of("truth"):
+            return self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane), "ground truth", True
         for base in BASE_FRAMES:
             poses = self._poses_of_tf("map", base)
             if poses is not None:
@@ -177,6 +163,7 @@ class _DriveReader:
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
 
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
+        """Return the poses x, y, yaw of the frame `inner` in `outer`; None if tf does not contain them."""
         try:
             found = self._transforms.between(outer, inner)
         except UnusableLog as error:
@@ -210,19 +197,19 @@ class _DriveReader:
         order = np.argsort(times, kind="stable")
         first: ScanMessage = next(message.content for message in messages if len(message.content.ranges) == beams)
         ranges = np.full((len(messages), beams), np.nan)
-        malformed = np.zeros(len(messages), dtype=bool)
+        is_malformed = np.zeros(len(messages), dtype=bool)
         for row, index in enumerate(order.tolist()):
             values = messages[index].content.ranges
-            malformed[row] = len(values) != beams
-            if not malformed[row]:
+            is_malformed[row] = len(values) != beams
+            if not is_malformed[row]:
                 ranges[row] = values
         mount, height = self._mount(frame)
         angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
         limits = first.range_min, first.range_max
-        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, malformed, frame)
+        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed)
 
     def _mount(self, frame: str) -> tuple[Pose2, float]:
-        """Return the pose of the lidar on the base and its height, from static transforms, or else the first ones."""
+        """Return the pose of the lidar on the base and its height in m, from the first transform of each frame."""
         links: dict[str, StampedPose] = {}
         for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
             for link in message.content:
@@ -250,7 +237,7 @@ class _DriveReader:
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
 
     def _footprint(self, poses: TimedValues) -> Polygon:
-        """Return the footprint in the base frame. It is published in the odom or map frame, where it cannot be used."""
+        """Return the footprint in the base frame, () if unknown. Nav2 publishes it in the odom or map frame."""
         messages = self._messages.of("footprint")
         if not messages:
             return ()
@@ -264,10 +251,11 @@ class _DriveReader:
 
 
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
+"""Roles whose messages do not tell when the drive began and ended, because they may be logged at any time."""
 
 
 def _belief_along_odometry(belief: TimedValues, odometry: TimedValues) -> TimedValues:
-    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the odometry since."""
+    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the later odometry."""
     at_belief = odometry.poses_at(belief.times)
     corrections = [
         Pose2(*pose).compose(Pose2(*odom).inverse())

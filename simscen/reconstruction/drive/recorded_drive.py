@@ -1,8 +1,8 @@
-"""A recorded drive as arrays with times in s since the start, and its motion in short steps."""
+"""Data of a recorded drive as arrays with times in s since its start, and its motion in steps of equal duration."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class TimedValues:
-    """Values (n, k) of a signal: `times` (n,) of measurement in ascending order, `arrivals` (n,) of logging, in s."""
+    """Signal with `values` (n, k) measured at the ascending `times` (n,) and logged at the times `arrivals` (n,)."""
 
     times: Array
     values: Array
@@ -28,48 +28,49 @@ class TimedValues:
 
     @property
     def period(self) -> float:
-        """Usual time between two messages in s; nan for fewer than two messages."""
+        """Median time between two messages in s; nan for fewer than two messages."""
         return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
 
     def poses_at(self, times: Array) -> Array:
-        """Return poses x, y, yaw (m, 3) at `times` (m,), interpolated linearly; held before the first and the last."""
+        """Return the poses x, y, yaw (m, 3) at `times` (m,), by linear interpolation of the first three columns."""
         columns = [np.interp(times, self.times, self.values[:, axis]) for axis in (0, 1)]
         yaw = np.interp(times, self.times, np.unwrap(self.values[:, 2]))
         return np.column_stack((*columns, wrap_array(yaw)))
 
     def values_at(self, times: Array) -> Array:
-        """Return the newest values (m, k) at `times` (m,); before the first, the first."""
+        """Return the newest values (m, k) at `times` (m,); before the first measurement, the first values."""
         return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
 
 
 USUAL_PERIOD_PERCENTILE = 20
-"""Percentile of the times between messages that is their period, even if most messages are lost."""
+"""Percentile of the times between messages that is taken as the period; a low one, because lost messages cause gaps."""
 
 
 def usual_period(times: Array) -> float:
-    """Return the period in s with which a sensor measures, from the `times` (n,) of its messages; nan if unknown."""
+    """Return the period in s of a sensor from the `times` (n,) of its messages; nan for fewer than two messages."""
     return float(np.percentile(np.diff(times), USUAL_PERIOD_PERCENTILE)) if len(times) > 1 else float("nan")
 
 
 def no_values(columns: int) -> TimedValues:
-    """Return a signal without samples."""
+    """Return a signal without any values, which would have this number of columns."""
     return TimedValues(np.empty(0), np.empty((0, columns)), np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Scans:
-    """Scans of one lidar: `ranges` (n, beams) in m, as in sensor_msgs/LaserScan, in the order of measurement.
+    """Scans of one lidar in the order of measurement.
 
     Attributes:
         times: Times of measurement (n,) in s.
-        arrivals: Times of logging (n,) in s.
+        arrivals: Log times (n,) in s.
+        ranges: Ranges (n, beams) in m as in sensor_msgs/LaserScan, with nan and inf.
         angles: Beam directions (beams,) in the lidar frame in rad.
         range_min: Minimum range in m.
         range_max: Maximum range in m.
         mount: Pose of the lidar on the base.
         height: Height of the lidar above the base frame in m.
-        malformed: Whether a scan (n,) has another number of beams; its ranges are nan.
-        frame: Frame of the lidar.
+        is_malformed: Whether a scan (n,) has another number of beams than most; its ranges are nan.
+
     """
 
     times: Array
@@ -80,15 +81,14 @@ class Scans:
     range_max: float
     mount: Pose2
     height: float
-    malformed: Mask
-    frame: str = "lidar"
+    is_malformed: Mask
 
     def __len__(self) -> int:
         return len(self.times)
 
     @property
     def period(self) -> float:
-        """Usual time between two scans in s; nan for fewer than two scans."""
+        """Median time between two scans in s; nan for fewer than two scans."""
         return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
 
     def is_hit(self) -> Mask:
@@ -97,17 +97,14 @@ class Scans:
             hit: Mask = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
             return hit
 
-    def every(self, step: int) -> Scans:
-        """Return every second, third, … of the scans."""
-        which = slice(None, None, step)
-        times, arrivals, ranges, malformed = (
-            self.times[which],
-            self.arrivals[which],
-            self.ranges[which],
-            self.malformed[which],
-        )
-        limits = self.range_min, self.range_max
-        return Scans(times, arrivals, ranges, self.angles, *limits, self.mount, self.height, malformed, self.frame)
+    def subset(self, which: slice) -> Scans:
+        """Return the scans of a slice of indices."""
+        names = ("times", "arrivals", "ranges", "is_malformed")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
+    def thinned(self, target: int) -> Scans:
+        """Return evenly spread scans: at least `target` and less than twice as many, or all if there are fewer."""
+        return self.subset(slice(None, None, max(1, len(self) // target)))
 
 
 @dataclass(frozen=True)
@@ -115,13 +112,12 @@ class RecordedGoal:
     """Goal of the drive.
 
     Attributes:
-        name: Name, or "" if unknown.
         pose: Pose in the map frame.
-        sent: Time in s at which the robot accepted it.
-        ended: Time in s of its result; None if it has none.
-        status: "reached", "failed", "canceled", "passed" without a stop, or "unknown".
-        error: Error code by name, or "".
-        source: Topic or estimate that it is from.
+        sent: Time in s at which it was accepted or, if unknown, sent.
+        ended: Time in s of its result; None if the log has no result.
+        status: "reached", "passed" (without a stop), "failed", "canceled", or "unknown".
+        error: Name of the error code, "" for none.
+        source: What the goal was derived from, in words; begins with the topic if it is from a message.
     """
 
     name: str
@@ -135,34 +131,31 @@ class RecordedGoal:
 
 @dataclass(frozen=True, eq=False)
 class RecordedDrive:
-    """Everything that the reconstruction uses of a log.
+    """Everything that the reconstruction uses from a log. Units are m, rad, m/s, and rad/s.
 
     Attributes:
-        name: Name of the log.
         duration: Time in s of the last message.
-        poses: Best known poses of the base in the map frame (x, y, yaw).
-        pose_source: Where `poses` are from, for people.
-        has_independent_poses: Whether `poses` are a ground truth and not the belief of the robot.
-        belief: Poses that the localizer published, with the covariances xx, xy, xyaw, yy, yyaw, yawyaw (n, 9).
-        corrections: Poses of the odom frame in the map frame (n, 3), from /tf.
-        odometry: Poses in the odom frame and velocities vx, vy, wz (n, 6).
+        poses: Best known poses x, y, yaw (n, 3) of the base in the map frame.
+        pose_source: Source of `poses` in words.
+        has_true_poses: Whether `poses` are a ground truth; otherwise they are estimates of the robot.
+        belief: Poses x, y, yaw from the localizer with the covariances xx, xy, xyaw, yy, yyaw, yawyaw (n, 9).
+        corrections: Poses x, y, yaw of the odom frame in the map frame (n, 3), from /tf.
+        odometry: Poses x, y, yaw in the odom frame and velocities vx, vy, wz in the base frame (n, 6).
         commands: Commanded velocities vx, vy, wz (n, 3).
-        turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1), in rad/s.
-        bumper: Whether the bumper is pressed (n, 1).
-        scans: Scans of the first lidar, or None.
-        map: Map of the robot, or None.
+        turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1).
+        bumper: 1 while the bumper is pressed, otherwise 0 (n, 1).
+        scans: Scans of the lidar frame with the most scans; None without scans.
         goals: Goals in the order in which they were sent.
-        result: Final result of the navigation, such as "SUCCEEDED", or "".
-        footprint: Corners of the robot's footprint in the base frame, () if unknown.
-        notes: Remarks for the user.
-        begin: Time in s, since the start of the log, at which the drive starts.
+        footprint: Corners (x, y) of the robot's footprint in the base frame, () if unknown.
+        notes: Sentences about what the log does not show, or how it was read, for the user.
+        begin: Time in s from the start of the log to the start of the drive.
     """
 
     name: str
     duration: float
     poses: TimedValues
     pose_source: str
-    has_independent_poses: bool
+    has_true_poses: bool
     belief: TimedValues = field(default_factory=lambda: no_values(9))
     corrections: TimedValues = field(default_factory=lambda: no_values(3))
     odometry: TimedValues = field(default_factory=lambda: no_values(6))
@@ -172,21 +165,25 @@ class RecordedDrive:
     scans: Scans | None = None
     map: OccupancyGrid | None = None
     goals: tuple[RecordedGoal, ...] = ()
-    result: str = ""
+
     footprint: Polygon = ()
     notes: tuple[str, ...] = ()
     begin: float = 0.0
 
 
 STEP_S = 0.5
-"""Duration of a step."""
+"""Duration of a motion step."""
 MAX_STEP_M = 2.0
-"""Longer steps are jumps of the pose, not motion."""
+"""Steps over which the pose moves farther are left out: the pose has jumped."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionSteps:
-    """Steps of STEP_S that begin at `times` (n,): forward and leftward distance in m, and turn in rad, each (n, 3)."""
+    """Motion in steps of STEP_S that begin at `times` (n,) in s.
+
+    The motion is measured by odometry, true (from the poses of the drive), and commanded. Each is an array (n, 3) of
+    forward distance in m, leftward distance in m, and turn in rad.
+    """
 
     times: Array
     measured: Array
@@ -198,7 +195,7 @@ class MotionSteps:
 
 
 def motion_steps(drive: RecordedDrive) -> MotionSteps:
-    """Return the steps of a drive in which odometry and poses are known."""
+    """Return the motion of a drive in the steps for which the log has odometry and poses."""
     odometry, poses = drive.odometry, drive.poses
     if len(odometry) < 2 or len(poses) < 2:
         return MotionSteps(np.empty(0), *(np.empty((0, 3)) for _ in range(3)))
@@ -216,7 +213,7 @@ def motion_steps(drive: RecordedDrive) -> MotionSteps:
 
 
 def _increments(poses: TimedValues, edges: Array) -> Array:
-    """Return the motion (n - 1, 3) between poses at `edges` (n,), in the frame in the middle of each step."""
+    """Return the motion (n - 1, 3) between the times `edges` (n,), along the mean heading of each step."""
     at = poses.poses_at(edges)
     turn = wrap_array(np.diff(at[:, 2]))
     middle = at[:-1, 2] + turn / 2
@@ -226,7 +223,7 @@ def _increments(poses: TimedValues, edges: Array) -> Array:
 
 
 def _commanded(commands: TimedValues, edges: Array) -> Array:
-    """Return the motion (n - 1, 3) that held commands make between `edges` (n,)."""
+    """Return the motion (n - 1, 3) between the times `edges` (n,) if each command is executed until the next one."""
     if not len(commands):
         return np.zeros((len(edges) - 1, 3))
     fine = np.arange(float(edges[0]), float(edges[-1]) + 1e-9, 0.02)

@@ -1,7 +1,7 @@
-"""What the header of a log of simscen says about the run: names of its world, map, robot, and stack.
+"""Reads from the header of a simscen log which world, robot, and stack the run used.
 
-Events, faults, criteria, and objects of the recorded scenario are not read; the reconstruction finds them in the
-messages, as in the log of a real robot.
+The events, faults, criteria, and objects of the recorded scenario are not read. The reconstruction derives them from
+the messages, as for the log of a real robot.
 """
 
 from __future__ import annotations
@@ -21,22 +21,18 @@ from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log, invalid_log, read_log
 from simscen.sim.body.outline import circle
 
-OBJECT_KEYS = ("objects",)
-"""Keys of an inline world whose contents the reconstruction has to find in the scans."""
-
 
 @dataclass(frozen=True)
 class RunDescription:
-    """Description of the run, empty for logs of real robots.
+    """Description of the run. The defaults are those for logs of real robots.
 
     Attributes:
-        seed: Seed of the run.
-        world: World file, or an inline world without its objects; None if unknown.
+        world: World file, or the data of an inline world without its objects; None if unknown.
         has_map: False if the robot drove without a map.
-        robot: Shipped robot or robot file; None if unknown.
-        stack: Configuration of the stack.
-        others: The other robots of a log with several: names, footprints, times (n,) in s, and true poses (n, 3).
-        root: Folder that the files lie in.
+        robot: Name of a shipped robot, or robot file; None if unknown.
+        other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each
+            robot that is not reconstructed.
+        notes: Remarks for the user about missing files.
     """
 
     seed: int = 1
@@ -44,17 +40,14 @@ class RunDescription:
     has_map: bool = True
     robot: str | Path | None = None
     stack: Mapping[str, Any] = field(default_factory=dict)
-    footprint: Polygon = ()
-    inscribed_radius: float = 0.0
-    others: tuple[tuple[str, Polygon, Array, Array], ...] = ()
-    root: Path | None = None
+    other_robots: tuple[tuple[str, Polygon, Array, Array], ...] = ()
     notes: tuple[str, ...] = ()
 
 
 def choose_robot(log: Path, name: str) -> str:
-    """Return the robot to reconstruct of a log with several robots, by its name; "" for a log with one robot.
+    """Return `name` for a simscen log with several robots, and "" for all other logs.
 
-    Raises InvalidInput if the log has several robots, and none has this name.
+    Raises InvalidInput if the log has several robots, but none with this name.
     """
     robots = () if log.is_dir() else recorded_robots(log)
     if robots and name not in robots:
@@ -64,22 +57,23 @@ def choose_robot(log: Path, name: str) -> str:
 
 
 def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
-    """Return the description in the header of a log. Files that it names are looked up from `root`.
+    """Return the description in the header of a log, or the default one for the log of a real robot.
 
-    Of a log with several robots, `robot` is the one that is described.
+    `root` is the folder from which the recorded scenario was run, to find its files. In a log with several robots,
+    `robot` is the name of the one to describe. Raises InvalidInput if the recorded scenario is no YAML mapping.
     """
     if log.is_dir() or not is_simscen_log(log):
         return RunDescription()
     recorded = read_log(log, partial=True)
     header, written = recorded.header, _scenario(recorded.header.scenario)
     if robot:
-        header, written = header.robots[robot], _of_robot(written, robot)
+        header, written = header.robots[robot], _for_single_robot(written, robot)
         described = _described_run(header, written, root)
-        return replace(described, others=tuple(_others(recorded, robot)))
+        return replace(described, other_robots=tuple(_other_robots(recorded, robot)))
     return _described_run(header, written, root)
 
 
-def _others(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Array]]:
+def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Array]]:
     for name, log in recorded.robots.items():
         if name != robot:
             truth, case = log.trace.truth, log.header.case
@@ -88,6 +82,7 @@ def _others(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Ar
 
 
 def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) -> RunDescription:
+    """Return the description of a run from its log header and the data `written` in its scenario."""
     scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
     world, named = written.get("world"), written.get("robot", {}).get("model", "turtlebot")
@@ -97,39 +92,25 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
             notes.append(f"the world `{world}` of the run is not below {root}; use --root or --world")
         world = file if file.is_file() else None
     elif isinstance(world, Mapping):
-        world = {key: value for key, value in world.items() if key not in OBJECT_KEYS}
-    model: str | Path = named
+        world = {key: value for key, value in world.items() if key != "objects"}
+    model: str | Path | None = named
     if named.endswith((".yaml", ".yml", ".urdf", ".xacro")):
-        model = file = (scenario_folder / named).resolve()
+        file = (scenario_folder / named).resolve()
         if not file.is_file():
             notes.append(f"the robot `{named}` of the run is not below {root}; use --root or --robot")
-            return _described(header, world, None, written, notes)
-    return _described(header, world, model, written, notes)
+        model = file if file.is_file() else None
+    has_map, stack = header.map is not None, written.get("stack", {})
+    return RunDescription(header.seed, world, has_map, model, stack, notes=tuple(notes))
 
 
-def _of_robot(written: Mapping[str, Any], robot: str) -> Mapping[str, Any]:
-    """Return the data of a scenario with several robots as that of a scenario with this robot alone."""
+def _for_single_robot(written: Mapping[str, Any], robot: str) -> Mapping[str, Any]:
+    """Return the data of a scenario with several robots as if it had only this robot."""
     own = written.get("robots", {}).get(robot, {})
     return {**written, "robot": own, "stack": own.get("stack", written.get("stack", {}))}
 
 
-def _described(
-    header: Any, world: Any, robot: str | Path | None, written: Mapping[str, Any], notes: list[str]
-) -> RunDescription:
-    return RunDescription(
-        seed=header.seed,
-        world=world,
-        has_map=header.map is not None,
-        robot=robot,
-        stack=written.get("stack", {}),
-        footprint=header.case.footprint,
-        inscribed_radius=header.case.inscribed_radius,
-        notes=tuple(notes),
-    )
-
-
 def _scenario(text: str) -> Mapping[str, Any]:
-    """Return the data of the recorded scenario."""
+    """Return the data of the recorded scenario from its YAML text."""
     tree, problems = parse_yaml(text, "scenario.yaml")
     if not isinstance(tree, MappingNode):
         raise InvalidInput(problems)

@@ -1,1 +1,1 @@
-"""Estimators of faults: messages, lidar, odometry, gyroscope, commands, and localizer."""
+"""Finds faults in a recorded drive: of message streams, lidar, odometry, gyroscope, commands, and localizer."""

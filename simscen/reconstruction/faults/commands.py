@@ -1,4 +1,4 @@
-"""Faults between command and motion: late or lost commands, weak motors, and lower speed limits."""
+"""Finds faults between commands and motion: late or ignored commands, weak motors, and reduced speed limits."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ from scipy.ndimage import uniform_filter1d
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 SAMPLE_PERIOD_S = 0.025
-"""Period at which commands and odometry are compared."""
+"""Period of the samples at which commands and odometry are compared."""
 MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
 """Largest lag that is searched, and smallest one that is reported."""
 NORMAL_LAG_S = 0.09
-"""Lag of a base without faults, which needs a moment to accelerate."""
+"""Lag of a base without faults, which needs this time to accelerate; subtracted from the reported latency."""
 MIN_COMMAND_M_S = 0.1
-"""Speed above which a command, or a motion, counts as driving."""
-IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
-"""Ratio of driven to commanded speed below which the base ignores a command, for at least this time."""
-KEPT_SHARE, MIN_KEPT_S = 0.5, 0.6
-"""Ratio of commanded to driven speed below which the base should slow down, for longer than braking takes."""
+"""Speed above which a command, or the base, counts as driving."""
+IGNORED_RATIO, MIN_IGNORED_S = 0.1, 0.4
+"""The base ignores a command if it drives at less than this fraction of the commanded speed for at least this time."""
+KEPT_RATIO, MIN_KEPT_S = 0.5, 0.6
+"""The base keeps its speed if the command is below this fraction of it for this time, which is longer than braking."""
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
-"""Time in which a steady command changes by at most this share of its value."""
+"""A command is steady if it changes in this time by at most this fraction of its value."""
 MIN_GAIN_ERROR = 0.08
-"""Smallest difference of a gain from 1 that is reported."""
+"""Smallest deviation of a gain (ratio of driven to commanded speed) from 1 that is reported."""
 MIN_STEADY_SAMPLES = 20
 """Number of samples with a steady command that the estimate of a speed limit or a gain needs."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
-"""Difference of the gains of both sides, and share of the motion that they do not explain, for a fault of one side."""
+"""Smallest reported difference between the gains of both sides, and largest fraction of squared speed they may miss."""
 MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
-"""Difference between commanded and driven speed above which the base is limited, and largest standard deviation of the
-speeds at one limit."""
+"""Deficit to the commanded speed above which a limit may act, and largest standard deviation of speeds at a limit."""
 SMOOTHING_S = 0.5
-"""Time over which the noise of the odometry is averaged."""
+"""Time over which speeds are averaged to reduce the noise of the odometry."""
 MIN_LIMIT_FALL_M_S = 0.05
-"""Decrease of a speed limit during the drive above which it is a low battery."""
+"""Decrease of the speed limit during the drive above which it is reported as a low battery."""
 MIN_ERROR_DECREASE = 0.02
-"""Decrease of the mean squared error, in squared standard deviations of the command, that shows a lag."""
+"""A lag exists if it reduces the mean squared difference between command and motion by more than this. The velocities
+are divided by the standard deviation of the command."""
 MIN_COMMAND_STD = 0.05
-"""Standard deviation of a commanded velocity, in m/s or rad/s, below which its changes say nothing about the lag."""
+"""Standard deviation of a commanded velocity, in m/s or rad/s, below which the lag cannot be estimated from it."""
 
 
-def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[FoundFault]:
+def command_faults(drive: RecordedDrive, wheel_separation: float = 0.0) -> Iterator[FoundFault]:
     """Yield the faults of the commands and of the base that executes them.
 
-    `separation` is the distance of the wheels in m, 0 for a base without sides.
+    `wheel_separation` is the distance in m between left and right wheels; 0 if the sides cannot be told apart.
     """
     times, commanded, driven = _speeds(drive)
     if len(times) < 80:
@@ -57,9 +57,7 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
     if lag >= MIN_LAG_S:
         text = f"the base follows its commands {lag:.2f} s late"
         values = {"latency": f"{1000 * (lag - NORMAL_LAG_S):.0f} ms"}
-        yield FoundFault(
-            "cmd_vel", "delay", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium")
-        )
+        yield FoundFault("cmd_vel", "delay", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
     shift = round(lag / SAMPLE_PERIOD_S)
     if shift:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
@@ -67,14 +65,14 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
     yield from ignored
     if ignored:
         return
-    sides = [*_side_gains(times, commanded, driven, separation)]
+    sides = [*_side_gains(times, commanded, driven, wheel_separation)]
     yield from sides
     if not sides:
         yield from _limits(times, commanded, driven)
 
 
 def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
-    """Return times (n,) with commanded and driven velocities vx, wz (n, 2)."""
+    """Return times (n,), commanded velocities vx, wz (n, 2), and driven velocities vx, wz (n, 2)."""
     commands, odometry = drive.commands, drive.odometry
     if len(commands) < 2 or len(odometry) < 2:
         return np.empty(0), np.empty((0, 2)), np.empty((0, 2))
@@ -87,13 +85,13 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _averaged(speeds: Array) -> Array:
-    """Return speeds (n,) without the noise of the odometry."""
+    """Return the moving average of speeds (n,) over SMOOTHING_S."""
     result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
     return result
 
 
 def _lag(commanded: Array, driven: Array) -> float:
-    """Return the lag in s with which the driven velocity follows the command best."""
+    """Return the lag in s of the driven velocities (n, 2) behind the commanded ones; 0 if none can be shown."""
     best, lag, error_without_lag = -np.inf, 0, -np.inf
     varies = np.std(commanded, axis=0) >= MIN_COMMAND_STD
     if not varies.any():
@@ -110,34 +108,34 @@ def _lag(commanded: Array, driven: Array) -> float:
 
 
 def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
-    """Return the times in which the base stood although it was commanded to drive."""
+    """Return a fault for each time in which the base stood although it was commanded to drive."""
     stands = (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S) & (
-        np.abs(driven[:, 0]) < IGNORED_SHARE * np.abs(commanded[:, 0])
+        np.abs(driven[:, 0]) < IGNORED_RATIO * np.abs(commanded[:, 0])
     )
     found = []
     for window in windows(stands, times, MIN_IGNORED_S, 0.1):
-        evidence = Evidence("the base stands although it is commanded to drive", window.begin, window.end, "medium")
-        found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, evidence))
+        reason = Reason("the base stands although it is commanded to drive", window.begin, window.end, "medium")
+        found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, reason))
     return found
 
 
 def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield the times in which the base kept its speed although it was commanded to stop."""
+    """Yield a fault for each time in which the base kept its speed although it was commanded to slow down."""
     speed = _averaged(driven[:, 0])
-    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_SHARE * np.abs(speed))
+    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_RATIO * np.abs(speed))
     for window in windows(keeps, times, MIN_KEPT_S, 0.1):
         if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
             text = "the base keeps its speed although it is commanded to stop"
-            evidence = Evidence(text, window.begin, window.end, "medium")
+            reason = Reason(text, window.begin, window.end, "medium")
             begin = max(0.0, window.begin - STEADY_S)
-            yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, evidence)
+            yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, reason)
 
 
-def _side_gains(times: Array, commanded: Array, driven: Array, separation: float) -> Iterator[FoundFault]:
-    """Yield the fault that the wheels of one side drive another share of their commands than those of the other."""
-    if separation <= 0.0:
+def _side_gains(times: Array, commanded: Array, driven: Array, wheel_separation: float) -> Iterator[FoundFault]:
+    """Yield the fault that left and right wheels drive at different fractions of their commanded speeds."""
+    if wheel_separation <= 0.0:
         return
-    half = separation / 2
+    half = wheel_separation / 2
     gains, remaining = [], []
     for side in (-half, half):
         command, speed = (_averaged(motion[:, 0] + side * motion[:, 1]) for motion in (commanded, driven))
@@ -148,12 +146,12 @@ def _side_gains(times: Array, commanded: Array, driven: Array, separation: float
         return
     left, right = (f"{100 * gain:.0f} %" for gain in gains)
     text = f"the left wheels drive {left} and the right ones {right} of their commands"
-    evidence = Evidence(text, float(times[0]), float(times[-1]), "medium")
-    yield FoundFault("wheels", "gain", {"left": left, "right": right}, evidence=evidence)
+    reason = Reason(text, float(times[0]), float(times[-1]), "medium")
+    yield FoundFault("wheels", "gain", {"left": left, "right": right}, reason=reason)
 
 
 def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield a lower maximum speed, or a constant ratio between driven and commanded speed."""
+    """Yield a falling speed limit, a constant speed limit, or a gain of the speed; at most one of them."""
     steady = _steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
     if int(steady.sum()) < MIN_STEADY_SAMPLES:
         return
@@ -162,12 +160,12 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
     slow = command - speed > MIN_SHORTFALL_M_S
     if slow.mean() < 0.2:
         return
-    evidence_times = float(at[slow][0]), float(at[slow][-1])
+    reason_times = float(at[slow][0]), float(at[slow][-1])
     start, end, drain, spread = _falling_limit(at[slow], speed[slow])
     if start - end > MIN_LIMIT_FALL_M_S and spread < MAX_LIMIT_SPREAD_M_S:
         values = {"start": f"{start:.2f} m/s", "end": f"{max(end, 0.01):.2f} m/s", "drain": f"{drain:.0f} s"}
         text = f"the speed falls from {start:.2f} to {end:.2f} m/s although more is commanded"
-        yield FoundFault("cmd_vel", "low_battery", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "low_battery", values, reason=Reason(text, *reason_times, "medium"))
         return
     cap = float(np.median(speed[slow]))
     below = (command < cap) & ~slow
@@ -176,16 +174,19 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
     ):
         text = f"the robot drives at most {cap:.2f} m/s although more is commanded"
         values = {"linear": f"{cap:.2f} m/s"}
-        yield FoundFault("cmd_vel", "saturation", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "saturation", values, reason=Reason(text, *reason_times, "medium"))
     elif abs(float(np.median(ratio)) - 1.0) > MIN_GAIN_ERROR:
         gain = float(np.median(ratio))
         text = f"the robot drives {100 * gain:.0f} % of the commanded speed"
         values = {"linear": f"{100 * gain:.0f} %"}
-        yield FoundFault("cmd_vel", "gain", values, evidence=Evidence(text, *evidence_times, "medium"))
+        yield FoundFault("cmd_vel", "gain", values, reason=Reason(text, *reason_times, "medium"))
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
-    """Return the speed at time 0 and in the end, the time until then, and the spread about a limit that falls so."""
+    """Fit a limit that falls linearly and then is constant to `speeds` (n,) at `times` (n,).
+
+    Return the limit at time 0, the final limit, the time from which on it is constant, and the standard deviation.
+    """
     best = (0.0, 0.0, 0.0, math.inf)
     for drain in np.linspace(times[0], times[-1], 25)[4:].tolist():
         share = np.minimum(times, drain) / drain
@@ -198,7 +199,7 @@ def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, fl
 
 
 def _steady(commanded: Array) -> Mask:
-    """Return when the commanded speed has hardly changed for STEADY_S."""
+    """Return at which samples (n,) the commanded speed has hardly changed for STEADY_S."""
     count = round(STEADY_S / SAMPLE_PERIOD_S)
     speed = np.abs(commanded[:, 0])
     steady = np.zeros(len(speed), dtype=bool)

@@ -1,4 +1,4 @@
-"""Beams that end too early or pass through walls: dust, ghosts that move with the lidar, and glass."""
+"""Finds lidar faults from beams that end too early (dust, ghosts) or pass through walls (glass)."""
 
 from __future__ import annotations
 
@@ -8,51 +8,56 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Solid
+from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Mask
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 from simscen.reconstruction.faults.lidar_readings import (
     MIN_SECTOR_BEAMS,
     MIN_WINDOW_S,
-    fault_in_window,
     invalid_scans,
+    lidar_fault_in_window,
     mask_runs,
     usable_windows,
 )
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings, beam_ends
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
+from simscen.reconstruction.static_world import StaticWorld, beam_ends
 from simscen.worlds.geometry.triangulation import merge_solids
 
-MIN_FALSE_SHARE = 0.015
-"""Share of isolated beams in a scan above which there is dust."""
+MIN_FALSE_FRACTION = 0.015
+"""Fraction of isolated beams in a scan above which the scan shows dust."""
 JUMP_M = 0.3
-"""Difference in range from which on two neighbor beams ended at different things."""
+"""If the ranges of neighbor beams differ by at least this, the beams end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""Number of beams beside a ghost that must not show it, and difference of the ranges of one object."""
-MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
-"""Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
-and distance in m that the lidar must move meanwhile."""
+"""A ghost is not visible this many beams beside its own. Ranges that differ by less than this show the same object."""
+MIN_GHOST_FRACTION, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
+"""Limits of a ghost: fraction of the scans that show it between its first and its last scan; spread (median deviation)
+of its range in m, or in standard deviations of the noise if that is larger; and distance that the lidar must move."""
 MIN_GHOST_S = 2.0
 """Time for which a ghost must be seen."""
 
 
-def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
-    """Yield dust: single beams that end in free space; and ghosts: objects that move with the lidar."""
-    usable = ~invalid_scans(model)
-    isolated = isolated_returns(model)
-    for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_SHARE, usable, model):
+def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
+    """Yield dust (single beams that end in free space) and ghosts (objects that move with the lidar).
+
+    `end` is the end of the drive in s.
+    """
+    usable = ~invalid_scans(compared)
+    isolated = isolated_returns(compared)
+    for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
         rows = usable[window.samples]
-        ranges = np.where(model.is_hit, model.scans.ranges, np.minimum(model.expected, model.scans.range_max))
+        ranges = np.where(
+            compared.is_hit, compared.scans.ranges, np.minimum(compared.expected, compared.scans.range_max)
+        )
         travelled = ranges[window.samples][rows]
         count = int(isolated[window.samples][rows].sum())
         if count < 20:
             continue
         length = float(np.nansum(np.where(np.isfinite(travelled), travelled, 0.0))) / count
         text = f"{count} single beams end in free space"
-        yield fault_in_window("dust", {"mean_free_path": f"{length:.0f} m"}, window, model, end, text)
-    for first, last, distance in ghost_beams(model):
-        angles = np.degrees(model.scans.angles)
+        yield lidar_fault_in_window("dust", {"mean_free_path": f"{length:.0f} m"}, window, compared, end, text)
+    for first, last, distance in ghost_beams(compared):
+        angles = np.degrees(compared.scans.angles)
         center, width = (angles[first] + angles[last]) / 2, angles[last] - angles[first] + 1.0
-        share = float(model.is_short[usable][:, first : last + 1].mean())
+        share = float(compared.is_short[usable][:, first : last + 1].mean())
         values = {
             "range": f"{distance:.2f} m",
             "direction": f"{center:.0f} deg",
@@ -60,33 +65,30 @@ def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
             "probability": f"{100 * share:.0f} %",
         }
         text = f"something {distance:.2f} m away moves with the lidar"
-        shown = model.is_short[:, first : last + 1].mean(axis=1) > 0.3
-        for window in windows(shown & usable, model.scans.times, MIN_WINDOW_S, 2.0):
-            yield fault_in_window("ghost", values, window, model, end, text)
+        shown = compared.is_short[:, first : last + 1].mean(axis=1) > 0.3
+        for window in windows(shown & usable, compared.scans.times, MIN_WINDOW_S, 2.0):
+            yield lidar_fault_in_window("ghost", values, window, compared, end, text)
             break
 
 
-def isolated_returns(model: ScanModel) -> Mask:
-    """Return the beams (n, beams) that end before the world, and not where their neighbors end."""
-    ranges = np.where(model.is_hit, model.scans.ranges, np.inf)
+def isolated_returns(compared: ComparedScans) -> Mask:
+    """Return which beams (n, beams) end before the static world, but not near the ends of their neighbor beams."""
+    ranges = np.where(compared.is_hit, compared.scans.ranges, np.inf)
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(ranges, axis=1))
     apart = np.ones((len(ranges), ranges.shape[1] + 1), dtype=bool)
     apart[:, 1:-1] = ~(steps < JUMP_M)
-    result: Mask = model.is_short & apart[:, 1:] & apart[:, :-1]
+    result: Mask = compared.is_short & apart[:, 1:] & apart[:, :-1]
     return result
 
 
-def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
-    """Return first and last beam and the range of objects that are fixed in the frame of the lidar.
-
-    The robot must have driven while they were seen, so that nothing that stands in the world looks like this.
-    """
-    if float(np.hypot(*np.ptp(model.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
+def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
+    """Return first beam, last beam, and range in m of each object that moves with the lidar while the robot drives."""
+    if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
-    short = model.is_short & ~invalid_scans(model)[:, None]
+    short = compared.is_short & ~invalid_scans(compared)[:, None]
     seen = short.sum(axis=0)
-    ranges = np.where(short, model.scans.ranges, np.nan)
+    ranges = np.where(short, compared.scans.ranges, np.nan)
     center, spread = np.full(len(seen), np.nan), np.full(len(seen), np.inf)
     chosen = seen >= max(5, 0.1 * len(short))
     if chosen.any():
@@ -95,20 +97,21 @@ def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
     moved = np.zeros(len(seen), dtype=bool)
     for beam in np.flatnonzero(chosen).tolist():
         rows = short[:, beam] & (np.abs(ranges[:, beam] - center[beam]) < 2 * MAX_GHOST_SPREAD_M)
-        long = bool(rows.any()) and float(np.ptp(model.scans.times[rows])) > MIN_GHOST_S
-        moved[beam] = long and float(np.hypot(*np.ptp(model.poses[rows, :2], axis=0))) > MIN_DRIVEN_M
+        long = bool(rows.any()) and float(np.ptp(compared.scans.times[rows])) > MIN_GHOST_S
+        moved[beam] = long and float(np.hypot(*np.ptp(compared.poses[rows, :2], axis=0))) > MIN_DRIVEN_M
     first, last = np.argmax(short, axis=0), len(short) - 1 - np.argmax(short[::-1], axis=0)
     share = seen / np.maximum(last - first + 1, 1)
-    limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(model.noise)))
-    fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_SHARE)
+    limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(compared.noise)))
+    fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_FRACTION)
     ghosts = [(a, b, float(np.median(center[a : b + 1]))) for a, b in mask_runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]
     return [(a, b, distance) for a, b, distance in ghosts if not _is_wider(ranges, a, b, distance)]
 
 
 def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
-    """Return whether beams beside a sector usually show the same distance, as of an object that only passes by.
+    """Return whether the object in a sector usually continues beside it, as an object does that only passes by.
 
-    `ranges` (n, beams) are those of beams that end before the world, nan for others.
+    `ranges` (n, beams) are nan for beams that do not end before the static world. The sector reaches from the beam
+    `first` to the beam `last`, and the object is at the range `distance` in m.
     """
     with np.errstate(invalid="ignore"):
         same = np.abs(ranges - distance) < SAME_OBJECT_M
@@ -117,30 +120,27 @@ def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
     return any(float(same[rows, beam].mean()) > 0.5 for beam in beside) if rows.any() else False
 
 
-MIN_PASSING_SHARE, MIN_PASSING_BEAMS = 0.3, 30
-"""Share and number of beams through a wall from which on it counts as transparent."""
+MIN_PASSING_FRACTION, MIN_PASSING_BEAMS = 0.3, 30
+"""A wall is transparent if more than this fraction of its beams, and at least this number of beams, pass through it."""
 MAX_SURFACE_DISTANCE_M = 0.05
-"""Distance from a solid within which an expected beam ends at it."""
+"""A beam is expected to end at a solid if its expected end is at most this far from the solid."""
 
 
-def glass_fault(model: ScanModel, world: Surroundings, usable: Mask) -> FoundFault | None:
-    """Return the fault of beams that pass through named walls and obstacles of the world, if there is one."""
+def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> FoundFault | None:
+    """Return the fault that beams of `usable` scans (n,) pass through named walls or obstacles; None if they do not."""
     rows = np.flatnonzero(usable)
     # A beam without any return may have been lost; only one that ends behind the wall has passed through it.
-    through = model.passes_through[rows] & model.is_hit[rows]
+    through = compared.passes_through[rows] & compared.is_hit[rows]
     if int(through.sum()) < MIN_PASSING_BEAMS:
         return None
-    ends = beam_ends(model.poses[rows], model.scans.angles, model.expected[rows])
-    decided = through | model.is_explained[rows]
-    points, passed = (
-        ends[decided & np.isfinite(model.expected[rows])],
-        through[decided & np.isfinite(model.expected[rows])],
-    )
-    shares = _shares(world.world.solids, points, passed)
+    ends = beam_ends(compared.poses[rows], compared.scans.angles, compared.expected[rows])
+    decided = through | compared.is_explained[rows]
+    decided &= np.isfinite(compared.expected[rows])
+    shares = _passing_fractions(world.world.solids, ends[decided], through[decided])
     names = [
         name
         for name, (count, share) in shares.items()
-        if share > MIN_PASSING_SHARE and count * share >= MIN_PASSING_BEAMS
+        if share > MIN_PASSING_FRACTION and count * share >= MIN_PASSING_BEAMS
     ]
     if not names:
         return None
@@ -148,12 +148,15 @@ def glass_fault(model: ScanModel, world: Surroundings, usable: Mask) -> FoundFau
     share = sum(shares[name][0] * shares[name][1] for name in names) / total
     text = f"{100 * share:.0f} % of {total} beams pass through {' and '.join(names)}"
     values = {"of": names, "probability": f"{100 * share:.0f} %"}
-    times = model.scans.times[rows][through.any(axis=1)]
-    return FoundFault("lidar", "glass", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium"))
+    times = compared.scans.times[rows][through.any(axis=1)]
+    return FoundFault("lidar", "glass", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
 
 
-def _shares(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str, tuple[int, float]]:
-    """Return for each named solid how many expected beam ends it has, and which share of the beams passes through."""
+def _passing_fractions(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str, tuple[int, float]]:
+    """Return by name of the solid how many beams should end at it, and which fraction of them passes through it.
+
+    `points` (n, 2) are the expected ends of beams in the map frame, and `passed` (n,) tells which of them pass.
+    """
     counts: dict[str, list[int]] = {}
     for solid in solids:
         if not solid.name or solid.name == "map":
@@ -166,7 +169,7 @@ def _shares(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str,
 
 
 def _near(solid: Solid, points: Array) -> Mask:
-    """Return which points (n, 2) are within MAX_SURFACE_DISTANCE_M of the convex hull of a solid, seen from above."""
+    """Return which points (n, 2) are in or near the convex hull of a solid, seen from above."""
     from scipy.spatial import ConvexHull
 
     corners = merge_solids((solid,)).vertices[:, :2]

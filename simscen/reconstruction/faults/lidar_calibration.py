@@ -1,6 +1,6 @@
-"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a scale, or a drift of its ranges.
+"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a wrong scale, or a drift of its ranges.
 
-The errors follow from the differences between its ranges and those expected in the static world.
+The errors are computed from the differences between measured ranges and the ranges expected in the static world.
 """
 
 from __future__ import annotations
@@ -12,45 +12,49 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.compared_scans import ComparedScans
+from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
-MAX_SCANS = 40
-"""Number of scans, evenly spread over the drive, that are compared."""
+TARGET_SCANS = 40
+"""The scans are thinned out evenly to at least this number, and less than twice as many."""
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
-"""Steps of the numerical derivatives."""
+"""Changes of the mount from which the numerical derivatives of the ranges are computed."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
 """Yaw errors of the mount that are tried as starting points of the estimate."""
 MAX_MISFIT_RATIO = 0.7
-"""The estimate starts at a yaw error only if the median difference of the ranges is below this fraction of that at the
-nominal mount."""
+"""The best tried yaw error is the starting point only if its median range difference is less than this fraction of that
+at the nominal mount; otherwise the nominal mount is the starting point."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Difference from the expected range above which a beam is ignored; halved with each step, down to 0.1 m."""
+"""Beams with a larger difference from the expected range are ignored. The limit of the mount is halved with each
+Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
-"""Number of beams that the estimate needs."""
+"""Smallest number of beams from which the mount is estimated."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
 """Smallest error of a mount that is reported. Smaller ones may be errors of the recorded poses or of the walls."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
-"""Smallest bias, difference of the scale from 1, and drift of ranges that are reported."""
+"""Smallest bias of the ranges, deviation of their scale from 1, and drift that are reported."""
 
 
-def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
-    """Return the true pose of the lidar in the frame of its nominal mount (Gauss-Newton on range differences)."""
-    step = max(1, len(model.scans) // MAX_SCANS)
-    chosen = np.flatnonzero(~model.scans.malformed)[::step]
+def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
+    """Return the true pose of the lidar relative to its nominal mount, by Gauss-Newton steps on the range differences.
+
+    It is the identity if too few beams hit the static world.
+    """
+    step = max(1, len(compared.scans) // TARGET_SCANS)
+    chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
     error = Pose2(0.0, 0.0, 0.0)
     if not len(chosen):
         return error
-    ranges, angles, reach = model.scans.ranges[chosen], model.scans.angles, model.scans.range_max
-    hit = model.is_hit[chosen]
+    ranges, angles, reach = compared.scans.ranges[chosen], compared.scans.angles, compared.scans.range_max
+    hit = compared.is_hit[chosen]
     if int(hit.sum()) < MIN_BEAMS:
         return error
 
     def differences(offset: Pose2) -> Array:
-        return ranges - world.ranges_from(_shifted(model.poses[chosen], offset), angles, reach)
+        return ranges - world.ranges_from(offset_poses(compared.poses[chosen], offset), angles, reach)
 
     with np.errstate(invalid="ignore"):
         misfit = {
@@ -83,16 +87,12 @@ def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
     return error
 
 
-def _shifted(poses: Array, offset: Pose2) -> Array:
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x = poses[:, 0] + c * offset.x - s * offset.y
-    y = poses[:, 1] + s * offset.x + c * offset.y
-    return np.column_stack((x, y, poses[:, 2] + offset.yaw))
+def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | None:
+    """Return the fault that the lidar has another pose on the robot than its mount; None if the error is small.
 
-
-def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
-    """Return the fault of a lidar that is not where its mount says, or None. The poses must be ground truth."""
-    error = mount_error(model, world)
+    The poses of the drive must be a ground truth.
+    """
+    error = mount_error(compared, world)
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
         return None
@@ -103,38 +103,38 @@ def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
         values["yaw"] = f"{math.degrees(error.yaw):.1f} deg"
     turned = math.degrees(error.yaw)
     text = f"the scans fit the walls if the lidar is turned by {turned:.1f} deg and shifted by {shift:.2f} m"
-    return FoundFault("lidar", "extrinsic", values, evidence=Evidence(text, None, None, "medium"))
+    return FoundFault("lidar", "extrinsic", values, reason=Reason(text, None, None, "medium"))
 
 
-def with_corrected_mount(model: ScanModel, world: Surroundings) -> ScanModel:
-    """Return the model with the lidar moved to its estimated true pose, at which its scans fit the walls."""
-    error = mount_error(model, world)
-    poses = _shifted(model.poses, error)
-    expected = world.ranges_from(poses, model.scans.angles, model.scans.range_max)
-    return replace(model, poses=poses, expected=expected)
+def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> ComparedScans:
+    """Return the scans compared again, with the lidar at its estimated true pose on the robot."""
+    error = mount_error(compared, world)
+    poses = offset_poses(compared.poses, error)
+    expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
+    return replace(compared, poses=poses, expected=expected)
 
 
-def range_error_faults(model: ScanModel) -> Iterator[FoundFault]:
-    """Yield a constant error, a wrong scale, or a drift of all ranges."""
-    residuals = np.where(np.abs(np.nan_to_num(model.residuals, nan=9.0)) < OUTLIER_M, model.residuals, np.nan)
+def range_error_faults(compared: ComparedScans) -> Iterator[FoundFault]:
+    """Yield the fault of a drift, a wrong scale, or a constant error (bias) of all ranges; at most one of them."""
+    residuals = np.where(np.abs(np.nan_to_num(compared.residuals, nan=9.0)) < OUTLIER_M, compared.residuals, np.nan)
     rows = np.isfinite(residuals).sum(axis=1) >= 20
     if int(rows.sum()) < 10:
         return
-    medians, times = np.nanmedian(residuals[rows], axis=1), model.scans.times[rows]
+    medians, times = np.nanmedian(residuals[rows], axis=1), compared.scans.times[rows]
     slope, start = np.polyfit(times - times[0], medians, 1).tolist()
     grown = slope * float(times[-1] - times[0])
     if abs(slope) > MIN_DRIFT_M_S and abs(grown) > 2 * MIN_BIAS_M and abs(grown) > 2 * abs(start):
         text = f"the ranges drift by {100 * grown:.1f} cm during the drive"
         values = {"range": f"{100 * slope:.2f} cm/s"}
-        yield FoundFault("lidar", "drift", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium"))
+        yield FoundFault("lidar", "drift", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
         return
     finite = np.isfinite(residuals)
-    expected, errors = model.expected[finite], residuals[finite]
+    expected, errors = compared.expected[finite], residuals[finite]
     scale, bias = np.polyfit(expected, errors, 1).tolist()
     if abs(scale) > MIN_SCALE_ERROR and abs(scale * float(np.mean(expected))) > abs(bias):
         text = f"ranges are {100 * (1 + scale):.1f} % of the distances"
-        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, evidence=Evidence(text))
+        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, reason=Reason(text))
     elif abs(float(np.median(errors))) > MIN_BIAS_M:
         bias = float(np.median(errors))
         text = f"ranges differ from the distances by {100 * bias:.1f} cm"
-        yield FoundFault("lidar", "bias", {"range": f"{100 * bias:.1f} cm"}, evidence=Evidence(text))
+        yield FoundFault("lidar", "bias", {"range": f"{100 * bias:.1f} cm"}, reason=Reason(text))

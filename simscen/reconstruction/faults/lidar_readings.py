@@ -1,4 +1,7 @@
-"""Faults in the contents of scans: invalid scans, missing beams, a limited range, rain, and noise."""
+"""Finds lidar faults from the ranges in the scans: invalid scans, missing beams, a limited range, rain, and noise.
+
+In all functions, `end` is the end of the drive in s.
+"""
 
 from __future__ import annotations
 
@@ -9,52 +12,54 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Mask
-from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
-from simscen.reconstruction.scan_model import ScanModel
+from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
-LIDAR = "lidar"
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
-"""Additional noise that is reported: at least this in m, and this multiple of the nominal noise."""
+"""Noise is reported if it exceeds the nominal noise by more than this distance, and this multiple of nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""Factor of the noise, and additional noise in m, that is reported if the noise of the lidar is known."""
+"""If the noise of the lidar is known, noise is reported above this multiple of it that exceeds it by this distance."""
 MIN_NOISE_S = 2.0
 """Shortest time with additional noise that is reported."""
 MIN_INVALID_SCANS = 2
-"""Number of invalid scans from which on they are reported."""
-MAX_INVALID_HIT_SHARE, MIN_EXPECTED_HIT_SHARE = 0.1, 0.3
-"""A scan is invalid if a smaller share of its beams than the first hits something, and a larger share than the second
+"""Smallest number of invalid scans that is reported."""
+MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
+"""A scan is invalid if less than the first fraction of its beams hits anything, although more than the second fraction
 should hit the static world."""
-MIN_NAN_SHARE = 0.03
-"""Share of beams without a return above which beams are missing."""
-BLIND_SHARE = 0.95
-"""Share of the scans in which a beam of a blind sector returns nothing."""
+MIN_NAN_FRACTION = 0.03
+"""Fraction of nan ranges in a scan above which beams are missing."""
+BLIND_FRACTION = 0.95
+"""A beam is blind if it returns nan in more than this fraction of the scans."""
 MIN_SECTOR_BEAMS = 3
-"""Number of neighboring beams that form a sector."""
-MIN_MISSING_SHARE, MAX_NEAR_SHARE = 0.03, 0.1
-"""Share of beams that miss the static world above which the range is limited, and largest share of these beams whose
-range is below the limit."""
+"""Smallest number of neighboring beams that form a sector."""
+MIN_MISSING_FRACTION, MAX_NEAR_FRACTION = 0.03, 0.1
+"""The range may be limited if more than the first fraction of beams returns nothing where the static world is in range.
+At most the second fraction of these beams may have an expected range below the limit."""
 MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
-"""Shortest time of a fault, and longest interruption within it."""
+"""Shortest duration of a fault, and longest interruption within it."""
 RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
-"""Model of the fault `rain` (Goodin et al., 2019): extinction α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)²."""
+"""Model of the fault `rain` (Goodin et al., 2019) for the rain rate R in mm/h and the range z in m: extinction
+α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)² m."""
 WHITE_REFLECTIVITY = 0.9
 """Reflectivity of a surface that the lidar just detects at its maximum range in clear air, as in the fault `rain`."""
 HEAVY_RAIN_MM_H = 25.0
 """Largest rain rate that is reported."""
 
 
-def invalid_scans(model: ScanModel) -> Mask:
-    """Return which scans (n,) are meaningless: of the wrong length, or with hardly a valid range."""
-    hits = model.is_hit.mean(axis=1)
-    expected = np.isfinite(model.expected).mean(axis=1)
-    result: Mask = model.scans.malformed | ((hits < MAX_INVALID_HIT_SHARE) & (expected > MIN_EXPECTED_HIT_SHARE))
+def invalid_scans(compared: ComparedScans) -> Mask:
+    """Return which scans (n,) are invalid: they have the wrong number of beams, or hardly any valid range."""
+    hits = compared.is_hit.mean(axis=1)
+    expected = np.isfinite(compared.expected).mean(axis=1)
+    result: Mask = compared.scans.is_malformed | (
+        (hits < MAX_INVALID_HIT_FRACTION) & (expected > MIN_EXPECTED_HIT_FRACTION)
+    )
     return result
 
 
-def invalid_scan_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
-    """Yield the fault of invalid scans among valid ones, or of a time with invalid scans alone."""
-    invalid, times = invalid_scans(model), model.scans.times
+def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
+    """Yield at most one fault that covers all invalid scans, with the probability of an invalid scan in its time."""
+    invalid, times = invalid_scans(compared), compared.scans.times
     if int(invalid.sum()) < MIN_INVALID_SCANS:
         return
     indices = np.flatnonzero(invalid)
@@ -63,20 +68,20 @@ def invalid_scan_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
     whole = times[last] - times[first] > 0.6 * end
     share = float(invalid.mean()) if whole else share
     values: dict[str, object] = {}
-    kinds = {_content(model, index) for index in indices.tolist()}
+    kinds = {_content(compared, index) for index in indices.tolist()}
     if len(kinds) == 1:
         values["value"] = kinds.pop()
     if share < 0.9:
         values["probability"] = f"{100 * share:.0f} %"
-    begin, length = float(times[first]), float(times[last] - times[first]) + model.scans.period
-    evidence = Evidence(f"{len(indices)} scans have no valid ranges", begin, float(times[last]))
-    yield FoundFault(LIDAR, "garbage", values, None if whole else begin, None if whole else length, evidence)
+    begin, length = float(times[first]), float(times[last] - times[first]) + compared.scans.period
+    reason = Reason(f"{len(indices)} scans have no valid ranges", begin, float(times[last]))
+    yield FoundFault("lidar", "garbage", values, None if whole else begin, None if whole else length, reason)
 
 
-def _content(model: ScanModel, index: int) -> str:
-    """Return the name of the content of an invalid scan."""
-    ranges = model.scans.ranges[index]
-    if model.scans.malformed[index]:
+def _content(compared: ComparedScans, index: int) -> str:
+    """Return the content of the invalid scan `index` as a value of the fault `garbage`, such as "nan" or "short"."""
+    ranges = compared.scans.ranges[index]
+    if compared.scans.is_malformed[index]:
         return "short"
     if np.isnan(ranges).all():
         return "nan"
@@ -87,34 +92,36 @@ def _content(model: ScanModel, index: int) -> str:
     return "zero" if (ranges == 0).all() else "huge"
 
 
-def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
-    """Yield the faults of beams that return nan: blind sectors, and beams that are lost at random."""
-    usable = ~invalid_scans(model)
-    missing = np.isnan(model.scans.ranges)
+def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
+    """Yield faults of beams that return nan: blind sectors, and beams that are lost at random."""
+    usable = ~invalid_scans(compared)
+    missing = np.isnan(compared.scans.ranges)
     blind = np.zeros(missing.shape[1], dtype=bool)
-    for window in usable_windows(missing.mean(axis=1) > MIN_NAN_SHARE, usable, model):
+    for window in usable_windows(missing.mean(axis=1) > MIN_NAN_FRACTION, usable, compared):
         chosen = missing[window.samples][usable[window.samples]]
-        always = chosen.mean(axis=0) > BLIND_SHARE
-        if always.mean() < BLIND_SHARE and (
+        always = chosen.mean(axis=0) > BLIND_FRACTION
+        if always.mean() < BLIND_FRACTION and (
             runs := [run for run in mask_runs(always) if run[1] - run[0] + 1 >= MIN_SECTOR_BEAMS]
         ):
             for first, last in runs:
                 blind[first : last + 1] = True
-                begin, stop = blind_sector(model.scans.angles, first, last)
+                begin, stop = blind_sector(compared.scans.angles, first, last)
                 values = {"from": f"{begin} deg", "to": f"{stop} deg"}
                 if last >= len(blind):  # across the seam of a full circle
                     continue
                 text = f"the beams from {begin} to {stop} deg return nothing"
-                yield fault_in_window("sector", values, window, model, end, text)
+                yield lidar_fault_in_window("sector", values, window, compared, end, text)
         others = chosen[:, ~blind]
         share = float(others.mean()) if others.size else 0.0
-        if share > MIN_NAN_SHARE:
+        if share > MIN_NAN_FRACTION:
             text = f"{100 * share:.0f} % of the beams return nothing"
-            yield fault_in_window("beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, model, end, text)
+            yield lidar_fault_in_window(
+                "beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, compared, end, text
+            )
 
 
 def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
-    """Return the directions of two beams in degrees, with as many decimals as tell neighboring beams apart."""
+    """Return the directions of the beams `first` and `last` in degrees, rounded so that neighbor beams still differ."""
     spacing = float(np.degrees(abs(angles[1] - angles[0])))
     decimals = max(0, math.ceil(-math.log10(spacing)))
     begin, end = (f"{math.degrees(angles[index]):.{decimals}f}" for index in (first, last))
@@ -122,42 +129,45 @@ def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
 
 
 def mask_runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last index of the runs in which a mask (n,) holds."""
+    """Return the first and last index of each run of true values in a mask (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def range_faults(model: ScanModel, end: float, nominal_noise: float) -> Iterator[FoundFault]:
-    """Yield the fault that far objects return nothing: a range limit or, with noise that grows with range, rain."""
-    usable = ~invalid_scans(model)
-    near = np.isfinite(model.expected) & (model.expected < 0.97 * model.scans.range_max)
-    lost = model.is_missing & near
-    for window in usable_windows(lost.mean(axis=1) > MIN_MISSING_SHARE, usable, model):
+def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> Iterator[FoundFault]:
+    """Yield faults that far objects return nothing: rain if there is more than the nominal noise in m, else a limit."""
+    usable = ~invalid_scans(compared)
+    near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)
+    lost = compared.is_missing & near
+    for window in usable_windows(lost.mean(axis=1) > MIN_MISSING_FRACTION, usable, compared):
         rows = np.zeros(len(usable), dtype=bool)
         rows[window.samples] = usable[window.samples]
-        hits = model.scans.ranges[rows][model.is_hit[rows]]
+        hits = compared.scans.ranges[rows][compared.is_hit[rows]]
         if not len(hits):
             continue
         limit = float(np.percentile(hits, 99.8))
-        beyond = near[rows] & (model.expected[rows] > limit + 0.3)
-        before = lost[rows] & (model.expected[rows] < limit - 0.3)
-        if before.sum() > MAX_NEAR_SHARE * max(1, lost[rows].sum()) or not beyond.any():
+        beyond = near[rows] & (compared.expected[rows] > limit + 0.3)
+        before = lost[rows] & (compared.expected[rows] < limit - 0.3)
+        if before.sum() > MAX_NEAR_FRACTION * max(1, lost[rows].sum()) or not beyond.any():
             continue
         if lost[rows][beyond].mean() < 0.8:
             continue
-        noise = float(np.median(model.noise[rows]))
+        noise = float(np.median(compared.noise[rows]))
         if noise > nominal_noise + MIN_EXTRA_NOISE_M:
             mean_range = float(np.median(hits))
-            values = rain_values(limit, noise / mean_range, model.scans.range_max)
+            values = rain_values(limit, noise / mean_range, compared.scans.range_max)
             text = f"nothing beyond {limit:.1f} m returns, and ranges have {100 * noise:.1f} cm of noise"
-            yield fault_in_window("rain", values, window, model, end, text)
+            yield lidar_fault_in_window("rain", values, window, compared, end, text)
         else:
             text = f"nothing beyond {limit:.1f} m returns"
-            yield fault_in_window("range_limit", {"max": f"{limit:.2f} m"}, window, model, end, text)
+            yield lidar_fault_in_window("range_limit", {"max": f"{limit:.2f} m"}, window, compared, end, text)
 
 
 def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[str, object]:
-    """Return the parameters of rain in which objects up to `limit` m are seen, with this noise per meter of range."""
+    """Return the parameters of the fault `rain` in which objects up to `limit` m are seen.
+
+    `noise_per_meter` is the standard deviation per meter of range, and `range_max` m the range in clear air.
+    """
     share = math.sqrt(min(1.0, noise_per_meter / RAIN_NOISE_PER_M))
     rate = HEAVY_RAIN_MM_H if share > 0.99 else min(HEAVY_RAIN_MM_H, -math.log(1.0 - share))
     alpha = RAIN_ALPHA * rate**RAIN_EXPONENT
@@ -165,38 +175,44 @@ def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[
     return {"rate": f"{rate:.1f} mm/h", "reflectivity": f"{100 * min(1.0, max(0.02, reflectivity)):.0f} %"}
 
 
-def noise_faults(model: ScanModel, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
-    """Yield the times in which ranges have more noise than the lidar has, or than good lidars if its is not known."""
-    usable = ~invalid_scans(model)
-    noise = median_filter(model.noise, size=5, mode="nearest")
+def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
+    """Yield a fault for each time in which ranges have more noise than `nominal_noise` m.
+
+    If `is_known`, this is the noise of the lidar itself. Otherwise it is a typical value, and only much more counts.
+    """
+    usable = ~invalid_scans(compared)
+    noise = median_filter(compared.noise, size=5, mode="nearest")
     limit = nominal_noise + max(MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR * nominal_noise)
     if is_known:
         limit = max(KNOWN_NOISE_FACTOR * nominal_noise, nominal_noise + MIN_KNOWN_EXTRA_NOISE_M)
-    for window in usable_windows(noise > limit, usable, model):
+    for window in usable_windows(noise > limit, usable, compared):
         if window.length < MIN_NOISE_S:
             continue
         measured = float(np.sqrt(np.mean(noise[window.samples] ** 2)))
         extra = math.sqrt(max(0.0, measured**2 - nominal_noise**2))
         text = f"ranges have {100 * measured:.1f} cm of noise"
-        yield fault_in_window("noise", {"std": f"{100 * extra:.1f} cm"}, window, model, end, text)
+        yield lidar_fault_in_window("noise", {"std": f"{100 * extra:.1f} cm"}, window, compared, end, text)
 
 
-def usable_windows(mask: Mask, usable: Mask, model: ScanModel) -> list[Window]:
-    """Return the times in which a mask holds for the usable scans; the others count as the scan before them."""
+def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Window]:
+    """Return the time windows in which `mask` (n,) holds for the usable scans; other scans count as the one before."""
     held = mask.copy()
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
     held = held[newest] & usable[newest]
-    return windows(held, model.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
+    return windows(held, compared.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
 
 
-def fault_in_window(
-    kind: str, values: Mapping[str, object], window: Window, model: ScanModel, end: float, text: str
+def lidar_fault_in_window(
+    kind: str, values: Mapping[str, object], window: Window, compared: ComparedScans, end: float, text: str
 ) -> FoundFault:
-    """Return a fault of the lidar in a window; without a start and a duration if it lasts the whole drive."""
-    times, period = model.scans.times, model.scans.period
+    """Return a lidar fault with the reason `text`. Its start is None if the window begins with the drive.
+
+    Its duration is None if the window ends with the drive.
+    """
+    times, period = compared.scans.times, compared.scans.period
     from_start = window.begin <= float(times[0]) + 3 * period
     until_end = window.end >= min(end, float(times[-1])) - 5 * period
     begin = None if from_start else max(0.0, window.begin - 0.5 * period)
     duration = None if until_end else window.end - (begin or 0.0) + 0.5 * period
     confidence = "high" if window.last - window.first >= 10 else "medium"
-    return FoundFault(LIDAR, kind, values, begin, duration, Evidence(text, window.begin, window.end, confidence))
+    return FoundFault("lidar", kind, values, begin, duration, Reason(text, window.begin, window.end, confidence))

@@ -1,4 +1,4 @@
-"""Faults of the localizer: outages, and jumps of the estimated pose."""
+"""Finds faults of the localizer: outages, and jumps of the estimated pose."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
-"""Smallest change of the error of the estimated pose, between two estimates, that is a jump."""
-MIN_SILENCE_S, MIN_SILENCE_PERIODS = 1.0, 6.0
-"""Shortest time without an estimate that is reported: the larger of a time and a multiple of the usual period."""
+"""The estimated pose jumps if its error changes by more than one of these between two estimates."""
+MIN_OUTAGE_S, MIN_OUTAGE_PERIODS = 1.0, 6.0
+"""Shortest outage that is reported: the larger of a time and a multiple of the usual period of the estimates."""
 MIN_CORRECTION_M_RAD = 1e-9
-"""A smaller change of the transform from map to odom, in m and rad, means that the localizer has not corrected it."""
+"""If the transform from map to odom changes by less than this in m and rad, the localizer has not corrected it."""
 MAX_JUMP_S = 30.0
 """Longest time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
@@ -24,16 +24,16 @@ MIN_DRIVEN_M = 0.6
 
 
 def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the faults of the localizer."""
+    """Yield the faults of the localizer; none for a drive with hardly any estimates."""
     if len(drive.belief) < 5:
         return
-    yield from _jumps(drive)
-    yield from _silence(drive)
+    yield from _jump(drive)
+    yield from _outages(drive)
 
 
-def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield jumps of the belief away from the ground truth and back."""
-    if not drive.has_independent_poses:
+def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the first jump of the belief away from the true pose and back, or a single jump away that lasts."""
+    if not drive.has_true_poses:
         return
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
     errors = belief - truth
@@ -55,52 +55,49 @@ def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
             continue
         values = _jump_values(truth[out], belief[out])
         text = f"the estimated pose jumps by {float(away[0]):.2f} m and back"
-        yield FoundFault("localizer", "jump", values, begin, end - begin, Evidence(text, begin, end))
+        yield FoundFault("localizer", "jump", values, begin, end - begin, Reason(text, begin, end))
         return
 
 
 def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -> Iterator[FoundFault]:
-    """Yield a jump of the belief at the sample `out` that does not come back until the end of the drive."""
+    """Yield the jump of the poses `belief` (n, 3) at the index `out` if they never return to `truth` (n, 3)."""
     begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
     stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
         text = f"the estimated pose jumps by {float(errors[out]):.2f} m and stays there"
-        evidence = Evidence(text, begin, float(drive.belief.times[-1]), "medium")
-        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, evidence)
+        reason = Reason(text, begin, float(drive.belief.times[-1]), "medium")
+        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, reason)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
-    """Return the parameters of a jump from the true pose (3,) to the estimated one."""
+    """Return the parameters of the fault `jump` from a true pose (3,) to the estimated pose (3,)."""
     error = Pose2(*truth.tolist()).between(Pose2(*belief.tolist()))
     return {"x": f"{error.x:.2f} m", "y": f"{error.y:.2f} m", "yaw": f"{math.degrees(error.yaw):.1f} deg"}
 
 
 def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
-    """Return whether the true pose jumps in this time, so that the belief is not what jumps."""
+    """Return whether the true pose jumps between two times in s, so that the error is no fault of the localizer."""
     chosen = (drive.poses.times >= begin) & (drive.poses.times <= end)
     steps = np.hypot(*np.diff(drive.poses.values[chosen, :2], axis=0).T)
     return bool((steps > MIN_JUMP_M).any())
 
 
-def _silence(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the times without an estimated pose although the robot drove.
-
-    If estimates come without gaps, yield the times in which they did not correct the odometry.
-    """
+def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the outages in which the robot drove: gaps between estimates or, without gaps, missing corrections."""
     times = drive.belief.times
-    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * drive.belief.period)
+    limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
     gaps = np.flatnonzero(np.diff(times) > limit)
     for index in gaps.tolist():
         begin, end = float(times[index]), float(times[index + 1])
         if len(drive.odometry) > 1 and _distance(drive, begin, end) > MIN_DRIVEN_M:
             text = f"no pose from the localizer for {end - begin:.1f} s"
-            yield FoundFault("localizer", "off", {}, begin, end - begin, Evidence(text, begin, end))
+            yield FoundFault("localizer", "off", {}, begin, end - begin, Reason(text, begin, end))
     if not len(gaps):
         yield from _without_corrections(drive)
 
 
 def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the times in which the odom frame stays where it is on the map although the robot drives."""
+    """Yield the outages in which the transform from map to odom does not change although the robot drives."""
     corrections = drive.corrections
     if len(corrections) < 2 or len(drive.odometry) < 2:
         return
@@ -109,13 +106,13 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     if not usual or still.all():
         return
     shortest = float(np.percentile([window.length for window in usual], 25)) if len(usual) >= 5 else 0.0
-    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * shortest)
+    limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * shortest)
     for window in usual:
         if window.length > limit and _distance(drive, window.begin, window.end) > MIN_DRIVEN_M:
             text = f"the localizer does not correct the odometry for {window.length:.1f} s"
-            evidence = Evidence(text, window.begin, window.end, "medium")
-            until_end = window.end >= float(corrections.times[-1]) - MIN_SILENCE_S
-            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, evidence)
+            reason = Reason(text, window.begin, window.end, "medium")
+            until_end = window.end >= float(corrections.times[-1]) - MIN_OUTAGE_S
+            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, reason)
 
 
 def _distance(drive: RecordedDrive, begin: float, end: float) -> float:

@@ -1,4 +1,7 @@
-"""Faults of the stream of messages of a sensor: outages, lost messages, delays, and repeated messages."""
+"""Finds outages, lost messages, delays, and low rates from the times of a sensor's messages, and finds repeated scans.
+
+In all functions, `target` is the name of the sensor, and `end` is the end of the drive in s.
+"""
 
 from __future__ import annotations
 
@@ -8,47 +11,47 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_period
-from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_OUTAGE_PERIODS = 4.5
-"""Time between two messages, in periods, from which on it is an outage and not a few lost messages."""
+"""A longer gap between two messages, in periods, is an outage and not a few lost messages."""
 MIN_GAP_PERIODS = 1.5
-"""Time between two messages, in periods, from which on messages are missing in between."""
-MIN_LOST_SHARE, MIN_LOST_MESSAGES = 0.03, 4
-"""Share and number of missing messages from which on they are reported."""
-MAX_MULTIPLE_ERROR, MIN_MULTIPLE_SHARE = 0.2, 0.7
-"""Where messages are lost, most steps are within a fifth of a period of two, three, … periods. Otherwise the sensor
-measures irregularly."""
+"""In a longer gap between two messages, in periods, messages are missing."""
+MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
+"""Lost messages are reported above this fraction of all messages, and from this number on."""
+MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
+"""Messages are lost if more than the second fraction of the gaps is a multiple of the period, with errors below the
+first fraction of a period. Otherwise the sensor measures irregularly."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
-"""Delays below both are those of normal drivers and networks."""
+"""Delays above the larger of these, in periods and in s, are reported; drivers and networks cause smaller ones."""
 MIN_OUTAGES_INTERMITTENT = 3
-"""Number of outages from which on they are one intermittent fault."""
+"""Number of outages from which on they are reported as one intermittent fault."""
 SLOW_FACTOR = 1.6
-"""Ratio of the period in a part of the drive to the usual period from which on the sensor was slow there."""
+"""The sensor is slow while its period is longer than this multiple of the usual period."""
 MIN_REPEATED_SCANS = 3
-"""Number of equal scans in a row that are reported."""
+"""Smallest number of repeated scans in a row that is reported."""
 MIN_EQUAL_BEAMS = 20
-"""Number of beams with a return that the comparison of two scans needs."""
+"""Number of beams with a return in both scans that the comparison of two scans needs."""
 
 
 def stream_faults(
     target: str, times: Array, arrivals: Array, end: float, nominal_period: float | None = None
 ) -> Iterator[FoundFault]:
-    """Yield the faults of a stream whose messages were measured at `times` (n,) and logged at `arrivals` (n,).
+    """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s.
 
-    `end` is the end of the drive in s, and `nominal_period` the period of the sensor in s, if it is known.
+    `nominal_period` is the period of the sensor in s; if None, it is estimated from the times.
     """
     if len(times) < 3:
         return
     period = nominal_period or usual_period(times)
     if period <= 0.0:
         return
-    late = list(_delay(target, times, arrivals, period, end))
-    yield from late
+    yield from _delay(target, times, arrivals, period, end)
     yield from _gaps(target, times, period, end)
 
 
 def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield the faults that gaps between messages show: a low rate, or else outages and lost messages."""
     edges = np.append(times, max(end, float(times[-1])))
     steps = np.diff(edges)
     steps[-1] = max(steps[-1], period)
@@ -63,36 +66,36 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
         down = float(gaps.mean())
         up = max(period, (last - begin - float(gaps.sum())) / max(1, len(long) - 1))
         text = f"{len(long)} outages of {down:.2f} s on average"
-        evidence = Evidence(text, begin, last)
+        reason = Reason(text, begin, last)
         whole = begin < up * 3 and last > end - 3 * up
         values = {"up": f"{up:.2f} s", "down": f"{down:.2f} s"}
         start, length = (None, None) if whole else (begin, last - begin)
-        yield FoundFault(target, "intermittent", values, start, length, evidence)
+        yield FoundFault(target, "intermittent", values, start, length, reason)
         return
     for index in long.tolist():
         begin, length = float(edges[index]) + 0.5 * period, float(steps[index]) - period
         until_end = edges[index + 1] >= end - period
-        evidence = Evidence(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
-        yield FoundFault(target, "off", {}, begin, None if until_end else length, evidence)
+        reason = Reason(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
+        yield FoundFault(target, "off", {}, begin, None if until_end else length, reason)
     short = (steps > MIN_GAP_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
     lost = int(np.round(steps[short] / period - 1.0).sum())
     expected = len(times) + lost
     periods = steps[short] / period
     is_multiple = np.abs(periods - np.round(periods)) < MAX_MULTIPLE_ERROR
-    if lost >= MIN_LOST_MESSAGES and lost / expected > MIN_LOST_SHARE and is_multiple.mean() > MIN_MULTIPLE_SHARE:
+    if lost >= MIN_LOST_MESSAGES and lost / expected > MIN_LOST_FRACTION and is_multiple.mean() > MIN_MULTIPLE_FRACTION:
         at = np.flatnonzero(short)
         begin, last = float(edges[at[0]]), float(edges[at[-1] + 1])
         inside = (times >= begin) & (times <= last)
         share = lost / (lost + int(inside.sum()))
         whole = last - begin > 0.7 * (end - float(times[0]))
         share = lost / expected if whole else share
-        evidence = Evidence(f"{lost} of {expected} messages are missing", begin, last)
+        reason = Reason(f"{lost} of {expected} messages are missing", begin, last)
         start, length = (None, None) if whole else (begin, last - begin)
-        yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, evidence)
+        yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, reason)
 
 
 def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
-    """Return the fault of a stream that is regular, but slower than usual, for at least half a second."""
+    """Return the fault that the sensor measured for some time at a regular, but lower rate; None if it did not."""
     steps = np.diff(times)
     is_slow = steps > SLOW_FACTOR * period
     if not is_slow.all() and not _is_regular(steps[~is_slow]):
@@ -104,9 +107,9 @@ def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | 
         step = float(np.median(inside))
         begin = float(times[window.first])
         whole = window.length > 0.8 * (end - float(times[0]))
-        evidence = Evidence(f"{1 / step:.2f} messages per second instead of {1 / period:.2f}", begin, window.end)
+        reason = Reason(f"{1 / step:.2f} messages per second instead of {1 / period:.2f}", begin, window.end)
         start, length = (None, None) if whole else (begin, window.end - begin)
-        return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, evidence)
+        return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, reason)
     return None
 
 
@@ -115,6 +118,7 @@ def _is_regular(steps: Array) -> bool:
 
 
 def _delay(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield a fault for each time in which messages were logged late."""
     delays = arrivals - times
     limit = max(MIN_DELAY_S, MIN_DELAY_PERIODS * period)
     usual = max(0.0, float(np.percentile(delays, 2)))
@@ -129,13 +133,13 @@ def _delay(target: str, times: Array, arrivals: Array, period: float, end: float
         values = {"latency": f"{1000 * max(0.0, least - base):.0f} ms"}
         if most - least > 0.25 * period:
             values["jitter"] = f"{1000 * (most - least):.0f} ms"
-        evidence = Evidence(f"messages arrive {least:.3f} to {most:.3f} s late", window.begin, window.end)
+        reason = Reason(f"messages arrive {least:.3f} to {most:.3f} s late", window.begin, window.end)
         start, length = (None, None) if whole else (window.begin, window.length)
-        yield FoundFault(target, "delay", values, start, length, evidence)
+        yield FoundFault(target, "delay", values, start, length, reason)
 
 
 def repeated_scans(scans: Scans) -> Mask:
-    """Return which scans (n,) repeat the ranges of the previous one, which noise makes impossible."""
+    """Return which scans (n,) have exactly the ranges of the previous scan, which noise prevents for new scans."""
     same = np.zeros(len(scans), dtype=bool)
     if len(scans) < 2:
         return same
@@ -147,12 +151,12 @@ def repeated_scans(scans: Scans) -> Mask:
 
 
 def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
-    """Yield the times in which a lidar repeated its last scan."""
+    """Yield a fault for each time in which a lidar repeated its last scan."""
     for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
         if window.last - window.first + 1 < MIN_REPEATED_SCANS:
             continue
         begin = max(0.0, window.begin - 1.5 * scans.period)
         until_end = window.end >= end - 1.5 * scans.period
         length = window.end - begin + 0.5 * scans.period
-        evidence = Evidence("the same scan is repeated", window.begin, window.end)
-        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, evidence)
+        reason = Reason("the same scan is repeated", window.begin, window.end)
+        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, reason)

@@ -1,4 +1,4 @@
-"""Faults of wheel odometry and gyroscope, from their differences to the true motion."""
+"""Finds faults of wheel odometry and gyroscope from their differences to the true motion."""
 
 from __future__ import annotations
 
@@ -9,75 +9,77 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import STEP_S, Mask, MotionSteps, RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
-"""Minimum motion for the estimate of a scale."""
+"""Total distance and turn of the drive from which on the scales of distances and turns are estimated."""
 MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_RAD_PER_M = 0.02, 0.03, 0.008
-"""Smallest differences from 1 of the scales of distances and turns, and smallest turn per meter, that are reported."""
+"""Smallest deviations from 1 of the scales of distances and turns, and smallest turn per meter, that are reported."""
 MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
 """Smallest velocities of the odometry at rest that are reported."""
-MIN_SLIP_SHARE, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
-"""Smallest slip that is reported: the share of the distance that is lost, the distance lost in a step, and the time."""
+MIN_SLIP_FRACTION, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
+"""A step has slip if the robot drives less far than its wheels roll, by this fraction and by this distance. Slip is
+reported if it lasts for this time."""
 MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
-"""Standard deviations after one meter, and after one radian, that are reported. Good odometry has 0.01."""
+"""Smallest standard deviations after 1 m and after 1 rad that are reported. Good odometry has 0.01."""
 MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
-"""Share of the distance that must be lost beyond that in the rest of the drive, if the wheels rolled this far then."""
+"""The fraction of the distance lost by slip must exceed that in the rest of the drive by this difference. A part of the
+drive counts only if the wheels rolled this far."""
 REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
-"""Motion within a step below which the robot stands, and the number of such steps for a drift."""
-LONG_SHARE = 0.75
-"""Share of the drive from which on a difference lasts the whole drive."""
+"""Largest motion in a step in which the robot stands, and number of these steps that the estimate of a drift needs."""
+LONG_FRACTION = 0.75
+"""Slip that lasts longer than this fraction of the drive is no slip, but a scale of the odometry."""
 CONFIDENCE_SIGMAS = 4.0
-"""Smallest estimate that is reported, in its standard deviations."""
+"""An estimate is reported if it exceeds this multiple of its standard deviation."""
 
 
-def odometry_faults(steps: MotionSteps, separation: float, skids: bool = False) -> Iterator[FoundFault]:
+def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = False) -> Iterator[FoundFault]:
     """Yield the faults of the odometry.
 
-    `separation` is the distance of the wheels in m. If the robot `skids` in turns, as skid-steer robots do, wrong turns
-    are no fault.
+    `wheel_separation` is the distance in m between left and right wheels. If the robot `skids` in turns, as skid-steer
+    robots do, wrong turns and noise are no fault.
     """
     if len(steps) < 6:
         return
-    slip = list(_slip(steps, separation))
+    slip = list(_slip(steps, wheel_separation))
     yield from slip
     if not slip:
         yield from _systematic(steps, skids)
 
 
-def _slip(steps: MotionSteps, separation: float) -> Iterator[FoundFault]:
-    """Yield the times in which the wheels rolled further than the robot drove."""
-    measured, true = _wheels(steps.measured, separation), _wheels(steps.true, separation)
+def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
+    """Yield a fault for each time in which the wheels rolled farther than the robot drove."""
+    measured, true = _wheels(steps.measured, wheel_separation), _wheels(steps.true, wheel_separation)
     lost = np.abs(measured) - np.abs(true)
-    slips = ((lost > MIN_SLIP_SHARE * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
+    slips = ((lost > MIN_SLIP_FRACTION * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
     for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
-        whole = window.length > LONG_SHARE * float(np.ptp(steps.times))
+        whole = window.length > LONG_FRACTION * float(np.ptp(steps.times))
         if whole or window.length < MIN_SLIP_S:
             continue
         values = _slip_values(measured[window.samples], true[window.samples])
         outside = np.ones(len(steps), dtype=bool)
         outside[window.samples] = False
-        excess = _lost_share(measured, true, ~outside) - _lost_share(measured, true, outside)
+        excess = _lost_fraction(measured, true, ~outside) - _lost_fraction(measured, true, outside)
         if not values or excess < MIN_EXCESS_SLIP:
             continue
         before = steps.times < window.begin
         target = "odom" if _follows_commands(steps, window) else "wheels"
         text = "the wheels roll further than the robot drives"
         begin = None if not before.any() else window.begin
-        evidence = Evidence(text, window.begin, window.end + STEP_S, "medium")
-        yield FoundFault(target, "slip", values, begin, window.length + STEP_S, evidence)
+        reason = Reason(text, window.begin, window.end + STEP_S, "medium")
+        yield FoundFault(target, "slip", values, begin, window.length + STEP_S, reason)
 
 
-def _lost_share(measured: Array, true: Array, chosen: Mask) -> float:
-    """Return the largest share of their distance that the wheels of one side lose in the chosen steps (n,)."""
+def _lost_fraction(measured: Array, true: Array, chosen: Mask) -> float:
+    """Return which fraction of the wheels' distances (n, 2) is lost in the `chosen` steps (n,), for the worse side."""
     rolled = np.abs(measured[chosen]).sum(axis=0)
     lost = (np.abs(measured[chosen]) - np.abs(true[chosen])).sum(axis=0)
     return float((lost / np.maximum(rolled, 1e-6)).max()) if rolled.max() > MIN_ROLLED_M else 0.0
 
 
-def _wheels(motion: Array, separation: float) -> Array:
-    """Return the distances (n, 2) of the left and right wheels in m."""
-    half = motion[:, 2] * separation / 2
+def _wheels(motion: Array, wheel_separation: float) -> Array:
+    """Return the distances (n, 2) in m that left and right wheels roll in motion steps (n, 3)."""
+    half = motion[:, 2] * wheel_separation / 2
     return np.column_stack((motion[:, 0] - half, motion[:, 0] + half))
 
 
@@ -85,20 +87,20 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
     rolled = np.abs(measured).sum(axis=0)
     shares = 1.0 - (true * np.sign(measured)).sum(axis=0) / np.maximum(rolled, 1e-6)
     shares = np.clip(np.where(rolled > 0.1, shares, 0.0), 0.0, 0.95)
-    if float(shares.max()) < MIN_SLIP_SHARE:
+    if float(shares.max()) < MIN_SLIP_FRACTION:
         return {}
     return {"left": f"{100 * shares[0]:.0f} %", "right": f"{100 * shares[1]:.0f} %"}
 
 
 def _follows_commands(steps: MotionSteps, window: Window) -> bool:
-    """Return whether the robot moved as commanded, so that only the odometry was wrong."""
+    """Return whether the true motion is closer to the commands than the odometry: then, only the odometry is wrong."""
     commanded = float(np.abs(steps.commanded[window.samples][:, 0]).sum())
     true, measured = (float(np.abs(motion[window.samples][:, 0]).sum()) for motion in (steps.true, steps.measured))
     return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
 
 
 def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
-    """Yield scale, bias, drift, and noise, by least squares over the whole drive."""
+    """Yield errors over the whole drive: scale or bias by least squares, drift at rest, and noise."""
     measured, true = steps.measured, steps.true
     forward = _fit(true[:, :1], measured[:, 0])
     turn = _fit(true[:, [2, 0]], measured[:, 2])
@@ -112,7 +114,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
     drive = float(steps.times[0]), float(steps.times[-1]) + STEP_S
     if is_linear and is_angular and abs(linear - angular) < 0.3 * abs(linear) and not is_curved:
         text = f"the odometry reports {100 * (1 + linear):.1f} % of the motion"
-        yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, evidence=Evidence(text, *drive))
+        yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, reason=Reason(text, *drive))
     elif is_linear or is_angular or is_curved:
         values: dict[str, object] = {}
         values |= {"linear_scale": round(float(1 + linear), 3)} if is_linear else {}
@@ -122,14 +124,14 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
             f"the odometry reports {100 * (1 + linear):.1f} % of the distance and {100 * (1 + angular):.1f} % of turns"
         )
         text += f", and turns by {math.degrees(per_meter):.2f} deg per meter" if is_curved else ""
-        yield FoundFault("odom", "bias", values, evidence=Evidence(text, *drive))
+        yield FoundFault("odom", "bias", values, reason=Reason(text, *drive))
     yield from _drift(steps)
     if not skids:
-        yield from _noise(measured[:, 0], forward[2], true[:, 0], measured[:, 2], turn[2], true[:, 2], drive)
+        yield from _noise(steps, forward[2], turn[2], drive)
 
 
 def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Return the least-squares solution, its standard deviations, and the predicted values."""
+    """Return the least-squares solution (k,), its standard deviations (k,), and the predicted values (n,)."""
     solution: Array = np.asarray(np.linalg.lstsq(matrix, values, rcond=None)[0], dtype=np.float64)
     predicted: Array = np.asarray(matrix @ solution, dtype=np.float64)
     variance = float(np.sum((values - predicted) ** 2)) / max(1, len(values) - matrix.shape[1])
@@ -139,7 +141,7 @@ def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
 
 
 def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
-    """Yield the motion that the odometry reports while the robot stands."""
+    """Yield the fault that the odometry reports motion while the robot stands."""
     rest = (np.abs(steps.true[:, :2]).max(axis=1) < REST_M) & (np.abs(steps.true[:, 2]) < REST_RAD)
     # Wheels also turn in place when something holds the robot that is commanded to drive.
     rest &= np.abs(steps.commanded).max(axis=1) < REST_M
@@ -151,48 +153,42 @@ def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
     values |= {"angular": f"{angular:.3f} rad/s"} if abs(angular) > MIN_DRIFT_RAD_S else {}
     if values:
         times = steps.times[rest]
-        evidence = Evidence("the odometry moves while the robot stands", float(times[0]), float(times[-1]))
-        yield FoundFault("odom", "drift", values, evidence=evidence)
+        reason = Reason("the odometry moves while the robot stands", float(times[0]), float(times[-1]))
+        yield FoundFault("odom", "drift", values, reason=reason)
 
 
-def _noise(
-    forward: Array,
-    forward_fit: Array,
-    distance: Array,
-    turn: Array,
-    turn_fit: Array,
-    turned: Array,
-    drive: tuple[float, float],
-) -> Iterator[FoundFault]:
+def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array, drive: tuple[float, float]) -> Iterator[FoundFault]:
+    """Yield the fault that measured motion scatters about the fitted distances and turns (n,) in the whole drive."""
     values: dict[str, object] = {}
+    distance, turned = steps.true[:, 0], steps.true[:, 2]
     moved, rotated = np.abs(distance) > 0.05, np.abs(turned) > 0.05
     if moved.sum() >= 8:
-        linear = float(np.std((forward - forward_fit)[moved] / np.sqrt(np.abs(distance[moved]))))
+        linear = float(np.std((steps.measured[:, 0] - forward_fit)[moved] / np.sqrt(np.abs(distance[moved]))))
         values |= {"linear": f"{100 * linear:.1f} cm"} if linear > MIN_NOISE_M else {}
     if rotated.sum() >= 8:
-        angular = float(np.std((turn - turn_fit)[rotated] / np.sqrt(np.abs(turned[rotated]))))
+        angular = float(np.std((steps.measured[:, 2] - turn_fit)[rotated] / np.sqrt(np.abs(turned[rotated]))))
         values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE_RAD else {}
     if values:
         text = "the steps of the odometry scatter about the true motion"
-        yield FoundFault("odom", "noise", values, evidence=Evidence(text, *drive, "low"))
+        yield FoundFault("odom", "noise", values, reason=Reason(text, *drive, "low"))
 
 
 BIN_S, MIN_BINS = 0.5, 8
-"""Length of the intervals over which turn rates are averaged, and number of intervals that an estimate needs."""
+"""Length of the bins over which turn rates are averaged, and number of bins that an estimate needs."""
 MIN_BIAS_RAD_S, MIN_DRIFTED_RAD_S = 0.006, 0.006
 """Smallest bias, and smallest change of the bias by drift, that are reported."""
 MIN_GYRO_SCALE_ERROR, MIN_GYRO_TURN_RAD = 0.03, 2.0
-"""Smallest difference of the scale from 1 that is reported, and total turn that its estimate needs."""
+"""Smallest deviation of the scale from 1 that is reported, and total turn that its estimate needs."""
 MAX_RATE_CHANGE_RAD_S = 0.2
-"""Change of the turn rate between two bins above which small errors of the times would look like errors of the rate."""
+"""Bins with a larger change of the turn rate are not used, because errors of the times would look like a bias."""
 MIN_RAMP_S, MIN_RAMP_SIGMAS = 4.0, 4.0
 """Shortest duration of a drift, and its smallest change in standard deviations of the remaining errors."""
 MAX_ERROR_RATIO = 0.2
-"""Share of the squared error below which a drift, or a scale, explains the differences better than a constant."""
+"""A drift or a scale is reported only if it reduces the sum of squared errors to less than this fraction."""
 
 
 def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the faults of the gyroscope."""
+    """Yield a wrong scale, a drift, or a bias of the gyroscope; at most one of them."""
     times, measured, true = _turn_rates(drive)
     if len(times) < MIN_BINS:
         return
@@ -201,7 +197,7 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     explained = float(np.sum((measured - scale * true) ** 2)) < MAX_ERROR_RATIO * float(np.sum((measured - true) ** 2))
     if abs(scale - 1.0) > MIN_GYRO_SCALE_ERROR and explained:
         text = f"the gyroscope reports {100 * scale:.1f} % of the turns"
-        yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, evidence=Evidence(text, float(times[0])))
+        yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, reason=Reason(text, float(times[0])))
         return
     change = np.abs(np.diff(true, prepend=true[0], append=true[-1]))
     steady = np.maximum(change[1:], change[:-1]) < MAX_RATE_CHANGE_RAD_S
@@ -218,22 +214,20 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
         whole = end >= float(times[-1]) - BIN_S
         from_start = begin <= float(times[0]) + BIN_S
         values = {"gyro": f"{slope:.5f} rad/s^2"}
-        evidence = Evidence(text, begin, end, "medium")
+        reason = Reason(text, begin, end, "medium")
         length = None if whole else end - begin
-        yield FoundFault("imu", "drift", values, None if from_start else begin, length, evidence)
+        yield FoundFault("imu", "drift", values, None if from_start else begin, length, reason)
     elif abs(bias) > MIN_BIAS_RAD_S:
         text = f"the gyroscope reports {bias:.4f} rad/s at rest"
-        yield FoundFault("imu", "bias", {"gyro": f"{bias:.4f} rad/s"}, evidence=Evidence(text, float(times[0])))
+        yield FoundFault("imu", "bias", {"gyro": f"{bias:.4f} rad/s"}, reason=Reason(text, float(times[0])))
 
 
 def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
-    """Return times (n,) of bins of BIN_S with the mean turn rates in rad/s that the gyroscope and the poses show."""
+    """Return the start times (n,) of bins in s, and the mean turn rates (n,) in rad/s of gyroscope and true poses."""
     imu = drive.turn_rates
-    if len(imu) < 2 or len(drive.poses) < 2:
+    if len(imu) < 2 or len(drive.poses) < 2 or imu.times[-1] - imu.times[0] <= BIN_S:
         return np.empty(0), np.empty(0), np.empty(0)
     edges = np.arange(float(imu.times[0]), float(imu.times[-1]), BIN_S)
-    if len(edges) < 2:
-        return np.empty(0), np.empty(0), np.empty(0)
     index = np.searchsorted(edges, imu.times, side="right") - 1
     inside = (index >= 0) & (index < len(edges) - 1)
     count = np.bincount(index[inside], minlength=len(edges) - 1)
@@ -244,7 +238,7 @@ def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _ramp(times: Array, errors: Array) -> tuple[float, float, float, float]:
-    """Return begin, end, slope, and remaining squared error of the ramp from zero that fits the errors best."""
+    """Return begin and end in s, slope in rad/s², and remaining sum of squares of the ramp that fits `errors` best."""
     best = (float(times[0]), float(times[-1]), 0.0, float(np.sum((errors - errors.mean()) ** 2)))
     stride = max(1, len(times) // 40)
     for first in range(0, len(times) - MIN_BINS // 2, stride):

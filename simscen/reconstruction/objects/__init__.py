@@ -1,1 +1,1 @@
-"""Objects that the scans show and the map does not: clusters, tracks, shapes, and poses over time."""
+"""Finds objects that the scans show and the map does not: clusters, tracks, shapes, and pedestrians."""

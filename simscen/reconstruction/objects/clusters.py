@@ -1,4 +1,4 @@
-"""Clusters of beams that end before the static world: what each scan shows of objects that are not on the map."""
+"""Groups the hits of each scan that the static world does not explain into clusters, one for each visible object."""
 
 from __future__ import annotations
 
@@ -8,29 +8,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Indices, Mask
 from simscen.reconstruction.faults.false_returns import ghost_beams, isolated_returns
 from simscen.reconstruction.faults.lidar_readings import invalid_scans
 from simscen.reconstruction.faults.message_stream import repeated_scans
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.static_world import StaticWorld
 
 MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
-"""Smallest number of hits of a cluster, and largest number of beams between two of them that do not show the object."""
+"""Smallest number of hits of a cluster, and largest number of beams without a hit between two of its hits."""
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
-"""Distance between neighbor hits of one object: in m, and as a multiple of the distance of two beams."""
+"""Largest distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
 TRUE_WALL_DISTANCE_M = 0.12
+"""Distance from a wall within which a hit belongs to the wall, if the poses are true."""
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""Distance from a wall on the map within which a hit belongs to the wall: with true poses, and with estimated poses,
-whose heading errors add a distance per meter of range."""
+"""The same distance for estimated poses: fixed, and per meter of range, because of errors of the heading."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScanCluster:
-    """Hits of one object in one scan: `points` (m, 2) in the map frame, seen from `lidar` (2,) at `time` in s.
+    """Hits of one object in one scan.
 
-    `scan` is the index of the scan, `angle` the angle in rad that the hits cover, and `is_whole` tells whether beams
-    beside it end farther away, so that nothing hides a part of the object.
+    Attributes:
+        scan: Index of the scan.
+        points: Hits (m, 2) in the map frame.
+        lidar: Position (2,) of the lidar in the map frame.
+        angle: Angle in rad that the hits cover, seen from the lidar.
+        is_fully_visible: Whether the beams on both sides of the hits end farther away: nothing hides the object.
     """
 
     scan: int
@@ -38,7 +42,7 @@ class ScanCluster:
     points: Array
     lidar: Array
     angle: float
-    is_whole: bool
+    is_fully_visible: bool
 
     @property
     def center(self) -> Array:
@@ -47,33 +51,33 @@ class ScanCluster:
         return center
 
 
-def usable_scans(model: ScanModel) -> Mask:
-    """Return which scans (n,) show the surroundings at their time."""
-    result: Mask = ~invalid_scans(model) & ~repeated_scans(model.scans)
+def usable_scans(compared: ComparedScans) -> Mask:
+    """Return which scans (n,) are neither invalid nor a repetition of the previous scan."""
+    result: Mask = ~invalid_scans(compared) & ~repeated_scans(compared.scans)
     return result
 
 
-def scan_clusters(model: ScanModel, world: Surroundings, has_true_poses: bool) -> list[list[ScanCluster]]:
-    """Return the clusters of each scan."""
-    unexplained = model.is_short & ~isolated_returns(model) & usable_scans(model)[:, None]
-    for first, last, _ in ghost_beams(model):
+def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: bool) -> list[list[ScanCluster]]:
+    """Return the clusters of each scan, in the order of the scans."""
+    unexplained = compared.is_short & ~isolated_returns(compared) & usable_scans(compared)[:, None]
+    for first, last, _ in ghost_beams(compared):
         unexplained[:, first : last + 1] = False
     rows, beams = np.nonzero(unexplained)
     if len(rows):
         fixed = TRUE_WALL_DISTANCE_M if has_true_poses else BELIEVED_WALL_DISTANCE_M
         growth = 0.0 if has_true_poses else BELIEVED_WALL_DISTANCE_PER_M
-        limit = fixed + growth * model.scans.ranges[rows, beams]
-        near = world.distance_to_walls(model.ends[rows, beams]) < limit
+        limit = fixed + growth * compared.scans.ranges[rows, beams]
+        near = world.distance_to_walls(compared.ends[rows, beams]) < limit
         unexplained[rows[near], beams[near]] = False
-    return [[*_clusters(model, row, np.flatnonzero(unexplained[row]))] for row in range(len(model.scans))]
+    return [[*_clusters(compared, row, np.flatnonzero(unexplained[row]))] for row in range(len(compared.scans))]
 
 
-def _clusters(model: ScanModel, row: int, beams: Indices) -> Iterator[ScanCluster]:
-    """Yield the clusters of one scan; the ends of a full circle are joined."""
+def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[ScanCluster]:
+    """Yield the clusters of `beams` (k,) of the scan `row`. In a scan of 360°, a cluster can contain both ends."""
     if len(beams) < MIN_HITS:
         return
-    step = abs(float(model.scans.angles[1] - model.scans.angles[0])) if len(model.scans.angles) > 1 else 0.0
-    ranges, points = model.scans.ranges[row], model.ends[row]
+    step = abs(float(compared.scans.angles[1] - compared.scans.angles[0])) if len(compared.scans.angles) > 1 else 0.0
+    ranges, points = compared.scans.ranges[row], compared.ends[row]
     total = len(ranges)
     gaps = np.hypot(*(points[beams[1:]] - points[beams[:-1]]).T)
     limit = np.maximum(MAX_GAP_M, MAX_GAP_BEAMS * step * np.minimum(ranges[beams[1:]], ranges[beams[:-1]]))
@@ -90,34 +94,37 @@ def _clusters(model: ScanModel, row: int, beams: Indices) -> Iterator[ScanCluste
         span = (int(group[-1]) - int(group[0])) % total
         sides = [(int(group[0]) - 1) % total, (int(group[-1]) + 1) % total]
         if not full and (group[0] == 0 or group[-1] == total - 1):
-            is_whole = False
+            is_fully_visible = False
         else:
             with np.errstate(invalid="ignore"):
                 farther = ranges[sides] > ranges[[group[0], group[-1]]]
-            is_whole = bool(farther.all())
-        lidar = model.poses[row, :2]
-        time = float(model.scans.times[row])
-        yield ScanCluster(row, time, points[group], lidar, (span + 1) * step, is_whole)
+            is_fully_visible = bool(farther.all())
+        lidar = compared.poses[row, :2]
+        time = float(compared.scans.times[row])
+        yield ScanCluster(row, time, points[group], lidar, (span + 1) * step, is_fully_visible)
 
 
-FREE_MARGIN_M, MIN_VISIBLE_SHARE = 0.25, 0.3
-"""Distance behind a point at which a beam must end to show that the point is free, and the smallest share of the points
-that must be visible."""
+FREE_MARGIN_M, MIN_VISIBLE_FRACTION = 0.25, 0.3
+"""A beam shows that a point is free if it ends at least this far behind the point. A scan counts only if at least this
+fraction of the points is visible."""
 
 
-def share_seen_free(model: ScanModel, points: Array, rows: Indices) -> Array:
-    """Return for each of `rows` (k,) the share of the points (m, 2) that beams pass, nan if most points are hidden."""
-    offsets = points[None, :, :] - model.poses[rows, None, :2]
+def fraction_seen_free(compared: ComparedScans, points: Array, rows: Indices) -> Array:
+    """Return for each scan in `rows` (k,) which fraction of the visible points is free; nan if few are visible.
+
+    `points` (m, 2) are in the map frame. A point is free if a beam passes through it.
+    """
+    offsets = points[None, :, :] - compared.poses[rows, None, :2]
     distance = np.hypot(offsets[..., 0], offsets[..., 1])
-    direction = np.arctan2(offsets[..., 1], offsets[..., 0]) - model.poses[rows, None, 2]
-    step = float(model.scans.angles[1] - model.scans.angles[0])
-    beam = np.round(((direction - model.scans.angles[0]) % (2 * np.pi)) / step).astype(np.int64)
+    direction = np.arctan2(offsets[..., 1], offsets[..., 0]) - compared.poses[rows, None, 2]
+    step = float(compared.scans.angles[1] - compared.scans.angles[0])
+    beam = np.round(((direction - compared.scans.angles[0]) % (2 * np.pi)) / step).astype(np.int64)
     beam = np.where(beam == round(2 * np.pi / abs(step)), 0, beam)
-    inside = (beam >= 0) & (beam < len(model.scans.angles)) & (distance < model.scans.range_max)
-    measured = model.scans.ranges[rows[:, None], np.where(inside, beam, 0)]
+    inside = (beam >= 0) & (beam < len(compared.scans.angles)) & (distance < compared.scans.range_max)
+    measured = compared.scans.ranges[rows[:, None], np.where(inside, beam, 0)]
     with np.errstate(invalid="ignore"):
         free = inside & (measured > distance + FREE_MARGIN_M)
         hidden = ~inside | np.isnan(measured) | (measured < distance - FREE_MARGIN_M)
     visible = (~hidden).sum(axis=1)
-    enough = visible >= max(2, MIN_VISIBLE_SHARE * len(points))
+    enough = visible >= max(2, MIN_VISIBLE_FRACTION * len(points))
     return np.where(enough, free.sum(axis=1) / np.maximum(visible, 1), np.nan)

@@ -1,4 +1,4 @@
-"""Objects that are not on the map, moving or standing, from the clusters of scans."""
+"""Finds moving and standing objects that are not on the map, from the clusters of the scans."""
 
 from __future__ import annotations
 
@@ -8,55 +8,56 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Pose2
+from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Indices, Polygon
-from simscen.reconstruction.evidence import Evidence
-from simscen.reconstruction.objects.clusters import scan_clusters, share_seen_free, usable_scans
+from simscen.reconstruction.objects.clusters import fraction_seen_free, scan_clusters, usable_scans
 from simscen.reconstruction.objects.found_object import FoundObject, Keyframe
 from simscen.reconstruction.objects.shapes import ObjectShape, fit_shape
 from simscen.reconstruction.objects.tracks import ObjectTrack, track_objects
-from simscen.reconstruction.scan_model import ScanModel
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.reasons import Reason
+from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
 MIN_DISPLACEMENT_M = 0.4
 """Distance that an object must move to count as moving."""
-MIN_FREED_SHARE = 0.5
-"""Share of an earlier outline that must be seen free later, or of a later one that was free earlier."""
-SEEN_FREE_SHARE = 0.6
-"""Share of the points of an object that beams must pass to show that it is not there."""
+MIN_FREED_FRACTION = 0.5
+"""An object has moved if more than this fraction of its first hits is free later, or of its farthest hits was free
+earlier."""
+SEEN_FREE_FRACTION = 0.6
+"""An object is absent if beams pass through more than this fraction of its points."""
 COMPARED_CLUSTERS = 5
-"""Number of clusters at the start and at the end of a track that are compared."""
+"""Number of clusters at the start of a track, and where it is farthest from the start, that are compared."""
 KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD, MAX_KEYFRAMES = 0.05, math.radians(10), 400
-"""Largest distance and turn between a track and its keyframes, and largest number of keyframes."""
+"""Largest distance and turn between a track and its keyframes, and approximate largest number of keyframes."""
 MERGE_DISTANCE_M = 0.3
-"""Distance between the hits of two tracks below which they may be of the same standing object."""
+"""Two tracks may be of the same standing object if some of their hits are at most this far apart."""
 MIN_CLUSTERS_STANDING = 10
-"""Number of clusters that a standing object needs."""
-PART_MARGIN_M, PART_SHARE = 0.15, 0.5
-"""A track belongs to a moving object if this share of its clusters is within this distance of it."""
+"""Smallest number of clusters from which a standing object is reported."""
+PART_MARGIN_M, PART_FRACTION = 0.15, 0.5
+"""A track belongs to a known object if more than this fraction of its clusters is within this distance of it."""
 MIN_SIZE_M = 0.06
-"""Longest side, or radius, below which an object is ignored."""
+"""Objects with a smaller longest side, or radius, are ignored."""
 MAX_OBJECT_SPEED_M_S = 4.0
-"""Keyframes that an object would reach only at a higher speed are errors of its track."""
+"""Keyframes that an object could reach only at a higher speed are errors of its track and are left out."""
 
 
 def find_objects(
-    model: ScanModel, world: Surroundings, has_true_poses: bool, robots: Sequence[FoundObject] = ()
+    compared: ComparedScans, world: StaticWorld, has_true_poses: bool, robots: Sequence[FoundObject] = ()
 ) -> list[FoundObject]:
-    """Return the objects that the scans show and the static world does not have, and the other `robots`."""
-    tracks = track_objects(scan_clusters(model, world, has_true_poses))
-    usable = np.flatnonzero(usable_scans(model))
-    moving = [track for track in tracks if _moves(model, track, usable)]
-    standing = _merged([track for track in tracks if track not in moving], model, usable)
+    """Return the other `robots`, and after them the objects that the scans show and the static world does not have."""
+    tracks = track_objects(scan_clusters(compared, world, has_true_poses))
+    usable = np.flatnonzero(usable_scans(compared))
+    moving = [track for track in tracks if _has_moved(compared, track, usable)]
+    standing = _merged([track for track in tracks if track not in moving], compared, usable)
     moving.sort(key=lambda track: (-len(track.clusters), track.begin))
     found: list[FoundObject] = [*robots]
     for track in moving:
         if not any(_is_part(track, thing) for thing in found):
-            found.append(_found(model, track, usable, moves=True))
+            found.append(_found(compared, track, usable, is_moving=True))
     known = [*found]
     for track in standing:
         if len(track.clusters) >= MIN_CLUSTERS_STANDING and not any(_is_part(track, thing) for thing in known):
-            found.append(_found(model, track, usable, moves=False))
+            found.append(_found(compared, track, usable, is_moving=False))
     found = [thing for thing in found[len(robots) :] if max(thing.size) >= MIN_SIZE_M]
     found.sort(key=lambda thing: (thing.keyframes[0][0], *thing.keyframes[0][1:3]))
     kinds = {True: "moving object", False: "object"}
@@ -68,22 +69,23 @@ def find_objects(
     return [*robots, *named]
 
 
-def object_along(name: str, outline: Polygon, times: Array, poses: Array) -> FoundObject:
-    """Return a box around an outline in the frame of poses x, y, yaw (n, 3), which are known at `times` (n,) in s."""
+def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> FoundObject:
+    """Return another robot as a box around its `outline`, which moves along `poses` x, y, yaw (n, 3).
+
+    The outline is in the frame of the robot; the poses in the map frame are those at `times` (n,) in s.
+    """
     corners = np.array(outline)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x, y = ((low + high) / 2).tolist()
-    centers = np.column_stack((poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2]))
+    centers = offset_poses(poses, Pose2(*((low + high) / 2).tolist()))
     length, width = np.round(high - low, 2).tolist()
-    keyframes = tuple(simplified(ObjectShape((length, width), times, centers)))
-    evidence = Evidence("its true poses in the log", float(times[0]), float(times[-1]))
-    return FoundObject(name, (length, width), keyframes, None, None, evidence, is_robot=True)
+    keyframes = tuple(keyframes_of(ObjectShape((length, width), times, centers)))
+    reason = Reason("its true poses in the log", float(times[0]), float(times[-1]))
+    return FoundObject(name, (length, width), keyframes, None, None, reason, is_robot=True)
 
 
-def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
-    """Return whether an object moved, and not only the part of it that was visible."""
-    shape = fit_shape(track.clusters, moves=True)
+def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
+    """Return whether an object moved, rather than only the visible part of it. `usable` are indices of scans."""
+    shape = fit_shape(track.clusters, is_moving=True)
     centers = shape.poses[:, :2]
     start = np.median(centers[:COMPARED_CLUSTERS], axis=0)
     away = np.hypot(*(centers - start).T)
@@ -96,13 +98,13 @@ def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
     rows_late = usable[(usable >= track.clusters[far].scan - 2) & (usable <= track.clusters[far].scan + 20)]
     rows_early = usable[(usable >= track.clusters[0].scan - 5) & (usable <= track.clusters[0].scan + 3)]
     freed, was_free = (
-        share_seen_free(model, points, rows) for points, rows in ((first, rows_late), (last, rows_early))
+        fraction_seen_free(compared, points, rows) for points, rows in ((first, rows_late), (last, rows_early))
     )
-    return max(_largest(freed), _largest(was_free)) > MIN_FREED_SHARE
+    return max(_median_fraction(freed), _median_fraction(was_free)) > MIN_FREED_FRACTION
 
 
 def median_of_three(values: Array) -> Array:
-    """Return the medians (n,) over three neighbors of values (n,)."""
+    """Return the medians (n,) of each value (n,) and its two neighbors."""
     if len(values) < 3:
         return values
     padded = np.concatenate((values[:1], values, values[-1:]))
@@ -110,15 +112,15 @@ def median_of_three(values: Array) -> Array:
     return result
 
 
-def _largest(shares: Array) -> float:
-    return float(np.nanmedian(shares)) if np.isfinite(shares).any() else 0.0
+def _median_fraction(fractions: Array) -> float:
+    return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
-def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> list[ObjectTrack]:
-    """Return the tracks of standing objects, with those of one object joined."""
+def _merged(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
+    """Return the tracks of standing objects; several tracks of the same object become one."""
     merged: list[ObjectTrack] = []
     for track in tracks:
-        same = next((earlier for earlier in merged if _is_same(earlier, track, model, usable)), None)
+        same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)
         if same is None:
             merged.append(ObjectTrack([*track.clusters]))
         else:
@@ -126,67 +128,65 @@ def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> lis
     return merged
 
 
-def _is_same(earlier: ObjectTrack, later: ObjectTrack, model: ScanModel, usable: Indices) -> bool:
-    """Return whether two tracks of standing objects touch, and the place was not free in between."""
+def _is_same(earlier: ObjectTrack, later: ObjectTrack, compared: ComparedScans, usable: Indices) -> bool:
+    """Return whether two tracks are of the same standing object: they touch, and it did not disappear in between."""
     a, b = (np.concatenate([cluster.points for cluster in track.clusters]) for track in (earlier, later))
     a, b = a[:: max(1, len(a) // 200)], b[:: max(1, len(b) // 200)]
     if float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min()) > MERGE_DISTANCE_M:
         return False
     first, last = earlier.clusters[-1].scan, later.clusters[0].scan
     between = usable[(usable > first) & (usable < last)]
-    return not len(between) or _largest(share_seen_free(model, b, between)) < SEEN_FREE_SHARE
+    return not len(between) or _median_fraction(fraction_seen_free(compared, b, between)) < SEEN_FREE_FRACTION
 
 
 def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
-    """Return whether most clusters of a track are where a moving object is at their times."""
-    frames = np.array(thing.keyframes)
+    """Return whether most clusters of a track are at the position that another object has at their times."""
     times = np.array([cluster.time for cluster in track.clusters])
     centers = np.array([cluster.center for cluster in track.clusters])
-    at = np.column_stack([np.interp(times, frames[:, 0], frames[:, axis]) for axis in (1, 2)])
-    reach = thing.size[0] if thing.is_cylinder else math.hypot(*thing.size) / 2
-    inside = np.hypot(*(centers - at).T) < reach + PART_MARGIN_M
-    present = (times >= frames[0, 0] - 0.5) & (times <= frames[-1, 0] + 0.5)
-    return float(np.mean(inside & present)) > PART_SHARE
+    inside = np.hypot(*(centers - thing.poses_at(times)[:, :2]).T) < thing.radius + PART_MARGIN_M
+    present = (times >= thing.keyframes[0][0] - 0.5) & (times <= thing.keyframes[-1][0] + 0.5)
+    return float(np.mean(inside & present)) > PART_FRACTION
 
 
-def _found(model: ScanModel, track: ObjectTrack, usable: Indices, moves: bool) -> FoundObject:
-    shape = fit_shape(track.clusters, moves)
-    keyframes = simplified(shape) if moves else [_keyframe(shape, 0)]
-    appears = _appearance(model, track, usable)
-    disappears = _disappearance(model, track, usable)
-    if disappears is not None and moves:
+def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
+    """Return the object of a track, still without a name."""
+    shape = fit_shape(track.clusters, is_moving)
+    keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
+    appears = _appearance(compared, track, usable)
+    disappears = _disappearance(compared, track, usable)
+    if disappears is not None and is_moving:
         disappears = max(disappears, keyframes[-1][0] + 0.01)
     seen = f"seen in {len(track.clusters)} scans"
-    if moves:
+    if is_moving:
         length = float(np.hypot(*np.diff(shape.poses[:, :2], axis=0).T).sum())
         text = f"{seen}, moved {length:.1f} m"
     else:
         text = f"{seen} at one place, and not on the map"
     confidence = "high" if len(track.clusters) >= 20 else "medium"
-    evidence = Evidence(text, track.begin, track.end, confidence)
-    return FoundObject("", shape.size, tuple(keyframes), appears, disappears, evidence)
+    reason = Reason(text, track.begin, track.end, confidence)
+    return FoundObject("", shape.size, tuple(keyframes), appears, disappears, reason)
 
 
-def _appearance(model: ScanModel, track: ObjectTrack, usable: Indices) -> float | None:
-    """Return when the object appeared; None if its place was never seen free before it was seen there."""
+def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
+    """Return the time in s at which the object appeared; None if no earlier scan shows its first position free."""
     points = np.concatenate([cluster.points for cluster in track.clusters[:3]])
     before = usable[usable < track.clusters[0].scan]
     if not len(before):
         return None
-    shares = share_seen_free(model, points, before)
-    free = before[np.nan_to_num(shares, nan=0.0) > SEEN_FREE_SHARE]
-    return float(model.scans.times[free[-1] + 1]) if len(free) else None
+    shares = fraction_seen_free(compared, points, before)
+    free = before[np.nan_to_num(shares, nan=0.0) > SEEN_FREE_FRACTION]
+    return float(compared.scans.times[free[-1] + 1]) if len(free) else None
 
 
-def _disappearance(model: ScanModel, track: ObjectTrack, usable: Indices) -> float | None:
-    """Return when the object disappeared; None if its place is not seen free afterwards."""
+def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
+    """Return the time in s at which the object disappeared; None if no later scan shows its last position free."""
     points = np.concatenate([cluster.points for cluster in track.clusters[-3:]])
     after = usable[usable > track.clusters[-1].scan]
     if not len(after):
         return None
-    free = np.nan_to_num(share_seen_free(model, points, after), nan=0.0) > SEEN_FREE_SHARE
+    free = np.nan_to_num(fraction_seen_free(compared, points, after), nan=0.0) > SEEN_FREE_FRACTION
     twice = free & np.append(free[1:], free[-1])
-    return float(model.scans.times[after[np.argmax(twice)]]) if twice.any() else None
+    return float(compared.scans.times[after[np.argmax(twice)]]) if twice.any() else None
 
 
 def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
@@ -194,8 +194,8 @@ def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
     return float(shape.times[index]), x, y, yaw
 
 
-def simplified(shape: ObjectShape) -> list[Keyframe]:
-    """Return the keyframes between which linear interpolation gives the poses within the tolerances."""
+def keyframes_of(shape: ObjectShape) -> list[Keyframe]:
+    """Return few keyframes between which linear interpolation gives the poses of a shape within the tolerances."""
     times, poses = shape.times, shape.poses.copy()
     poses[:, 2] = np.unwrap(poses[:, 2])
     scale = np.array([1.0, 1.0, KEYFRAME_TOLERANCE_M / KEYFRAME_TOLERANCE_RAD])

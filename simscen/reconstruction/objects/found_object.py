@@ -1,4 +1,4 @@
-"""Objects that the scans show and the map does not: what they are like, and where they are over time."""
+"""Data of an object that the scans show and the map does not: its shape, its keyframes, and its pedestrian."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 
 from simscen.core.environment.world_model import WalkingPedestrian
 from simscen.core.geometry import Array
-from simscen.reconstruction.evidence import Evidence
+from simscen.reconstruction.reasons import Reason
 
 Keyframe = tuple[float, float, float, float]
-"""Time in s since the start of the drive, x, y, yaw."""
+"""Time in s since the start of the drive, and pose x, y, yaw in the map frame."""
 
 
 @dataclass(frozen=True, eq=False)
-class FoundWalk:
-    """Pedestrian of the scenario language that walks like a tracked person.
+class FittedPedestrian:
+    """Pedestrian of the scenario language whose simulated motion in the recorded drive reproduces a tracked person.
 
     Attributes:
-        begin: Time in s at which it appears.
-        walker: Its start, goals, speed, and behavior.
-        times: Times (n,) in s of a simulation of the pedestrian in the recorded drive.
-        positions: Its positions (n, 2) in the simulation.
+        begin: Time in s at which the pedestrian appears.
+        walker: Start, goals, speed, and behavior of the pedestrian.
+        times: Times (n,) in s of the simulation.
+        positions: Positions (n, 2) of the pedestrian in the simulation.
         rmse: RMSE in m of these positions from the track.
-        time_shift: Time in s by which the simulation is late or early.
-        meets_robot: Whether the robot came so near that the track shows whether the person evades it.
+        time_shift: Delay or lead in s, not negative, at which the positions would fit the track best.
+        meets_robot: Whether the robot came so near that the track shows how the person reacts to it.
     """
 
     begin: float
@@ -39,7 +39,7 @@ class FoundWalk:
 
     @property
     def sentence(self) -> str:
-        """How well the pedestrian reproduces the track."""
+        """Phrase that states how well the pedestrian reproduces the track, and how it reacts to the robot."""
         reaction = ""
         if self.walker.blind_to:
             reaction = " if it does not evade the robot"
@@ -54,13 +54,13 @@ class FoundObject:
 
     Attributes:
         name: Name in the scenario.
-        size: Length and width in m of a box, or the radius of a cylinder alone.
-        keyframes: Poses over time; a single one for an object that stands.
+        size: (length, width) of a box in m, or (radius,) of a cylinder.
+        keyframes: Poses in order of time; a single one for a standing object.
         appears: Time in s at which it appears; None if it is there from the start.
         disappears: Time in s at which it disappears; None if it stays.
-        evidence: Why it is there.
-        is_robot: Whether it is another robot, whose poses are in the log.
-        walk: How a pedestrian walks that reproduces the keyframes; None if it is no person or none does.
+        reason: Reason for which it is in the scenario.
+        is_robot: Whether it is another robot whose poses are in the log.
+        pedestrian: Pedestrian that reproduces the keyframes; None if the object is no person or no pedestrian fits.
     """
 
     name: str
@@ -68,37 +68,37 @@ class FoundObject:
     keyframes: tuple[Keyframe, ...]
     appears: float | None = None
     disappears: float | None = None
-    evidence: Evidence = field(default_factory=lambda: Evidence(""))
+    reason: Reason = field(default_factory=lambda: Reason(""))
     is_robot: bool = False
-    walk: FoundWalk | None = None
+    pedestrian: FittedPedestrian | None = None
 
     @property
     def is_moving(self) -> bool:
-        """Whether it moves."""
+        """Whether the object moves."""
         return len(self.keyframes) > 1
 
     @property
     def is_cylinder(self) -> bool:
-        """Whether it is an upright cylinder; otherwise it is a box."""
+        """Whether the object is an upright cylinder; otherwise it is a box."""
         return len(self.size) == 1
 
     @property
     def radius(self) -> float:
-        """Radius in m of the circle around its outline."""
+        """Radius in m of the circle around the outline."""
         return self.size[0] if self.is_cylinder else math.hypot(*self.size) / 2
 
     def is_there(self, time: float) -> bool:
-        """Return whether it is there at a time in s."""
+        """Return whether the object is present at a time in s."""
         return (self.appears or 0.0) <= time and (self.disappears is None or time < self.disappears)
 
     def poses_at(self, times: Array) -> Array:
-        """Return its poses x, y, yaw (n, 3) at `times` (n,) by its keyframes."""
+        """Return the poses x, y, yaw (n, 3) at `times` (n,) by linear interpolation between the keyframes."""
         frames = np.array(self.keyframes)
         return np.column_stack([np.interp(times, frames[:, 0], frames[:, axis]) for axis in (1, 2, 3)])
 
     @property
     def comment(self) -> str:
-        """Why it is there, and as what, in one line."""
-        if self.walk is None:
-            return self.evidence.comment
-        return replace(self.evidence, text=f"{self.evidence.text}; {self.walk.sentence}").comment
+        """The reason as one line, with the fit of the pedestrian if there is one."""
+        if self.pedestrian is None:
+            return self.reason.comment
+        return replace(self.reason, text=f"{self.reason.text}; {self.pedestrian.sentence}").comment

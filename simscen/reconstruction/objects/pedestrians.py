@@ -1,4 +1,4 @@
-"""Pedestrians of the scenario language that reproduce tracked people."""
+"""Finds pedestrians of the scenario language whose simulated motion reproduces tracked people."""
 
 from __future__ import annotations
 
@@ -12,91 +12,92 @@ from simscen.core.environment.world_model import Behavior, Unseen, WalkingPedest
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polygons import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
-from simscen.reconstruction.evidence import windows
-from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
-from simscen.reconstruction.objects.walk_trial import WalkTrial
+from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
+from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
+from simscen.reconstruction.reasons import windows
 
 MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
-"""Radii of a round object that may be a person."""
+"""Smallest and largest radius of a round object that may be a person."""
 MAX_LEGS_SIDE_M = 0.7
-"""Longest side of a box around two legs."""
+"""Longest side of a box that may be the two legs of a person."""
 MIN_BODY_RADIUS_M, MAX_BODY_RADIUS_M, LEGS_BODY_RADIUS_M = 0.2, 0.35, 0.25
 """Limits of the radius of a pedestrian, and its radius if the lidar saw legs."""
 MIN_WALK_M = 1.0
-"""Shortest track that a pedestrian reproduces."""
+"""Length of the shortest track that may be a person's."""
 MAX_PEOPLE = 4
 """Number of people above which none becomes a pedestrian, because small differences grow too fast in a crowd."""
 MIN_WALKING_SPEED_M_S, MAX_WALKING_SPEED_M_S = 0.3, 2.2
-"""Usual speeds of a person who walks."""
+"""Limits of the usual speed of a person who walks."""
 MAX_RMSE_M, MAX_TIME_SHIFT_S = 0.3, 0.5
-"""Largest difference between a track and the pedestrian that replaces it."""
+"""Largest RMSE and time shift between a track and the pedestrian that replaces it."""
 TRIED_SHIFTS_S = np.round(np.arange(-1.0, 1.01, 0.05), 2)
-"""Time shifts at which a track is compared with a pedestrian."""
+"""Time shifts at which a track is compared with a simulated pedestrian."""
 STEP_S, SMOOTHING_STEPS = 0.1, 5
-"""Time between two positions of a track, and number of steps to each side over which its speed is measured."""
+"""Time between two positions of a track, and number of steps before and after over which its speed is averaged."""
 MOVING_SPEED_M_S, MIN_STOP_S = 0.2, 1.5
-"""Speed below which a person stands, and the shortest stop that is a reaction."""
+"""Speed below which a person stands, and duration of the shortest stop that may be a reaction to the robot."""
 PATH_TOLERANCES_M = (math.inf, 0.6, 0.3)
-"""Distances that the straight lines between goals may have from the track: first only the end is a goal."""
+"""Largest distances between the track and the straight lines from goal to goal, in the order in which they are tried.
+With the first, the end of the track is the only goal."""
 MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
 """Distance from the robot within which a person would evade it, or stop and look at it."""
 MIN_RMSE_DECREASE_M = 0.05
-"""Amount by which the RMSE of a more complex explanation must be smaller."""
+"""A more complex pedestrian is preferred only if its RMSE is smaller by more than this."""
 GOOD_RMSE_M, HOPELESS_RMSE_M, LOST_M = 0.12, 0.6, 1.2
-"""RMSE below which nothing else is tried, RMSE above which no other speed is tried, and distance from the track beyond
-which a simulation ends."""
+"""No other goals or reactions are tried below the first RMSE, and no other speeds above the second. A simulation ends
+if the pedestrian is farther from the track than the third value."""
 SPEED_FACTORS = (0.93, 1.07)
-"""Factors of the measured speed that are tried as well."""
+"""Multiples of the measured speed that are also tried."""
 
 
 @dataclass(frozen=True)
 class _Reaction:
-    """How a person may react to the robot."""
+    """How a person may react to the robot: behavior, its duration in s, and what the person does not see."""
 
     behavior: Behavior = "regular"
     duration: float = 0.0
     blind_to: frozenset[Unseen] = frozenset()
 
 
-def with_walks(objects: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
-    """Return the objects; those that a pedestrian reproduces have a walk, and their names begin with "person"."""
+def fit_pedestrians(objects: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
+    """Return the objects. Those that a pedestrian reproduces have this pedestrian and a name like "person 1"."""
     people = [thing for thing in objects if is_person(thing)]
     if len(people) > MAX_PEOPLE:
         return [*objects]
     others = [thing for thing in objects if thing not in people]
-    walks = {
-        thing.name: _fitted_walk(thing, [person for person in people if person is not thing], others, trial)
+    fitted = {
+        thing.name: _fit_pedestrian(thing, [person for person in people if person is not thing], others, trial)
         for thing in people
     }
-    found = [replace(thing, walk=walks.get(thing.name)) for thing in objects]
-    while any(thing.walk for thing in found):
-        found = _walked_together(found, trial)
+    found = [replace(thing, pedestrian=fitted.get(thing.name)) for thing in objects]
+    while any(thing.pedestrian for thing in found):
+        found = _simulated_together(found, trial)
         worst = max(found, key=_error)
         if _error(worst) <= 1.0:
             break
-        found = [replace(thing, walk=None) if thing is worst else thing for thing in found]
+        found = [replace(thing, pedestrian=None) if thing is worst else thing for thing in found]
     return [*_named(found)]
 
 
 def _named(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
     count = 0
     for thing in found:
-        if thing.walk is None:
+        if thing.pedestrian is None:
             yield thing
         else:
             count += 1
-            walker = replace(thing.walk.walker, name=f"person {count}")
-            yield replace(thing, name=walker.name, walk=replace(thing.walk, walker=walker))
+            walker = replace(thing.pedestrian.walker, name=f"person {count}")
+            yield replace(thing, name=walker.name, pedestrian=replace(thing.pedestrian, walker=walker))
 
 
 def _error(thing: FoundObject) -> float:
-    """Return how far the walk of an object is from its track, in multiples of what is allowed; 0 without a walk."""
-    walk = thing.walk
-    return 0.0 if walk is None else max(walk.rmse / MAX_RMSE_M, walk.time_shift / MAX_TIME_SHIFT_S)
+    """Return the error of an object's pedestrian as a multiple of the largest allowed one; 0 without a pedestrian."""
+    pedestrian = thing.pedestrian
+    return 0.0 if pedestrian is None else max(pedestrian.rmse / MAX_RMSE_M, pedestrian.time_shift / MAX_TIME_SHIFT_S)
 
 
 def is_person(thing: FoundObject) -> bool:
-    """Return whether the size and the speed of an object are those of a person who walks."""
+    """Return whether size, track length, and speed of an object fit a person who walks."""
     if not thing.is_moving or thing.is_robot:
         return False
     if thing.is_cylinder:
@@ -108,7 +109,7 @@ def is_person(thing: FoundObject) -> bool:
 
 
 class _Track:
-    """Positions of an object every STEP_S."""
+    """Positions (n, 2) and speeds (n,) of an object at times (n,) every STEP_S."""
 
     def __init__(self, thing: FoundObject) -> None:
         begin, end = thing.keyframes[0][0], thing.keyframes[-1][0]
@@ -126,7 +127,7 @@ class _Track:
 
     @property
     def speed(self) -> float:
-        """Usual speed in m/s while it walks."""
+        """Median speed in m/s while the object moves."""
         walking = self.speeds[self.speeds > MOVING_SPEED_M_S]
         return float(np.median(walking)) if len(walking) else 0.0
 
@@ -135,23 +136,23 @@ class _Track:
         return x, y
 
 
-def _fitted_walk(
-    thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: WalkTrial
-) -> FoundWalk | None:
-    """Return the simplest walk that reproduces a person while all others move as recorded; None without one."""
+def _fit_pedestrian(
+    thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: PedestrianTrial
+) -> FittedPedestrian | None:
+    """Return the simplest pedestrian that reproduces `thing` while all others move as recorded; None if none does."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
-    meets = bool(distances.min() < MEETING_DISTANCE_M)
+    meets_robot = bool(distances.min() < MEETING_DISTANCE_M)
 
     def is_lost(time: float, position: tuple[float, float]) -> bool:
         return time > track.times[0] and math.dist(position, track.at(time)) > LOST_M
 
-    def tried(begin: float, walker: WalkingPedestrian) -> FoundWalk:
-        walked = trial.positions([(begin, walker)], people, objects, float(track.times[-1]), is_lost)
+    def tried(begin: float, walker: WalkingPedestrian) -> FittedPedestrian:
+        walked = trial.simulate([(begin, walker)], people, objects, float(track.times[-1]), is_lost)
         return _compared(track, begin, walker, *walked[walker.name])
 
-    best: FoundWalk | None = None
-    for reaction in _reactions(track, distances, meets):
+    best: FittedPedestrian | None = None
+    for reaction in _reactions(track, distances, meets_robot):
         if best is not None and best.rmse < GOOD_RMSE_M:
             break
         for begin, walker in _walkers(thing, track, reaction, trial):
@@ -163,17 +164,18 @@ def _fitted_walk(
     for factor in SPEED_FACTORS:
         faster = replace(best.walker, speed=round(factor * track.speed, 2))
         best = _better(best, tried(best.begin, faster), MIN_RMSE_DECREASE_M / 2)
-    return replace(best, meets_robot=meets)
+    return replace(best, meets_robot=meets_robot)
 
 
-def _better(simple: FoundWalk | None, other: FoundWalk, margin: float) -> FoundWalk:
+def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: float) -> FittedPedestrian:
+    """Return `other` if its RMSE is smaller by more than `margin` m, otherwise `simple`."""
     return other if simple is None or other.rmse < simple.rmse - margin else simple
 
 
-def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reaction]:
-    """Yield how the person may react to the robot, the simplest first."""
+def _reactions(track: _Track, distances: Array, meets_robot: bool) -> Iterator[_Reaction]:
+    """Yield possible reactions to the robot, the simplest first. `distances` (n,) from the track to it are in m."""
     yield _Reaction()
-    if meets:
+    if meets_robot:
         yield _Reaction(blind_to=frozenset({"robots"}))
     for stop in windows(track.speeds < MOVING_SPEED_M_S, track.times, MIN_STOP_S):
         walks_before_and_after = stop.first > 0 and stop.last < len(track.times) - 1
@@ -183,11 +185,11 @@ def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reacti
 
 
 def _walkers(
-    thing: FoundObject, track: _Track, reaction: _Reaction, trial: WalkTrial
+    thing: FoundObject, track: _Track, reaction: _Reaction, trial: PedestrianTrial
 ) -> Iterator[tuple[float, WalkingPedestrian]]:
-    """Yield times of appearance and pedestrians that walk along a track, those with the fewest goals first.
+    """Yield pedestrians that may walk along a track, with their times of appearance in s; those with few goals first.
 
-    A pedestrian starts at rest. One whose track begins in motion appears earlier by its relaxation time.
+    Pedestrians start at rest. If the track begins in motion, they appear earlier by the relaxation time.
     """
     radius, walls = body_radius(thing), trial.world.walls
     lead = RELAXATION_TIME_S if track.speeds[0] > MOVING_SPEED_M_S else 0.0
@@ -216,14 +218,14 @@ def _walkers(
 
 
 def body_radius(thing: FoundObject) -> float:
-    """Return the radius in m of the pedestrian that has the size of an object."""
+    """Return the body radius in m of the pedestrian for an object."""
     if not thing.is_cylinder:
         return LEGS_BODY_RADIUS_M
     return min(max(thing.size[0], MIN_BODY_RADIUS_M), MAX_BODY_RADIUS_M)
 
 
-def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
-    """Return the end (2,) of a track; if it ends in motion, a place farther on, because a pedestrian brakes."""
+def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
+    """Return the end (2,) of a track or, if it ends in motion, a point beyond it: pedestrians brake before goals."""
     end: Array = track.positions[-1]
     motion = end - track.at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
     distance = float(np.hypot(*motion))
@@ -235,26 +237,30 @@ def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
     return farther if has_room and walls.visible(end[None], farther[None])[0] else end
 
 
-def _walked_together(found: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
-    """Return the objects with their walks in a simulation in which all pedestrians walk at the same time."""
-    walkers = [(thing.walk.begin, thing.walk.walker) for thing in found if thing.walk]
-    objects = [thing for thing in found if not thing.walk]
-    end = max(thing.keyframes[-1][0] for thing in found if thing.walk)
-    paths = trial.positions(walkers, [], objects, end)
+def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
+    """Return the objects; their pedestrians have the positions and errors of one simulation of all pedestrians."""
+    walkers = [(thing.pedestrian.begin, thing.pedestrian.walker) for thing in found if thing.pedestrian]
+    objects = [thing for thing in found if not thing.pedestrian]
+    end = max(thing.keyframes[-1][0] for thing in found if thing.pedestrian)
+    paths = trial.simulate(walkers, [], objects, end)
     together = []
     for thing in found:
-        walk = thing.walk
-        if walk is not None:
-            again = _compared(_Track(thing), walk.begin, walk.walker, *paths[thing.name])
-            walk = replace(again, meets_robot=walk.meets_robot)
-        together.append(replace(thing, walk=walk))
+        pedestrian = thing.pedestrian
+        if pedestrian is not None:
+            again = _compared(_Track(thing), pedestrian.begin, pedestrian.walker, *paths[thing.name])
+            pedestrian = replace(again, meets_robot=pedestrian.meets_robot)
+        together.append(replace(thing, pedestrian=pedestrian))
     return together
 
 
-def _compared(track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array) -> FoundWalk:
+def _compared(
+    track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array
+) -> FittedPedestrian:
+    """Return the pedestrian with the errors of its simulated `positions` (n, 2) at `times` (n,) from the track."""
+
     def rmse(shift: float) -> float:
         at = np.column_stack([np.interp(track.times + shift, times, positions[:, axis]) for axis in (0, 1)])
         return float(np.sqrt(np.mean(np.sum((at - track.positions) ** 2, axis=1))))
 
     errors = [(rmse(shift), abs(shift)) for shift in TRIED_SHIFTS_S.tolist()]
-    return FoundWalk(begin, walker, times, positions, rmse(0.0), min(errors)[1])
+    return FittedPedestrian(begin, walker, times, positions, rmse(0.0), min(errors)[1])

@@ -1,4 +1,4 @@
-"""Size, shape, and poses of a tracked object from the parts of it that the lidar saw."""
+"""Estimates shape, size, and poses of a tracked object from the parts of it that the lidar saw."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
-from simscen.reconstruction.evidence import windows
 from simscen.reconstruction.objects.clusters import ScanCluster
+from simscen.reconstruction.reasons import windows
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
-"""An object is round if its radius is at most this, and its hits are this close to a circle."""
+"""An object is round if its radius, and the mean distance of its hits from a circle, are at most these."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Largest half of the angle that an object covers, in rad, for computing its radius, which is infinite at 90°."""
+"""Upper limit of half the angle that an object covers: at 90°, the radius computed from the angle is infinite."""
 MIN_SIDE_M = 0.1
 """Shortest side of a box."""
 SIZE_PERCENTILE = 90.0
-"""Percentile of the extents in single scans that is the size of a moving box."""
+"""Percentile of the visible sizes in single scans that is taken as the size of a moving box."""
 HEADING_SPEED_M_S, HEADING_SPAN_S = 0.25, 0.8
-"""Speed from which on the direction of motion is the heading, and half the time over which it is measured."""
+"""Speed above which the direction of motion is the heading, and time before and after over which it is measured."""
 MIN_STAND_S = 1.5
-"""Time below the speed from which on an object stands."""
+"""An object stands if it is slower than HEADING_SPEED_M_S for at least this time."""
 SMOOTHING_SCANS = 5
 """Number of scans over which positions are smoothed."""
 TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
-"""Orientations that are tried for the rectangle around an object that stands."""
+"""Orientations that are tried for the rectangle around a standing object."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectShape:
-    """Size and poses of an object: `times` (n,) and `poses` x, y, yaw (n, 3).
+    """Size of an object, and its `poses` x, y, yaw (n, 3) in the map frame at `times` (n,) in s.
 
-    `size` is length and width of a box in m, or the radius of a cylinder alone.
+    `size` is (length, width) of a box in m, or (radius,) of a cylinder.
     """
 
     size: tuple[float, ...]
@@ -43,22 +43,22 @@ class ObjectShape:
     poses: Array
 
 
-def fit_shape(clusters: list[ScanCluster], moves: bool) -> ObjectShape:
-    """Return the shape and the poses of an object. If it does not move, all poses are equal."""
+def fit_shape(clusters: list[ScanCluster], is_moving: bool) -> ObjectShape:
+    """Return the shape of an object, with a pose for each of its clusters. If it does not move, all poses are equal."""
     times = np.array([cluster.time for cluster in clusters])
     radius, error = _radius(clusters)
     if radius <= MAX_ROUND_RADIUS_M and error <= MAX_ROUND_ERROR_M:
         centers = np.array([_circle_center(cluster, radius) for cluster in clusters])
-        if not moves:
+        if not is_moving:
             centers = np.tile(np.median(centers, axis=0), (len(centers), 1))
-        poses = np.column_stack((_smoothed(centers) if moves else centers, np.zeros(len(centers))))
+        poses = np.column_stack((_smoothed(centers) if is_moving else centers, np.zeros(len(centers))))
         return ObjectShape((round(max(radius, 0.05), 2),), times, poses)
-    return _moving_box(clusters, times) if moves else _standing_box(clusters, times)
+    return _moving_box(clusters, times) if is_moving else _standing_box(clusters, times)
 
 
 def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
-    """Return the radius of the cylinder that fits the completely visible clusters, and the error of its hits, in m."""
-    whole = [cluster for cluster in clusters if cluster.is_whole and len(cluster.points) >= 5]
+    """Return radius and mean error in m of the cylinder that fits the fully visible clusters; inf for few clusters."""
+    whole = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
     if len(whole) < 3:
         return math.inf, math.inf
     radius = float(np.median([_radius_of(cluster) for cluster in whole]))
@@ -70,18 +70,19 @@ def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
 
 
 def _radius_of(cluster: ScanCluster) -> float:
+    """Return the radius in m of a circle that has the nearest hit of a cluster and covers the same angle."""
     near = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
     sine = math.sin(min(cluster.angle / 2, MAX_HALF_ANGLE_RAD))
     return near * sine / (1.0 - sine)
 
 
 def _circle_center(cluster: ScanCluster, radius: float) -> Array:
-    """Return the center (2,) of the circle of this radius, in the middle direction of the hits, that fits them."""
+    """Return the center (2,) of a circle with this `radius` that fits the hits, in their mean direction."""
     offsets = cluster.points - cluster.lidar
     distance = np.hypot(*offsets.T)
     middle = (offsets / distance[:, None]).mean(axis=0)
     middle /= max(float(np.hypot(*middle)), 1e-9)
-    # The circle with the least error along the middle direction, by the mean of all hits.
+    # Each hit gives a distance of the center along the mean direction. Their median is robust against outliers.
     across = offsets @ np.array([-middle[1], middle[0]])
     along = offsets @ middle + np.sqrt(np.maximum(radius**2 - across**2, 0.0))
     center: Array = cluster.lidar + middle * float(np.median(along))
@@ -89,27 +90,29 @@ def _circle_center(cluster: ScanCluster, radius: float) -> Array:
 
 
 def _moving_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
+    """Return a box whose heading is its direction of motion; headings, size, and centers are refined three times."""
     centers = np.array([cluster.center for cluster in clusters])
     yaw, size = np.zeros(len(times)), np.zeros(2)
     for _ in range(3):
-        yaw, moves = _headings(times, _smoothed(centers))
+        yaw, is_moving = _headings(times, _smoothed(centers))
         low, high = _extents(clusters, yaw)
-        sizes = (high - low)[moves] if int(moves.sum()) >= SMOOTHING_SCANS else high - low
+        sizes = (high - low)[is_moving] if int(is_moving.sum()) >= SMOOTHING_SCANS else high - low
         size = np.maximum(np.percentile(sizes, SIZE_PERCENTILE, axis=0), MIN_SIDE_M)
         centers = _anchored(clusters, yaw, low, high, size)
-    poses = np.column_stack((_at_rest(times, _smoothed(centers), moves), yaw))
+    poses = np.column_stack((_at_rest(times, _smoothed(centers), is_moving), yaw))
     return ObjectShape((round(float(size[0]), 2), round(float(size[1]), 2)), times, poses)
 
 
-def _at_rest(times: Array, centers: Array, moves: Mask) -> Array:
-    """Return centers (n, 2) that are constant while the object stands."""
+def _at_rest(times: Array, centers: Array, is_moving: Mask) -> Array:
+    """Return `centers` (n, 2), which become constant in each time in which the object stands (`is_moving` is false)."""
     result: Array = centers.copy()
-    for rest in windows(~moves, times, MIN_STAND_S):
+    for rest in windows(~is_moving, times, MIN_STAND_S):
         result[rest.samples] = np.median(centers[rest.samples], axis=0)
     return result
 
 
 def _standing_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
+    """Return the rectangle that fits the hits of all clusters together."""
     points = np.concatenate([cluster.points for cluster in clusters])
     if len(points) > 4000:
         points = points[:: len(points) // 4000 + 1]
@@ -130,7 +133,7 @@ def _standing_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
 
 
 def _orientation(points: Array) -> float:
-    """Return the orientation in rad of the rectangle whose sides are closest to the points (m, 2).
+    """Return the orientation in rad, from 0 to π/2, of the rectangle whose sides are closest to the points (m, 2).
 
     Source: Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using laser scanners (2017).
     """
@@ -146,26 +149,26 @@ def _orientation(points: Array) -> float:
 
 
 def _headings(times: Array, centers: Array) -> tuple[Array, Mask]:
-    """Return the directions of motion (n,), and when the object moves (n,).
+    """Return at each time the heading (n,) in rad, and whether the object moves (n,).
 
-    While it stands, the heading is the last one, or else the first one.
+    While the object stands, it keeps its last heading. Until it moves, it has the first heading of its motion.
     """
     before = np.maximum(np.searchsorted(times, times - HEADING_SPAN_S), 0)
     after = np.minimum(np.searchsorted(times, times + HEADING_SPAN_S), len(times) - 1)
     motion = centers[after] - centers[before]
     speed = np.hypot(*motion.T) / np.maximum(times[after] - times[before], 1e-3)
-    moves = speed > HEADING_SPEED_M_S
-    fast = np.flatnonzero(moves)
+    is_moving = speed > HEADING_SPEED_M_S
+    fast = np.flatnonzero(is_moving)
     if not len(fast):
         whole = centers[-1] - centers[0]
-        return np.full(len(times), math.atan2(whole[1], whole[0])), moves
+        return np.full(len(times), math.atan2(whole[1], whole[0])), is_moving
     newest = np.searchsorted(fast, np.arange(len(times)), side="right") - 1
     chosen = motion[fast[np.maximum(newest, 0)]]
-    return np.arctan2(chosen[:, 1], chosen[:, 0]), moves
+    return np.arctan2(chosen[:, 1], chosen[:, 0]), is_moving
 
 
 def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
-    """Return the smallest and largest coordinates (n, 2) of the hits along and across the heading."""
+    """Return the smallest and largest coordinates (n, 2) of each cluster's hits, along and across its heading (n,)."""
     low, high = np.empty((len(clusters), 2)), np.empty((len(clusters), 2))
     for index, cluster in enumerate(clusters):
         c, s = math.cos(yaw[index]), math.sin(yaw[index])
@@ -175,7 +178,10 @@ def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
 
 
 def _anchored(clusters: list[ScanCluster], yaw: Array, low: Array, high: Array, size: Array) -> Array:
-    """Return the centers (n, 2) of boxes of this size, whose faces toward the lidar are where the hits are."""
+    """Return the centers (n, 2) of boxes with this `size` (2,) whose faces toward the lidar are at the hits.
+
+    `low` and `high` (n, 2) are the extents of the hits along and across the headings `yaw` (n,).
+    """
     c, s = np.cos(yaw), np.sin(yaw)
     at = np.array([cluster.lidar for cluster in clusters])
     lidar = np.column_stack((c * at[:, 0] + s * at[:, 1], c * at[:, 1] - s * at[:, 0]))
@@ -186,7 +192,7 @@ def _anchored(clusters: list[ScanCluster], yaw: Array, low: Array, high: Array, 
 
 
 def _smoothed(centers: Array) -> Array:
-    """Return centers (n, 2) without outliers and with less noise."""
+    """Return `centers` (n, 2) after a median filter and a moving average over SMOOTHING_SCANS."""
     size = min(SMOOTHING_SCANS, len(centers))
     result: Array = np.column_stack(
         [

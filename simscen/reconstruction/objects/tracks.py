@@ -1,4 +1,4 @@
-"""Tracks of objects: clusters of successive scans that belong to the same object."""
+"""Tracks objects: assigns the clusters of successive scans that belong to the same object to one track."""
 
 from __future__ import annotations
 
@@ -10,26 +10,28 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_CENTER_DISTANCE_M = 2.5
-"""Distance of the centers beyond which a cluster is not compared with a track."""
+"""A cluster does not belong to a track if its center is farther from the predicted center."""
 GATE_M, GATE_M_S = 0.25, 0.8
-"""Maximum distance between the predicted and the measured hits of an object: fixed, and per second unseen."""
+"""Maximum distance between a track and its next cluster: fixed, and per second since the last cluster."""
 MAX_UNSEEN_S = 2.0
 """Time without a cluster after which a track ends."""
 CENTER_WEIGHT = 0.3
-"""Weight of the distance of the centers, which depends on the visible part, beside that of the hits."""
+"""Weight of the distance between centers, relative to that between hits, in the distance of a cluster from a track. It
+is low because the center depends on which part of the object is visible."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
-"""Number of clusters from which the velocity is computed, and the largest possible speed."""
+"""Number of clusters from which the velocity is computed, and upper limit of the speed."""
 MOVING_SPEED_M_S = 0.3
-"""Speed below which a hidden object may also have stopped where it was."""
+"""A hidden object with a lower speed may also have stopped where it was last seen."""
 MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
-"""Number of clusters, and duration, that a track needs."""
+"""Smallest number of clusters, and shortest duration, of a track."""
 MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5
-"""Time for which an object may be hidden, and how far from its predicted place it may reappear."""
+"""Longest time for which an object may be hidden, and largest distance from its predicted position at which it may
+reappear: fixed, and per second hidden."""
 
 
 @dataclass(eq=False)
 class ObjectTrack:
-    """Clusters of one object in order of time."""
+    """Clusters of one object in order of time, and its velocity (2,) in m/s at the last one."""
 
     clusters: list[ScanCluster] = field(default_factory=list)
     velocity: Array = field(default_factory=lambda: np.zeros(2))
@@ -57,7 +59,7 @@ class ObjectTrack:
             self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
 
     def distance_to(self, cluster: ScanCluster) -> float:
-        """Return the mean distance in m of the hits of a cluster from the predicted hits, or the other way around."""
+        """Return the distance in m of a cluster from the hits and center that the track predicts; inf if it is far."""
         last = self.clusters[-1]
         predicted = last.points + self.velocity * (cluster.time - last.time)
         if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:
@@ -69,7 +71,7 @@ class ObjectTrack:
 
 
 def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
-    """Return the tracks of all objects that were seen often enough, in order of their start."""
+    """Return the tracks of all objects that were seen often enough in `scans`, the clusters of each scan."""
     active: list[ObjectTrack] = []
     done: list[ObjectTrack] = []
     for clusters in scans:
@@ -79,16 +81,13 @@ def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
         done += [track for track in active if time - track.end > MAX_UNSEEN_S]
         active = [track for track in active if time - track.end <= MAX_UNSEEN_S]
         _associate(active, clusters)
-    tracks = [track for track in (*done, *active) if _is_object(track)]
+    tracks = [track for track in (*done, *active) if len(track.clusters) >= MIN_CLUSTERS]
+    tracks = [track for track in tracks if track.end - track.begin >= MIN_TRACK_S]
     return _linked(sorted(tracks, key=lambda track: (track.begin, *track.clusters[0].center.tolist())))
 
 
-def _is_object(track: ObjectTrack) -> bool:
-    return len(track.clusters) >= MIN_CLUSTERS and track.end - track.begin >= MIN_TRACK_S
-
-
 def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
-    """Add each cluster to the nearest track, nearest pairs first, or start a new track with it."""
+    """Add each cluster of a scan to the nearest of the `active` tracks, nearest pairs first, or append a new track."""
     pairs = []
     for number, track in enumerate(active):
         for index, cluster in enumerate(clusters):
@@ -110,7 +109,7 @@ def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
 
 
 def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
-    """Return the tracks, with those joined that one object made before and after it was hidden."""
+    """Return the tracks; those of one object before and after it was hidden become one."""
     linked: list[ObjectTrack] = []
     for track in tracks:
         before = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]
@@ -124,7 +123,7 @@ def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
 
 
 def _link_distance(before: ObjectTrack, after: ObjectTrack) -> float | None:
-    """Return how far a track starts from where another one leads, None if that is too far or too late."""
+    """Return how far in m a track starts from where an earlier one leads; None if that is too far or too late."""
     gap = after.begin - before.end
     if not 0.0 < gap <= MAX_LINK_S:
         return None

@@ -1,1 +1,1 @@
-"""Contents of the reconstructed scenario: world, robot, goals, criteria, and the text with its evidence."""
+"""Creates the contents of the reconstructed scenario (world, robot, goals, criteria) and its YAML text."""

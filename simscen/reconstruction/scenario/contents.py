@@ -1,4 +1,4 @@
-"""Reconstruction of a scenario from a drive: the estimators in their order, and the contents of the scenario file."""
+"""Combines a drive, the given parts, and the estimated parts into the contents of the scenario file."""
 
 from __future__ import annotations
 
@@ -11,80 +11,87 @@ import numpy as np
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
-from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.scenario.criteria import criteria_of
+from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.scenario.criteria import propose_criteria
 from simscen.reconstruction.scenario.incidents import Incident
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal
 
 INVALID_GOAL_CODES = frozenset({"GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP"})
-"""Error codes of goals that no robot can reach. A scenario must expect them."""
+"""Error codes of goals that no robot can reach. The scenario expects these errors."""
 TIMEOUT_CODE = "NAVIGATE_TIMEOUT"
-"""Error code of a goal whose time was up, so that its timeout is known."""
+"""Error code of a goal that was not reached within its timeout, so that the timeout is known."""
 MAX_REFUSAL_S = 1.0
-"""Time within which a robot refuses a goal that it cannot reach. Later, something else went wrong."""
+"""Time within which a robot refuses a goal that cannot be reached. Later failures have other causes."""
 MIN_WAIT_S = 0.3
 """Minimum time between a result and the next goal that counts as a wait at the goal."""
 MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
-"""Shortest timeout of a goal, and its ratio to the time that the robot took."""
+"""Shortest timeout of a goal, and ratio of the timeout to the time that the robot took."""
 UNFINISHED_TIMEOUT_FACTOR = 1.1
-"""The same ratio for a goal that was active when the log ended."""
+"""Ratio of the timeout to the recorded time, for a goal that was active when the log ended."""
 MAX_TIME_LIMIT_S = 8000.0
-"""Longest time limit of a scenario."""
+"""Longest time limit of the scenario."""
 RADIUS_STEP_M = 0.05
-"""Step to which the distance at which goals count as passed is rounded up."""
+"""The distance at which goals count as passed is rounded up to a multiple of this."""
 NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
-"""Errors of the first belief within which the default initial estimate is kept."""
+"""If the first belief has smaller errors than these, the scenario has the default initial estimate."""
 UNKNOWN_START_STD_M = 1.5
-"""Standard deviation of the first belief from which on the start was unknown to the localizer."""
+"""If the first belief has a larger standard deviation, the localizer did not know where the robot started."""
 
 
 @dataclass(frozen=True)
-class Findings:
-    """What the estimators found in a drive."""
+class EstimatedParts:
+    """Parts of the scenario that the estimators found in a drive.
+
+    `kidnaps` are the time in s, the new pose in the map frame, and the reason of each kidnapping. `unknowns` are
+    phrases about what the log does not show.
+    """
 
     incidents: Sequence[Incident]
     objects: Sequence[FoundObject] = ()
     faults: Sequence[FoundFault] = ()
-    kidnaps: Sequence[tuple[float, Pose2, Evidence]] = ()
+    kidnaps: Sequence[tuple[float, Pose2, Reason]] = ()
     unknowns: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class GivenParts:
-    """Parts of the scenario that do not depend on estimates: world, map, robot, and stack, each with its evidence."""
+    """Parts of the scenario that are not estimated: values of the keys `world`, `map`, `robot`, `seed`, and `stack`.
+
+    `reasons` are the reasons by key. `unknowns` are phrases about what the log does not show.
+    """
 
     world: str | Mapping[str, Any]
     map: str
     robot: str
     seed: int
     stack: Mapping[str, Any] = field(default_factory=dict)
-    evidence: Mapping[str, Evidence] = field(default_factory=dict)
+    reasons: Mapping[str, Reason] = field(default_factory=dict)
     unknowns: Sequence[str] = ()
 
 
-def contents_of(
-    drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, source: str
+def scenario_contents(
+    drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, source: str
 ) -> ScenarioContents:
-    """Return the contents of the scenario file."""
-    start = start_pose(drive)
-    estimate, estimate_evidence = _estimate(drive, start, bool(given.map == "none"))
+    """Return the contents of a scenario file with the name `name`; `source` is the name of the log."""
+    start = Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
+    estimate, estimate_reason = _estimate(drive, start, bool(given.map == "none"))
     goals = [*_goals(drive)]
-    invalid = bool(goals) and all(goal.expect for goal in goals)
-    evidence = dict(given.evidence)
-    evidence["start"] = Evidence(f"first pose of the drive, from {drive.pose_source}", 0.0)
-    if estimate_evidence is not None:
-        evidence["estimate"] = estimate_evidence
+    is_refusal_expected = bool(goals) and all(goal.expect for goal in goals)
+    reasons = dict(given.reasons)
+    reasons["start"] = Reason(f"first pose of the drive, from {drive.pose_source}", 0.0)
+    if estimate_reason is not None:
+        reasons["estimate"] = estimate_reason
     passing = passing_radius(drive)
     if passing is not None:
         text = f"goals were passed without a stop, at a distance of at most {passing:g} m"
-        evidence["navigation"] = Evidence(text, None, None, "medium")
+        reasons["navigation"] = Reason(text, None, None, "medium")
     slowest = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
     time_limit = min(MAX_TIME_LIMIT_S, max(60.0, 2 * drive.duration, drive.duration + slowest))
     return ScenarioContents(
         name=name,
         source=source,
-        summary=[*_summary(drive, findings)],
+        summary=[*_summary(drive, estimated)],
         seed=given.seed,
         world=given.world,
         map=given.map,
@@ -96,25 +103,20 @@ def contents_of(
         goals=goals,
         stops_at_failure=not any(goal.status == "failed" for goal in drive.goals[:-1]),
         time_limit=time_limit,
-        objects=findings.objects,
-        kidnaps=findings.kidnaps,
-        faults=findings.faults,
-        criteria=criteria_of(drive, findings.incidents, findings.faults, invalid),
-        evidence=evidence,
-        unknowns=[*given.unknowns, *findings.unknowns, *drive.notes],
+        objects=estimated.objects,
+        kidnaps=estimated.kidnaps,
+        faults=estimated.faults,
+        criteria=[*propose_criteria(drive, estimated.incidents, estimated.faults, is_refusal_expected)],
+        reasons=reasons,
+        unknowns=[*given.unknowns, *estimated.unknowns, *drive.notes],
     )
 
 
-def start_pose(drive: RecordedDrive) -> Pose2:
-    """Return the pose at the start of the drive."""
-    return Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
-
-
 def passing_radius(drive: RecordedDrive) -> float | None:
-    """Return the distance in m at which goals counted as passed; None if the robot passed none.
+    """Return the distance in m at which goals counted as passed; None if the robot passed no goal without a stop.
 
-    A robot counts a goal as passed at the first control step within this distance, by its own belief. The largest
-    distance seen is therefore a little too small, and is rounded up.
+    A robot passes a goal in the first control step in which its estimated pose is within this distance. All recorded
+    distances are therefore a little too small, and the largest one is rounded up.
     """
     passed = [goal for goal in drive.goals if goal.status == "passed" and goal.ended is not None]
     distances = [_believed_pose(drive, goal.ended or 0.0).distance(goal.pose) for goal in passed]
@@ -122,7 +124,7 @@ def passing_radius(drive: RecordedDrive) -> float | None:
 
 
 def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
-    """Return the pose that the robot estimated: its odometry with the latest correction, if the log has both."""
+    """Return the pose that the robot estimated at a time in s; the best known pose if the log does not contain it."""
     at = np.array([time])
     if not len(drive.corrections) or not len(drive.odometry):
         return Pose2(*drive.poses.poses_at(at)[0].tolist())
@@ -131,10 +133,13 @@ def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
 
 
 def _estimate(
-    drive: RecordedDrive, start: Pose2, mapless: bool
-) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Evidence | None]:
-    """Return the initial estimate of the localizer if it differs from the default, with its evidence."""
-    if mapless or not len(drive.belief):
+    drive: RecordedDrive, start: Pose2, is_mapless: bool
+) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Reason | None]:
+    """Return the initial estimate of the localizer and the reason for it; None for both if it is the default.
+
+    The estimate is "unknown", or a pose with the standard deviations of x, y (m), and yaw (rad).
+    """
+    if is_mapless or not len(drive.belief):
         return None, None
     values = drive.belief.values[0]
     pose = Pose2(*values[:3].tolist())
@@ -142,11 +147,11 @@ def _estimate(
     time = float(drive.belief.times[0])
     if max(std[:2]) > UNKNOWN_START_STD_M:
         text = f"the first belief has a standard deviation of {max(std[:2]):.1f} m, so the start was unknown"
-        return "unknown", Evidence(text, time, None, "medium")
+        return "unknown", Reason(text, time, None, "medium")
     if pose.distance(start) <= NEAR_TRUTH_M and abs(wrap(pose.yaw - start.yaw)) <= NEAR_TRUTH_RAD:
         return None, None
     text = f"the first belief was {pose.distance(start):.2f} m from the start"
-    return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Evidence(text, time, None, "medium")
+    return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Reason(text, time, None, "medium")
 
 
 def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
@@ -160,16 +165,16 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
         refused = goal.ended is not None and goal.ended - goal.sent < MAX_REFUSAL_S
         expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""
         yield ScenarioGoal(
-            name, goal.pose, _timeout(goal, drive.duration), _goal_evidence(goal), expect, _wait(goal, following)
+            name, goal.pose, _timeout(goal, drive.duration), _goal_reason(goal), expect, _wait(goal, following)
         )
 
 
-def _goal_evidence(goal: RecordedGoal) -> Evidence:
+def _goal_reason(goal: RecordedGoal) -> Reason:
     result = {"unknown": "its result is unknown"}.get(
         goal.status, f"{goal.status}{f' ({goal.error})' if goal.error else ''}"
     )
     confidence = "high" if goal.source.startswith("/") else "medium"
-    return Evidence(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
+    return Reason(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
@@ -187,10 +192,10 @@ def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
     return round(gap, 1) if gap >= MIN_WAIT_S else 0.0
 
 
-def _summary(drive: RecordedDrive, findings: Findings) -> Iterator[str]:
+def _summary(drive: RecordedDrive, estimated: EstimatedParts) -> Iterator[str]:
     yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
-    for incident in findings.incidents:
-        x, y = incident.place
+    for incident in estimated.incidents:
+        x, y = incident.position
         yield f"At {incident.time:.1f} s, at ({x:.2f}, {y:.2f}): {incident.kind}, {incident.detail}."
-    if not findings.incidents:
+    if not estimated.incidents:
         yield "The drive had no incident."

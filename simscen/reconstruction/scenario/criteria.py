@@ -1,4 +1,4 @@
-"""Criteria that a drive suggests: what it held with a margin, and what an incident broke."""
+"""Proposes criteria for a scenario: limits that the drive met, with a margin, and limits that an incident violated."""
 
 from __future__ import annotations
 
@@ -10,74 +10,69 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident
 
 TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
-"""Factors between a measured value and the limit that a criterion allows."""
+"""Ratios of the limits of time, path length, and localization error to the values in the drive."""
 MIN_ERROR_LIMIT_M, MIN_TIME_LIMIT_S = 0.25, 10.0
 """Smallest limits of the localization error and of the time to the goal."""
 MIN_STEP_M = 0.01
-"""Minimum move that counts for the length of a path, as in the criterion path_length."""
+"""Shorter moves do not count for the length of a path, as in the criterion path_length."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
-"""Percentile of the speeds that is the observed limit, because odometry is noisy, and factor to the limit."""
+"""Percentile of the speeds that counts as the highest one, because odometry is noisy, and ratio of the limit to it."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
-"""Factor between the measured time to stop and its limit, and the longest time that is a reaction to a fault."""
+"""Ratio of the limit to the measured time to stop, and longest time in which a stop is a reaction to a fault."""
 REST_SPEED_M_S = 0.01
-"""Speed below which the robot rests."""
+"""The robot rests below this speed in m/s, and below the same turn rate in rad/s."""
 NO_SENSORS = ("cmd_vel", "wheels", "localizer")
-"""Targets of faults after which a stop is not required."""
+"""Targets of faults that are no sensors: the robot need not stop if they fail."""
 
 
 @dataclass(frozen=True)
 class ProposedCriterion:
-    """Criterion in the scenario language with the evidence for its limit."""
+    """Criterion of the scenario language: its key, its parameters by key, and the reason for its limit."""
 
     kind: str
     values: Mapping[str, object]
-    evidence: Evidence
+    reason: Reason
 
 
-def criteria_of(
-    drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], invalid_goals: bool
-) -> list[ProposedCriterion]:
-    """Return criteria for a drive. With `invalid_goals`, all goals are refused as soon as they are sent."""
-    return [*_criteria(drive, incidents, faults, invalid_goals)]
-
-
-def _criteria(
-    drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], invalid_goals: bool
+def propose_criteria(
+    drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], is_refusal_expected: bool
 ) -> Iterator[ProposedCriterion]:
+    """Yield criteria for a drive. `is_refusal_expected` tells whether all goals must fail as soon as they are sent."""
     broken = {incident.criterion: incident for incident in incidents}
     if drive.goals:
-        yield ProposedCriterion("goals_reached", {}, _broken(broken, "goals_reached", "all goals were reached"))
-    contact = _broken(broken, "collisions", "no contact was recorded")
+        yield ProposedCriterion("goals_reached", {}, _limit_reason(broken, "goals_reached", "all goals were reached"))
+    contact = _limit_reason(broken, "collisions", "no contact was recorded")
     yield ProposedCriterion("collisions", {"max": 0}, contact)
     if "stuck" in broken:
-        yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _broken(broken, "stuck", ""))
-    if drive.has_independent_poses and len(drive.belief):
+        yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _limit_reason(broken, "stuck", ""))
+    if drive.has_true_poses and len(drive.belief):
         yield _localization(drive, broken)
-    if not invalid_goals and not {"goals_reached", "stuck"} & set(broken):
+    if not is_refusal_expected and not {"goals_reached", "stuck"} & set(broken):
         yield from _efficiency(drive)
     yield from _speed(drive)
     yield from _stops(drive, faults)
 
 
 def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
-    """Yield the observed speed limit."""
+    """Yield a limit for the speed of the robot."""
     if not len(drive.odometry):
         return
     fastest = float(np.percentile(np.hypot(*drive.odometry.values[:, 3:5].T), SPEED_PERCENTILE))
     if fastest > REST_SPEED_M_S:
         limit = math.ceil(10 * SPEED_MARGIN * fastest) / 10
-        yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Evidence(f"held: at most {fastest:.2f} m/s"))
+        yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Reason(f"held: at most {fastest:.2f} m/s"))
 
 
-def _broken(broken: Mapping[str, Incident], criterion: str, held: str) -> Evidence:
+def _limit_reason(broken: Mapping[str, Incident], criterion: str, held: str) -> Reason:
+    """Return the incident that broke a criterion as a reason, or else the text `held`."""
     incident = broken.get(criterion)
     if incident is None:
-        return Evidence(f"held: {held}")
-    return Evidence(f"broken: {incident.detail}", incident.time)
+        return Reason(f"held: {held}")
+    return Reason(f"broken: {incident.detail}", incident.time)
 
 
 def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
@@ -86,7 +81,7 @@ def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> Propo
     limit = LOST_ERROR_M if "localization_error" in broken else max(MIN_ERROR_LIMIT_M, ERROR_MARGIN * largest)
     text = f"the largest error was {largest:.2f} m"
     return ProposedCriterion(
-        "localization_error", {"max": round(limit, 2)}, _broken(broken, "localization_error", text)
+        "localization_error", {"max": round(limit, 2)}, _limit_reason(broken, "localization_error", text)
     )
 
 
@@ -95,39 +90,39 @@ def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
         return
     took = drive.goals[-1].ended - drive.goals[0].sent
     limit = max(MIN_TIME_LIMIT_S, TIME_MARGIN * took)
-    yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Evidence(f"held: it took {took:.1f} s"))
+    yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Reason(f"held: it took {took:.1f} s"))
     length = path_length(drive.poses.values[:, :2])
     if length > 1.0:
         values = {"max": f"{PATH_MARGIN * length:.1f} m"}
-        yield ProposedCriterion("path_length", values, Evidence(f"held: the robot drove {length:.2f} m"))
+        yield ProposedCriterion("path_length", values, Reason(f"held: the robot drove {length:.2f} m"))
 
 
 def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
-    """Yield a limit for the time to stop, for the first outage of a sensor at which the robot stopped."""
+    """Yield a limit for the time to stop after the first outage of a sensor to which the robot reacted with a stop."""
     for fault in faults:
         if fault.kind != "off" or fault.target in NO_SENSORS or fault.begin is None or fault.duration is None:
             continue
         stop = time_to_rest(drive, fault.begin, fault.begin + fault.duration)
         if stop is not None and 0.05 < stop < MAX_STOP_S:
             values = {"time": f"{STOP_TIME_FACTOR * stop + 0.2:.1f} s", "after": f"{fault.target}.off"}
-            yield ProposedCriterion("stopped_within", values, Evidence(f"held: the robot stopped after {stop:.2f} s"))
+            yield ProposedCriterion("stopped_within", values, Reason(f"held: the robot stopped after {stop:.2f} s"))
             return
 
 
 def time_to_rest(drive: RecordedDrive, begin: float, end: float) -> float | None:
-    """Return the time in s from `begin` until the robot first rests before `end`; None if it does not."""
+    """Return the time in s from `begin` until the robot rests; None if it does not rest before `end`."""
     chosen = (drive.odometry.times >= begin) & (drive.odometry.times <= end)
     speeds = np.abs(drive.odometry.values[chosen][:, 3:6]).max(axis=1) if chosen.any() else np.empty(0)
     rest = np.flatnonzero(speeds < REST_SPEED_M_S)
     return float(drive.odometry.times[chosen][rest[0]] - begin) if len(rest) else None
 
 
-def path_length(places: Array) -> float:
-    """Return the length in m of a path (n, 2), in moves of at least MIN_STEP_M."""
-    if not len(places):
+def path_length(positions: Array) -> float:
+    """Return the length in m of the path through positions (n, 2), in moves of at least MIN_STEP_M."""
+    if not len(positions):
         return 0.0
-    length, last = 0.0, places[0]
-    for place in places[1:]:
+    length, last = 0.0, positions[0]
+    for place in positions[1:]:
         step = float(np.hypot(*(place - last)))
         if step >= MIN_STEP_M:
             length, last = length + step, place

@@ -1,4 +1,4 @@
-"""World, map, robot, and stack of a reconstructed scenario: from options, the header of the log, or its messages."""
+"""Chooses world, map, robot, and stack: from the user's options, else the log header, else the messages of the log."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_world_file
 from simscen.model.world import WorldSpec
+from simscen.reconstruction.compared_scans import compare_scans
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
-from simscen.reconstruction.evidence import Evidence
-from simscen.reconstruction.scan_model import scan_model
+from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.scenario.contents import GivenParts
-from simscen.reconstruction.scenario.robot_file import UNKNOWN_ROBOT, observed_limits, write_robot_file
-from simscen.reconstruction.surroundings import Surroundings, map_from_scans, world_from_map
+from simscen.reconstruction.scenario.robot_file import TYPICAL_ROBOT, observed_limits, write_robot_file
+from simscen.reconstruction.static_world import StaticWorld, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Height at which the world is cut for a log without scans."""
+"""Height of the plane in which the walls of the world are seen, for a log without scans."""
 WALL_MARGIN_M = 0.05
-"""Distance that a wall can be nearer than the center of its cell."""
-MAX_NOISE_SCANS = 100
-"""Number of scans, evenly spread over the drive, from which the noise of a lidar is computed."""
+"""Amount by which a wall can be nearer than the center of its map cell."""
+NOISE_SCANS = 100
+"""For computing the noise of a lidar, the scans are thinned out evenly to at least this number."""
 MAX_EQUAL_MAP_DIFFERENCE = 0.002
-"""Share of cells in which two maps of the same world may differ."""
+"""Largest fraction of cells in which two maps of the same world may differ."""
 
 
 @dataclass(frozen=True)
 class GivenFiles:
-    """Files that the user names instead of what the log says."""
+    """World, map, and robot that the user names; they replace those of the log. `robot` is a file or a name."""
 
     world: Path | None = None
     map: Path | None = None
@@ -49,82 +49,85 @@ class GivenFiles:
 
 @dataclass
 class WorldChoice:
-    """World of the scenario: how it is written, as data, and why. `is_built` if it is from the scans of the log."""
+    """World and map of the scenario, each with its reason.
+
+    `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` tells whether the walls
+    were built from the scans of the log. `files` were written beside the scenario.
+    """
 
     written: str | Mapping[str, Any]
     world: World
-    evidence: Evidence
+    reason: Reason
     map: str = ""
-    map_evidence: Evidence | None = None
+    map_reason: Reason | None = None
     is_built: bool = False
     unknowns: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
-    """Files that were written beside the scenario."""
 
 
 def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return the world and the map, and write those that the log contains beside the scenario `out`.
+    """Return the world and the map of the scenario file `out`, and write beside it those that need a new file.
 
-    Raises InvalidInput for an unusable file, and OSError.
+    Raises InvalidInput for an unusable file, and OSError if a file cannot be written.
     """
     if files.world is not None:
-        choice = _world_of_file(files.world, out, Evidence("given with --world"))
+        choice = _world_of_file(files.world, out, Reason("given with --world"))
     elif isinstance(described.world, Path):
-        choice = _world_of_file(described.world, out, Evidence("world file in the header of the log"))
+        choice = _world_of_file(described.world, out, Reason("world file in the header of the log"))
     elif isinstance(described.world, Mapping):
         spec = WorldSpec.model_validate(described.world)
         world = world_from_spec(spec, spec.name or "world")
-        choice = WorldChoice(described.world, world, Evidence("walls and obstacles in the header of the log"))
+        choice = WorldChoice(described.world, world, Reason("walls and obstacles in the header of the log"))
     else:
         return _world_of_map(drive, files, out)
     height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
     if not described.has_map:
-        choice.map, choice.map_evidence = "none", Evidence("the log has no map")
+        choice.map, choice.map_reason = "none", Reason("the log has no map")
     elif files.map is not None:
-        choice.map, choice.map_evidence = relative(files.map, out), Evidence("given with --map")
-    elif drive.map is not None and _differs(drive.map, Surroundings(choice.world, height).grid):
+        choice.map, choice.map_reason = relative_path(files.map, out), Reason("given with --map")
+    elif drive.map is not None and _differs(drive.map, StaticWorld(choice.world, height).grid):
         file = out.with_name(f"{_stem(out)}_map.yaml")
         save_map(drive.map, file)
         choice.files += [file, file.with_suffix(".pgm")]
-        choice.map, choice.map_evidence = file.name, Evidence("the map on /map differs from the world", 0.0)
+        choice.map, choice.map_reason = file.name, Reason("the map on /map differs from the world", 0.0)
     return choice
 
 
 def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return a world whose walls are those of a map: a given one, that on /map, or one built from the scans."""
+    """Return a world whose walls are those of a map: the given map, the map in the log, or one built from the scans."""
     if files.map is not None:
         loaded = load_world_file(files.map, default_root([files.map]))
         if loaded.map is None:
             raise InvalidInput(
                 [Problem(str(files.map), 0, 0, "SC320", "not a ROS map", "use --world for other worlds")]
             )
-        grid, written = load_map(loaded.map), relative(files.map, out)
-        return WorldChoice(written, world_from_map(grid, _stem(out)), Evidence("given with --map"))
+        grid, written = load_map(loaded.map), relative_path(files.map, out)
+        return WorldChoice(written, world_from_map(grid, _stem(out)), Reason("given with --map"))
     file = out.with_name(f"{_stem(out)}_map.yaml")
     unknowns = ["walls and objects that no scan shows"]
     if drive.map is not None:
-        grid, evidence = drive.map, Evidence("the walls are the occupied cells of /map", 0.0)
+        grid, reason = drive.map, Reason("the walls are the occupied cells of /map", 0.0)
     else:
         grid = map_from_scans(drive)
-        evidence = Evidence("built from the scans along the poses, because the log has no map", None, None, "medium")
+        reason = Reason("built from the scans along the poses, because the log has no map", None, None, "medium")
         unknowns.append("which parts of the built map were on the robot's own map")
     save_map(grid, file)
     written_files = [file, file.with_suffix(".pgm")]
     return WorldChoice(
         file.name,
         world_from_map(grid, _stem(out)),
-        evidence,
+        reason,
         is_built=drive.map is None,
         unknowns=unknowns,
         files=written_files,
     )
 
 
-def _world_of_file(file: Path, out: Path, evidence: Evidence) -> WorldChoice:
+def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
     root = default_root([file])
     loaded = load_world_file(file, root)
     out_root = default_root([out])
-    written, copies = relative(file, out), list[Path]()
+    written, copies = relative_path(file, out), list[Path]()
     if not file.resolve().is_relative_to(out_root.resolve()):
         copy = out.with_name(f"{_stem(out)}{''.join(file.suffixes[-2:])}")
         if loaded.map is not None:
@@ -132,63 +135,62 @@ def _world_of_file(file: Path, out: Path, evidence: Evidence) -> WorldChoice:
         else:
             shutil.copyfile(file, copy)
         written, copies = copy.name, [copy]
-    return WorldChoice(written, world_from_file(loaded, root), evidence, files=copies)
+    return WorldChoice(written, world_from_file(loaded, root), reason, files=copies)
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
-    """Return whether the robot's map has other walls than the world."""
+    """Return whether the robot's map `given` has other walls than the map that is `drawn` from the world."""
     if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
         return True
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
 
 
-def given_parts(
+def prepare_given_parts(
     drive: RecordedDrive,
     described: RunDescription,
     choice: WorldChoice,
     files: GivenFiles,
     out: Path,
-    surroundings: Surroundings,
+    static_world: StaticWorld,
 ) -> GivenParts:
-    """Return the parts of the scenario that are not estimated. Writes a robot file if no robot is named."""
-    evidence = {"world": choice.evidence}
-    if choice.map_evidence is not None:
-        evidence["map"] = choice.map_evidence
+    """Return the parts of the scenario that are not estimated. Write a robot file if neither user nor log names one."""
+    reasons = {"world": choice.reason}
+    if choice.map_reason is not None:
+        reasons["map"] = choice.map_reason
     unknowns = [*choice.unknowns, *described.notes]
     stack = dict(described.stack)
     if files.robot:
-        robot = relative(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
-        evidence["robot"] = Evidence("given with --robot")
+        robot = relative_path(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
+        reasons["robot"] = Reason("given with --robot")
     elif described.robot is not None:
-        robot = relative(described.robot, out) if isinstance(described.robot, Path) else described.robot
-        evidence["robot"] = Evidence("robot in the header of the log")
+        robot = relative_path(described.robot, out) if isinstance(described.robot, Path) else described.robot
+        reasons["robot"] = Reason("robot in the header of the log")
     else:
-        clearance = float(surroundings.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
+        clearance = float(static_world.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
         file = out.with_name(f"{_stem(out)}.robot.yaml")
-        written = write_robot_file(drive, file, _lidar_noise(drive, surroundings), clearance)
+        written = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
         choice.files.append(written.file)
         robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
-        evidence["robot"] = Evidence(written.evidence, None, None, "medium")
+        reasons["robot"] = Reason(written.reason, None, None, "medium")
     if stack:
-        evidence["stack"] = Evidence("configuration of the stack in the header of the log")
+        reasons["stack"] = Reason("configuration of the stack in the header of the log")
     elif described.robot is None:
         unknowns.append("parameters of the navigation stack, besides the speed; the defaults are used")
         speed = observed_limits(drive)[0]
         stack = {"controller": {"type": "regulated_pure_pursuit", "desired_linear_vel": speed}}
-        evidence["stack"] = Evidence(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
-    return GivenParts(choice.written, choice.map, robot, described.seed, stack, evidence, unknowns)
+        reasons["stack"] = Reason(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
+    return GivenParts(choice.written, choice.map, robot, described.seed, stack, reasons, unknowns)
 
 
-def _lidar_noise(drive: RecordedDrive, surroundings: Surroundings) -> float:
-    """Return the usual noise of the ranges in m."""
+def _lidar_noise(drive: RecordedDrive, static_world: StaticWorld) -> float:
+    """Return the median standard deviation of the range noise in m; the typical one without scans."""
     if drive.scans is None or len(drive.scans) < 3:
-        return UNKNOWN_ROBOT.lidar_noise
-    scans = drive.scans.every(max(1, len(drive.scans) // MAX_NOISE_SCANS))
-    return float(np.median(scan_model(drive, scans, surroundings).noise))
+        return TYPICAL_ROBOT.lidar_noise
+    return float(np.median(compare_scans(drive, drive.scans.thinned(NOISE_SCANS), static_world).noise))
 
 
-def relative(file: Path, out: Path) -> str:
-    """Return the path of a file relative to the folder of the scenario."""
+def relative_path(file: Path, out: Path) -> str:
+    """Return the path of a file relative to the folder of the scenario file `out`."""
     return os.path.relpath(file.resolve(), out.parent.resolve())
 
 

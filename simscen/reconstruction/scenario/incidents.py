@@ -1,4 +1,4 @@
-"""Incidents of a drive: contact, standstill with a goal, wrong localization, failed goals, and time-outs."""
+"""Finds the incidents of a drive: contacts, standstills with a goal, wrong localization, failed or unfinished goals."""
 
 from __future__ import annotations
 
@@ -10,84 +10,88 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
-from simscen.reconstruction.evidence import windows
+from simscen.reconstruction.reasons import windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
 """A robot with a goal is stuck if it stays within this radius for this time, as in Nav2's progress checker."""
 MAX_COMMAND_HOLD_S = 0.5
-"""Maximum time for which a command counts; bases stop without a new one."""
+"""A command counts for at most this time, because bases stop if no new one arrives."""
 LOST_ERROR_M = 0.5
 """Localization error above which the robot is lost."""
 MAX_STD_M = 1.0
-"""Standard deviation of the belief above which the robot is lost, if no ground truth exists."""
+"""Standard deviation of the believed position above which the robot is lost, for logs without a ground truth."""
 
 
 @dataclass(frozen=True)
 class Incident:
-    """Something that went wrong.
+    """Something that went wrong in a drive.
 
     Attributes:
         kind: "contact", "stuck", "lost", "failed goal", or "unfinished goal".
-        time: When it began, in s.
-        place: Position of the robot then.
+        time: Time in s at which it began.
+        position: Position (x, y) of the robot at this time, in the map frame.
         detail: What happened, in words.
-        criterion: Criterion that it breaks.
+        criterion: Name of the criterion that it violates.
     """
 
     kind: str
     time: float
-    place: tuple[float, float]
+    position: tuple[float, float]
     detail: str
     criterion: str
 
 
-def incidents_of(drive: RecordedDrive) -> list[Incident]:
+def find_incidents(drive: RecordedDrive) -> list[Incident]:
     """Return the incidents of a drive in order of time."""
     found = [*_contacts(drive), *_standstills(drive), *_lost(drive), *_goals(drive)]
     return sorted(found, key=lambda incident: (incident.time, incident.kind))
 
 
-def _place(drive: RecordedDrive, time: float) -> tuple[float, float]:
+def _position(drive: RecordedDrive, time: float) -> tuple[float, float]:
     x, y, _ = drive.poses.poses_at(np.array([time]))[0].tolist()
     return x, y
 
 
 def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield the times at which the bumper was pressed."""
+    """Yield an incident for each time in which the bumper was pressed."""
     for pressed in windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
         detail = f"the bumper was pressed for {max(pressed.length, 0.05):.2f} s"
-        yield Incident("contact", pressed.begin, _place(drive, pressed.begin), detail, "collisions")
+        yield Incident("contact", pressed.begin, _position(drive, pressed.begin), detail, "collisions")
 
 
 def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield the longest standstill during each goal that lasts STUCK_S."""
+    """Yield the longest standstill on the way to each goal if it lasts longer than STUCK_S.
+
+    At a goal that is only derived from a stop, the robot may wait or be parked. There, a standstill is an incident only
+    if the robot was commanded to drive.
+    """
     for goal in drive.goals:
         end = drive.duration if goal.ended is None else goal.ended
         chosen = (drive.poses.times >= goal.sent) & (drive.poses.times <= end)
-        times, places = drive.poses.times[chosen], drive.poses.values[chosen, :2]
-        begin, length = longest_stay(times, places, STUCK_RADIUS_M)
+        times, positions = drive.poses.times[chosen], drive.poses.values[chosen, :2]
+        begin, length = longest_stay(times, positions, STUCK_RADIUS_M)
         is_estimated = goal.source in (STOP_SOURCE, BEND_SOURCE)
-        if length > STUCK_S and (not is_estimated or _is_told_to_leave(drive.commands, begin, begin + length)):
+        if length > STUCK_S and (not is_estimated or _is_commanded_to_leave(drive.commands, begin, begin + length)):
             detail = f"the robot stayed within {STUCK_RADIUS_M} m for {length:.1f} s"
-            yield Incident("stuck", begin, _place(drive, begin), detail, "stuck")
+            yield Incident("stuck", begin, _position(drive, begin), detail, "stuck")
 
 
-def _is_told_to_leave(commands: TimedValues, begin: float, end: float) -> bool:
-    """Return whether the commands are to drive, in sum, farther than the circle in which the robot stayed.
-
-    Where a goal is only known from where the robot stopped, one that stands may wait or be parked.
-    """
+def _is_commanded_to_leave(commands: TimedValues, begin: float, end: float) -> bool:
+    """Return whether all commands together would have moved the robot out of the circle in which it stayed."""
     inside = (commands.times >= begin) & (commands.times <= end)
     held = np.minimum(np.diff(commands.times[inside], append=end), MAX_COMMAND_HOLD_S)
     return float(np.hypot(*(commands.values[inside, :2].T @ held))) > 2 * STUCK_RADIUS_M
 
 
-def longest_stay(times: Array, places: Array, radius: float) -> tuple[float, float]:
-    """Return the start and length in s of the longest time within `radius` of a position (n, 2), (0, 0) if empty."""
+def longest_stay(times: Array, positions: Array, radius: float) -> tuple[float, float]:
+    """Return start and duration in s of the longest stay within `radius` m of a position; (0, 0) without positions.
+
+    `positions` (n, 2) are those at `times` (n,) in s.
+    """
     best, begin = 0.0, 0.0
     at = 0
     while at < len(times):
-        away = np.flatnonzero(np.hypot(*(places[at:] - places[at]).T) > radius)
+        away = np.flatnonzero(np.hypot(*(positions[at:] - positions[at]).T) > radius)
         end = at + (int(away[0]) if len(away) else len(times) - at)
         last = min(end, len(times) - 1)
         if times[last] - times[at] > best:
@@ -99,31 +103,32 @@ def longest_stay(times: Array, places: Array, radius: float) -> tuple[float, flo
 
 
 def _lost(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield the times at which the belief was wrong or, without a ground truth, uncertain."""
+    """Yield an incident for each time in which the belief was wrong or, without a ground truth, uncertain."""
     if not len(drive.belief):
         return
     belief = drive.belief
-    if drive.has_independent_poses:
+    if drive.has_true_poses:
         errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
         for window in windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):
             largest = float(errors[window.samples].max())
             detail = f"the localization error reached {largest:.2f} m"
-            yield Incident("lost", window.begin, _place(drive, window.begin), detail, "localization_error")
+            yield Incident("lost", window.begin, _position(drive, window.begin), detail, "localization_error")
         return
     deviation = np.sqrt(np.maximum(belief.values[:, 3], belief.values[:, 6]))
     for window in windows(deviation > MAX_STD_M, belief.times, min_length=0.5, max_gap=1.0):
         detail = f"the localizer reported a standard deviation of {float(deviation[window.samples].max()):.2f} m"
-        yield Incident("lost", window.begin, _place(drive, window.begin), detail, "localization_error")
+        yield Incident("lost", window.begin, _position(drive, window.begin), detail, "localization_error")
 
 
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
         name = goal.name or f"goal-{number + 1}"
         if goal.status == "failed" and goal.ended is not None:
             code = f" with {goal.error}" if goal.error else ""
             yield Incident(
-                "failed goal", goal.ended, _place(drive, goal.ended), f"`{name}` failed{code}", "goals_reached"
+                "failed goal", goal.ended, _position(drive, goal.ended), f"`{name}` failed{code}", "goals_reached"
             )
         elif goal.ended is None and number == len(drive.goals) - 1:
             detail = f"`{name}` has no result when the log ends"
-            yield Incident("unfinished goal", drive.duration, _place(drive, drive.duration), detail, "goals_reached")
+            yield Incident("unfinished goal", drive.duration, _position(drive, drive.duration), detail, "goals_reached")

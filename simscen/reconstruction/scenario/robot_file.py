@@ -1,4 +1,4 @@
-"""Properties of the robot of a drive: from its robot file, or a new file with what the messages of the log show."""
+"""Reads properties of a robot from its robot file, or writes a robot file with what the log shows of the robot."""
 
 from __future__ import annotations
 
@@ -19,89 +19,95 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, Ti
 
 
 @dataclass(frozen=True)
-class KnownRobot:
-    """Properties of a robot.
+class RobotProperties:
+    """Properties of a robot that the estimators need.
 
     Attributes:
-        lidar_noise: Standard deviation of the ranges of the lidar in m.
-        radius: Radius of the circle around its footprint in m.
-        separation: Distance of the left and right wheels in m.
-        skids: Whether the wheels skid in turns.
-        sensors: Names of its sensors by the usual name: "lidar", "odom", "imu". Empty if they are unknown.
-        is_known: Whether the properties are those of the robot; otherwise they are those of a usual one.
+        lidar_noise: Standard deviation of the lidar's ranges in m.
+        radius: Radius in m of the circle around the footprint.
+        wheel_separation: Distance in m between left and right wheels.
+        skids: Whether the wheels skid sideways in turns, as those of a skid-steer robot do.
+        sensors: Name in the robot file of each sensor "lidar", "odom", or "imu"; empty if the file is unknown.
+        is_known: Whether the properties are those of the recorded robot; otherwise they are those of a typical one.
     """
 
     lidar_noise: float = 0.01
     radius: float = 0.25
-    separation: float = 0.287
+    wheel_separation: float = 0.287
     skids: bool = False
     sensors: Mapping[str, str] = field(default_factory=dict)
     is_known: bool = False
 
 
-UNKNOWN_ROBOT = KnownRobot()
+TYPICAL_ROBOT = RobotProperties()
+"""Properties that are assumed for a robot without a usable robot file."""
 
 
-def known_robot(written: str, folder: Path, is_known: bool) -> KnownRobot:
-    """Return the properties of a robot that a scenario in a folder names. `is_known` if it is the robot of the log."""
+def robot_properties(written: str, folder: Path, is_known: bool) -> RobotProperties:
+    """Return the properties of the robot file or shipped robot `written`; the typical ones if it cannot be loaded.
+
+    `folder` is the folder of the scenario. `is_known` tells whether the file describes the recorded robot.
+    """
     file = folder / written
     name = str(file) if file.is_file() else written
     try:
         spec = load_robot_file(name, default_root([file if file.is_file() else folder / "x"])).robot.spec
     except SimscenError:
-        return UNKNOWN_ROBOT
+        return TYPICAL_ROBOT
     if spec is None:
-        return UNKNOWN_ROBOT
+        return TYPICAL_ROBOT
     lidars = [sensor.lidar for sensor in spec.sensors.values() if sensor.lidar]
-    noise = lidars[0].noise if lidars else UNKNOWN_ROBOT.lidar_noise
-    separation = float(getattr(spec.drive, "wheel_separation", UNKNOWN_ROBOT.separation))
+    noise = lidars[0].noise if lidars else TYPICAL_ROBOT.lidar_noise
+    wheel_separation = float(getattr(spec.drive, "wheel_separation", TYPICAL_ROBOT.wheel_separation))
     names: dict[str, str] = {}
     for name, sensor in spec.sensors.items():
         kinds = ("lidar", sensor.lidar), ("odom", sensor.odometry), ("imu", sensor.imu)
         names |= {usual: name for usual, given in kinds if given and usual not in names}
     corners = (math.hypot(x, y) for x, y in spec.footprint or ())
-    radius = spec.radius or max(corners, default=UNKNOWN_ROBOT.radius)
-    return KnownRobot(noise, radius, separation, spec.drive.type == "skid_steer", names, is_known)
+    radius = spec.radius or max(corners, default=TYPICAL_ROBOT.radius)
+    return RobotProperties(noise, radius, wheel_separation, spec.drive.type == "skid_steer", names, is_known)
 
 
 TICK_RATE_HZ = 240
-"""Default tick rate of scenarios, which the rates of sensors must divide."""
+"""Default tick rate of scenarios, which must be a multiple of the sensor rates."""
 DEFAULT_RADIUS_M, MIN_RADIUS_M = 0.22, 0.1
-"""Radius of a robot whose footprint is unknown, and the smallest one, for a robot that drove close to walls."""
+"""Assumed radius of a robot with unknown footprint, and lower limit of this radius if it drove close to walls."""
 DEFAULT_MASS_KG, DEFAULT_ACCELERATION_M_S2, DEFAULT_TURN_ACCELERATION_RAD_S2 = 5.0, 1.0, 3.2
-"""Mass and accelerations that a log does not show."""
+"""Assumed mass and accelerations, which a log does not show."""
 BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
-"""Heights of the body, and smallest height of a lidar, which must be above the body."""
-WHEEL_RADIUS_M, SEPARATION_PER_RADIUS = 0.033, 1.3
-"""Radius of the wheels, and ratio of their separation to half the width of the robot."""
+"""Assumed heights of the body, and smallest height of a lidar, which must be above the body."""
+WHEEL_RADIUS_M, SEPARATION_PER_HALF_WIDTH = 0.033, 1.3
+"""Assumed radius of the wheels, and ratio of their separation to half the width of the robot."""
 VELOCITY_STEP_S = 0.25
 """Time over which velocities are averaged, if only poses are known."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
-"""Percentile of the speeds that is the observed limit, because odometry is noisy, and factor to the limit."""
+"""Percentile of the speeds that counts as the highest one, because odometry is noisy, and ratio of the limit to it."""
 MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
-"""Smallest limits, for a robot that hardly moves."""
+"""Lower limits of the speed limits, for a robot that hardly moves."""
 MAX_BEAMS = 4096
-"""Largest number of beams of a lidar in a robot file."""
+"""Largest number of beams of a lidar that robot files allow."""
 
 
 @dataclass(frozen=True)
 class WrittenRobot:
-    """A robot file, what it is from in words, and what the log does not show about the robot."""
+    """Written robot file, with the reason for its content and phrases about what the log does not show of the robot."""
 
     file: Path
-    evidence: str
+    reason: str
     unknowns: list[str]
 
 
 def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clearance: float) -> WrittenRobot:
     """Write a robot file with what a drive shows of its robot.
 
-    `lidar_noise` is that of the ranges in m, and `clearance` the smallest distance in m of the base to a wall.
+    `lidar_noise` is the standard deviation of the ranges in m. `clearance` is the smallest distance in m between the
+    origin of the base and a wall, which limits the radius of the robot.
     """
     speed, turn_rate = observed_limits(drive)
     unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
     assumed = max(MIN_RADIUS_M, min(DEFAULT_RADIUS_M, math.floor(100 * clearance) / 100))
     radius = max((math.hypot(*corner) for corner in drive.footprint), default=assumed)
+    half_width = max((abs(y) for _, y in drive.footprint), default=radius)
     outline: dict[str, Any] = {"radius": radius}
     body: dict[str, Any] = {"cylinder": [round(radius, 3), round(BODY_TOP_M - BODY_BOTTOM_M, 3)], "z": BODY_BOTTOM_M}
     if drive.footprint:
@@ -120,7 +126,7 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
         "drive": {
             "type": "differential",
             "wheel_radius": WHEEL_RADIUS_M,
-            "wheel_separation": round(SEPARATION_PER_RADIUS * _inner_radius(drive, radius), 3),
+            "wheel_separation": round(SEPARATION_PER_HALF_WIDTH * half_width, 3),
         },
         "limits": {
             "linear": speed,
@@ -136,9 +142,9 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
 
 
 def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
-    """Return the largest speed in m/s and turn rate in rad/s of a drive.
+    """Return limits for the speed in m/s and the turn rate in rad/s: the highest of the drive, with a margin.
 
-    They are those of its odometry and commands, or else of its poses.
+    They are computed from odometry and commands; from the poses if the log has neither.
     """
     speeds = _largest(drive.odometry, 3), _largest(drive.commands, 0)
     turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
@@ -160,11 +166,6 @@ def _velocities(poses: TimedValues) -> TimedValues:
     steps = np.diff(poses.poses_at(times), axis=0) / VELOCITY_STEP_S
     turns = np.diff(np.unwrap(poses.poses_at(times)[:, 2])) / VELOCITY_STEP_S
     return TimedValues(times[1:], np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), turns)), times[1:])
-
-
-def _inner_radius(drive: RecordedDrive, radius: float) -> float:
-    """Return half the width of the robot in m."""
-    return max((abs(y) for _, y in drive.footprint), default=radius)
 
 
 def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
@@ -198,7 +199,7 @@ def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
 
 
 def _rate(times: Array, usual: float) -> float:
-    """Return the rate in Hz nearest to that of a signal that divides the tick rate."""
+    """Return the divisor of the tick rate, in Hz, nearest to the rate of a signal; to `usual` if it has no rate."""
     measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else usual
     divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
     return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

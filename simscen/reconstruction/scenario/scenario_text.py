@@ -1,4 +1,4 @@
-"""Text of a reconstructed scenario: YAML in which a comment gives the evidence for each part."""
+"""Formats a reconstructed scenario as YAML, with a comment for each part that gives the reason for it."""
 
 from __future__ import annotations
 
@@ -13,60 +13,56 @@ from typing import Any
 from simscen.core.geometry import Pose2
 from simscen.loading.files.single_files import CompactDumper
 from simscen.loading.yaml.scalars import to_yaml
-from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
+from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrians import is_person
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 
 MAX_COLUMNS = 118
+"""Maximum length of a line."""
 OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
-"""Heights of objects and people, which a planar lidar does not see."""
+"""Assumed heights of objects and people, which a planar lidar does not see."""
 NO_BREAK_SPACE = "\x00"
-"""Placeholder for a space at which no line is broken."""
+"""Placeholder for a space at which lines must not be broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
 
 
 @dataclass(frozen=True)
 class ScenarioGoal:
-    """Goal of the reconstructed scenario: `pose` in the map frame; `timeout` and `wait`, at the goal, in s.
+    """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
 
-    `expect` is the error code with which the goal is expected to fail, "" if it must be reached.
+    `expect` is the name of the error code with which the goal must fail, "" if it must be reached.
     """
 
     name: str
     pose: Pose2
     timeout: float
-    evidence: Evidence
+    reason: Reason
     expect: str = ""
     wait: float = 0.0
 
 
 @dataclass(frozen=True)
 class ScenarioContents:
-    """Everything that the text of a scenario holds.
+    """Contents of a scenario file.
 
     Attributes:
-        name: Name of the scenario.
         source: Name of the log.
         summary: Sentences about the drive.
-        seed: Seed of the run.
         world: World file, or an inline world.
         map: Map file or "none"; "" for the map of the world.
         robot: Robot file or name of a shipped robot.
-        start: True start pose.
-        estimate: Initial estimate with standard deviations x, y, yaw; None for the default, "unknown" for anywhere.
-        stack: Configuration of the stack.
-        passing_radius: Distance in m at which a pose counts as passed; None if the robot stops at each goal.
-        goals: Goals in their order.
-        stops_at_failure: Whether the drive ends at the first failed goal.
-        time_limit: Time limit in s.
+        start: True start pose in the map frame.
+        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
+            not know where the robot is; None for the default.
+        passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
+        goals: Goals in the order in which they are sent.
+        stops_at_failure: Whether the run ends at the first failed goal.
         objects: Objects and pedestrians that the scenario spawns.
-        kidnaps: Time in s, new pose in the map frame, and evidence of each kidnapping.
-        faults: Faults of sensors, commands, and localizer.
-        criteria: Pass criteria.
-        evidence: Evidence by key of the scenario.
-        unknowns: What the log does not show.
+        kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
+        reasons: Reasons by key of the scenario, for parts without a reason of their own.
+        unknowns: Phrases about what the log does not show.
     """
 
     name: str
@@ -84,15 +80,15 @@ class ScenarioContents:
     stops_at_failure: bool
     time_limit: float
     objects: Sequence[FoundObject]
-    kidnaps: Sequence[tuple[float, Pose2, Evidence]]
+    kidnaps: Sequence[tuple[float, Pose2, Reason]]
     faults: Sequence[FoundFault]
     criteria: Sequence[ProposedCriterion]
-    evidence: Mapping[str, Evidence]
+    reasons: Mapping[str, Reason]
     unknowns: Sequence[str]
 
 
 def scenario_text(contents: ScenarioContents) -> str:
-    """Return the scenario as YAML."""
+    """Return the YAML text of the scenario file."""
     return "\n".join(_lines(contents)) + "\n"
 
 
@@ -110,17 +106,17 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     yield "tags: [from-log]"
     yield f"seed: {contents.seed}"
     yield ""
-    yield from _evidence(contents, "world")
+    yield from _reason(contents, "world")
     yield from _entry("world", contents.world)
     if contents.map:
-        yield from _evidence(contents, "map")
+        yield from _reason(contents, "map")
         yield from _entry("map", contents.map)
     yield from _robot(contents)
     if contents.stack:
-        yield from _evidence(contents, "stack")
+        yield from _reason(contents, "stack")
         yield from _entry("stack", dict(contents.stack))
     if contents.passing_radius is not None:
-        yield from _evidence(contents, "navigation")
+        yield from _reason(contents, "navigation")
         yield f"navigation: {{mode: navigate_through_poses, radius: {contents.passing_radius:g} m}}"
     if not contents.stops_at_failure:
         yield "on_goal_failure: continue"
@@ -131,12 +127,12 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
         yield ""
         yield "faults:"
         for fault in contents.faults:
-            yield from _comment(fault.evidence.comment, "  ")
+            yield from _comment(fault.reason.comment, "  ")
             yield f"  - {_flow(_fault_entry(fault))}"
     yield ""
     yield "pass:"
     for criterion in contents.criteria:
-        yield from _comment(criterion.evidence.comment, "  ")
+        yield from _comment(criterion.reason.comment, "  ")
         yield f"  - {criterion.kind}: {_flow(dict(criterion.values))}"
 
 
@@ -151,22 +147,22 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
     )
 
 
-def _evidence(contents: ScenarioContents, key: str) -> list[str]:
-    evidence = contents.evidence.get(key)
-    return [] if evidence is None else _comment(evidence.comment)
+def _reason(contents: ScenarioContents, key: str) -> list[str]:
+    reason = contents.reasons.get(key)
+    return [] if reason is None else _comment(reason.comment)
 
 
 def _robot(contents: ScenarioContents) -> Iterator[str]:
     yield ""
-    yield from _evidence(contents, "robot")
+    yield from _reason(contents, "robot")
     yield "robot:"
     yield f"  model: {_text(contents.robot)}"
-    if (start := contents.evidence.get("start")) is not None:
+    if (start := contents.reasons.get("start")) is not None:
         yield from _comment(start.comment, "  ")
     yield f"  pose: {_pose(contents.start)}"
     if contents.estimate is None:
         return
-    if (estimate := contents.evidence.get("estimate")) is not None:
+    if (estimate := contents.reasons.get("estimate")) is not None:
         yield from _comment(estimate.comment, "  ")
     if isinstance(contents.estimate, str):
         yield f"  initial_estimate: {contents.estimate}"
@@ -180,7 +176,7 @@ def _goals(contents: ScenarioContents) -> Iterator[str]:
     yield ""
     yield "goals:" if contents.goals else "goals: []"
     for goal in contents.goals:
-        yield from _comment(goal.evidence.comment, "  ")
+        yield from _comment(goal.reason.comment, "  ")
         entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:g} s"
         entry += f", expect: {{error_code: {goal.expect}}}" if goal.expect else ""
         entry += f", on_reached: {{wait: {goal.wait:.1f} s}}" if goal.wait else ""
@@ -195,23 +191,23 @@ def _events(contents: ScenarioContents) -> Iterator[str]:
     for thing in contents.objects:
         yield from _comment(thing.comment, "  ")
         yield from _object(thing)
-    for time, pose, evidence in contents.kidnaps:
-        yield from _comment(evidence.comment, "  ")
+    for time, pose, reason in contents.kidnaps:
+        yield from _comment(reason.comment, "  ")
         yield f"  - name: robot is carried off at {time:.1f} s"
         yield f"    when: {{time: {time:.2f} s}}"
         yield f"    do: {{kidnap: {{pose: {_pose(pose)}}}}}"
 
 
 def _object(thing: FoundObject) -> Iterator[str]:
-    yield from _scripted_object(thing) if thing.walk is None else _pedestrian(thing.walk)
+    yield from _scripted_object(thing) if thing.pedestrian is None else _pedestrian(thing.pedestrian)
     if thing.disappears is not None:
         yield f"  - name: {_text(f'{thing.name} disappears')}"
         yield f"    when: {{time: {thing.disappears:.2f} s}}"
         yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
 
 
-def _pedestrian(walk: FoundWalk) -> Iterator[str]:
-    walker = walk.walker
+def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
+    walker = fitted.walker
     goals = ", ".join(f"[{x:.2f}, {y:.2f}]" for x, y in walker.goals)
     keys = [
         f"name: {_text(walker.name)}",
@@ -225,7 +221,7 @@ def _pedestrian(walk: FoundWalk) -> Iterator[str]:
     if walker.blind_to:
         keys.append(f"blind_to: [{', '.join(sorted(walker.blind_to))}]")
     yield f"  - name: {_text(f'{walker.name} appears')}"
-    yield f"    when: {{time: {walk.begin:.2f} s}}"
+    yield f"    when: {{time: {fitted.begin:.2f} s}}"
     yield "    do:"
     yield "      pedestrian:"
     glued = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)
@@ -267,7 +263,7 @@ def _pose(pose: Pose2) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text as a YAML scalar that is also valid in flow style."""
+    """Return a string as a YAML scalar, with quotes if it is not plain in flow style."""
     plain = to_yaml({"x": text}).removeprefix("x: ").rstrip("\n")
     return plain if _PLAIN.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
 
@@ -279,7 +275,7 @@ def _entry(key: str, value: Any) -> list[str]:
 
 
 def _flow(value: Any) -> str:
-    """Return a value in YAML's flow style, on one line."""
+    """Return a mapping, sequence, or scalar in YAML's flow style, on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):

@@ -1,1 +1,1 @@
-"""Comparison of a run of the reconstructed scenario with the log, and the page that shows both."""
+"""Compares a run of the reconstructed scenario with the log, and creates the page that shows both."""

@@ -1,4 +1,4 @@
-"""Comparison of a run of the reconstructed scenario with the drive that it is from."""
+"""Compares a run of a reconstructed scenario with the recorded drive: paths, times, scans, and incidents."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans
 from simscen.reconstruction.scenario.criteria import path_length
-from simscen.reconstruction.scenario.incidents import Incident, incidents_of
+from simscen.reconstruction.scenario.incidents import Incident, find_incidents
 from simscen.reconstruction.scenario_from_log import Reconstruction
 from simscen.record.mcap_reader import attached_result
 
 STEP_S = 0.1
 """Time between two compared positions."""
-SAME_PLACE_M = 0.3
-"""Maximum distance between both robots at which their scans are compared."""
+SAME_POSITION_M = 0.3
+"""Scans of both drives are compared if the robots are nearer to each other than this."""
 SAME_RANGE_M = 0.2
-"""Maximum difference between two ranges that show the same."""
+"""Maximum difference between two ranges that count as equal."""
 MIN_SCANS = 3
-"""Number of scans that must show a range, because a single one may be an error."""
+"""Number of scans that must show a range at most this long, because a single one may be an error."""
 MAX_INCIDENT_DISTANCE_M, MAX_INCIDENT_TIME_S = 1.0, 5.0
-"""Distance and time within which the same kind of incident counts as the same incident."""
+"""Distance and time within which an incident of the same kind counts as the same incident."""
 
 
 @dataclass(frozen=True)
 class ComparedQuantity:
-    """One row of the comparison, as text."""
+    """One row of the comparison as texts: a quantity, its values in log and run, and their difference."""
 
     name: str
     log: str
@@ -40,21 +40,21 @@ class ComparedQuantity:
 
 @dataclass(frozen=True)
 class ComparedIncident:
-    """An incident of the log, and the nearest incident of the same kind in the run; None if there is none."""
+    """Incident of the log, and the incident of the same kind in the run that is nearest in time; None without one."""
 
     recorded: Incident
     repeated: Incident | None
 
     @property
     def distance(self) -> float:
-        """Distance in m between both places; inf if it did not happen again."""
+        """Distance in m between the positions of both incidents; inf if the run has none."""
         if self.repeated is None:
             return float("inf")
-        return float(np.hypot(*(np.array(self.recorded.place) - np.array(self.repeated.place))))
+        return float(np.hypot(*(np.array(self.recorded.position) - np.array(self.repeated.position))))
 
     @property
     def is_reproduced(self) -> bool:
-        """Whether it happened again, near the same place and time."""
+        """Whether the incident of the run is near the position and the time of that in the log."""
         if self.repeated is None:
             return False
         late = abs(self.repeated.time - self.recorded.time)
@@ -62,7 +62,7 @@ class ComparedIncident:
 
     @property
     def sentence(self) -> str:
-        """What became of the incident."""
+        """Sentence that states whether the run reproduced the incident."""
         what = f"{self.recorded.kind} at {self.recorded.time:.2f} s ({self.recorded.detail})"
         if self.repeated is None:
             return f"not reproduced: {what}"
@@ -73,16 +73,14 @@ class ComparedIncident:
 
 @dataclass(frozen=True)
 class Verification:
-    """Result of a verification.
+    """Result of comparing a recorded drive with a run of its reconstructed scenario.
 
     Attributes:
-        drive: The recorded drive.
-        repeated: The drive of the run, read from its log.
-        log: Log of the run.
-        quantities: Rows of the comparison.
-        incidents: Incidents of the log.
-        new_incidents: Incidents of the run that the log does not have.
-        failed: Criteria that failed in the run.
+        drive: Recorded drive.
+        repeated: Drive of the run, with the log `log`.
+        incidents: Incidents of the recorded drive with those of the run.
+        new_incidents: Incidents of the run without a match in the recorded drive.
+        failed: Names of the criteria that did not pass in the run.
     """
 
     drive: RecordedDrive
@@ -94,15 +92,15 @@ class Verification:
     failed: Sequence[str]
 
     @property
-    def reproduces(self) -> bool:
-        """Whether all incidents of the log happened again."""
+    def is_reproduced(self) -> bool:
+        """Whether the run reproduced all incidents of the log."""
         return all(incident.is_reproduced for incident in self.incidents)
 
 
 def compare_with_run(made: Reconstruction, log: Path) -> Verification:
-    """Compare a drive with the log of a run of its reconstructed scenario. Raises InvalidInput for an unusable log."""
+    """Compare the recorded drive with the log of a run of the scenario. Raises InvalidInput for an unusable log."""
     repeated = read_drive(log, DriveOptions())
-    incidents, others = compare_incidents(incidents_of(made.drive), incidents_of(repeated))
+    incidents, others = compare_incidents(find_incidents(made.drive), find_incidents(repeated))
     verdicts = (attached_result(log) or {}).get("verdicts", [])
     failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
     quantities = [*compare_drives(made.drive, repeated)]
@@ -112,7 +110,7 @@ def compare_with_run(made: Reconstruction, log: Path) -> Verification:
 def compare_incidents(
     recorded: Sequence[Incident], repeated: Sequence[Incident]
 ) -> tuple[list[ComparedIncident], list[Incident]]:
-    """Return for each recorded incident the nearest repeated one of its kind, and the repeated ones without a match."""
+    """Return each recorded incident with its match in the run, and the incidents of the run without a match."""
     left = [*repeated]
     compared = []
     for incident in recorded:
@@ -145,7 +143,7 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
     clearances = nearest_return(recorded), nearest_return(repeated)
     if None not in clearances:
         yield _numbers("nearest return of the lidar", float(clearances[0] or 0), float(clearances[1] or 0), "m")
-    seen = share_seen_alike(recorded, repeated, times)
+    seen = fraction_seen_alike(recorded, repeated, times)
     if seen is not None:
         text = f"{100 * seen:.0f} % within {SAME_RANGE_M:g} m"
         yield ComparedQuantity("ranges at the same place", "", "", text)
@@ -169,7 +167,7 @@ def _outcome(goal: RecordedGoal) -> str:
 
 
 def common_times(recorded: RecordedDrive, repeated: RecordedDrive) -> Array:
-    """Return the times (n,), every STEP_S, that both drives have."""
+    """Return times (n,) in s, every STEP_S, until the shorter of both drives ends."""
     times: Array = np.arange(0.0, min(recorded.duration, repeated.duration), STEP_S)
     return times
 
@@ -181,17 +179,14 @@ def distances_between(recorded: RecordedDrive, repeated: RecordedDrive, times: A
 
 
 def distances_to_path(points: Array, path: Array) -> Array:
-    """Return the distances (n,) of points (n, 2) from the nearest of the points (m, 2) of a path."""
+    """Return the distances (n,) in m of `points` (n, 2) from the nearest of the points (m, 2) of a path."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(path).query(points)[0], dtype=np.float64)
 
 
 def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
-    """Return the times (n,) in s of the scans, and the smallest range in m of each; None without scans.
-
-    Scans without a return are left out.
-    """
+    """Return times (n,) in s and smallest ranges (n,) in m of all scans with a return; None with few scans."""
     if drive.scans is None or len(drive.scans) < MIN_SCANS:
         return None
     nearest = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
@@ -200,7 +195,7 @@ def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
 
 
 def nearest_return(drive: RecordedDrive) -> float | None:
-    """Return the smallest range in m that at least three scans have measured; None if there are fewer."""
+    """Return the MIN_SCANS-th smallest of the smallest ranges of all scans, in m; None with fewer scans."""
     found = nearest_returns(drive)
     if found is None or len(found[1]) < MIN_SCANS:
         return None
@@ -208,19 +203,20 @@ def nearest_return(drive: RecordedDrive) -> float | None:
 
 
 def _hits(scans: Scans) -> Array:
-    """Return the ranges (n, beams), nan where nothing returned, which lidars write as 0, inf, or nan."""
+    """Return the ranges (n, beams) in m; nan where nothing returned, for which lidars write 0, inf, or nan."""
     return np.where(scans.is_hit(), scans.ranges, np.nan)
 
 
-def share_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
-    """Return the share of the beams that show the same while both robots are near the same place; None if never.
+def fraction_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
+    """Return the fraction of beams with equal ranges at the `times` (n,) at which both robots are near each other.
 
-    Beams are compared with those in the same direction, because the robots may have different headings.
+    Beams with the same direction on the map are compared, because the robots may have different headings. Returns None
+    without these beams.
     """
     one, other = recorded.scans, repeated.scans
     if one is None or other is None or not len(one) or not len(other) or len(other.angles) < 2:
         return None
-    near = distances_between(recorded, repeated, times) < SAME_PLACE_M
+    near = distances_between(recorded, repeated, times) < SAME_POSITION_M
     first = np.clip(np.searchsorted(one.times, times[near]), 0, len(one) - 1)
     second = np.clip(np.searchsorted(other.times, times[near]), 0, len(other) - 1)
     if not len(first):

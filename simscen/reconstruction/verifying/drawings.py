@@ -1,13 +1,13 @@
-"""SVG drawings of a verification: a drive on its map, and charts over time."""
+"""Draws a verification as SVG: a drive on its map, and charts of values over time."""
 
 from __future__ import annotations
 
 import base64
-import html
 import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 from PIL import Image
@@ -17,33 +17,29 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
-from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
-"""Colors of occupied and unknown cells, and of cells in which the lidar measured something that is not on the map."""
+"""RGBA colors of occupied and unknown cells, and of cells in which the lidar measured something that is not a wall."""
 WALL_DISTANCE_M = 0.15
 """Distance from a wall up to which a return belongs to the wall."""
-MAX_SCANS, MAX_POINTS = 300, 600
-"""Largest number of scans, and of points of a line, that are drawn."""
+TARGET_SCANS, TARGET_POINTS = 300, 600
+"""Scans and points of lines are thinned out evenly to at least these numbers, and less than twice as many."""
 MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
-"""Number of time marks on a path, and their distance as a share of the drawing."""
+"""Largest number of time marks on a path, and their smallest distance as a fraction of the larger side of the map."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
-"""Distance of the edge of a drawing from what it shows, and smallest ratio of its sides."""
-FONT_SHARE = 0.026
-"""Height of the text in a map as a share of the larger side."""
+"""Distance between the edge of a map and what it shows, and smallest ratio of its sides."""
+FONT_FRACTION = 0.026
+"""Height of the text in a map as a fraction of the larger side."""
 CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
-"""Size of a chart, and of its margins with labels, in units of the SVG."""
+"""Size of a chart, and of its left and bottom margin with labels, in units of the SVG."""
 TICK_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-
-
-def text(value: str) -> str:
-    """Return text for HTML."""
-    return html.escape(value)
+"""Possible distances between the marks of an axis or of a path, in the unit of the axis or in s."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """Part of the map that is drawn: the smallest coordinates and the size in m."""
+    """Part of the world that is drawn: its smallest coordinates and its size in m, in the map frame."""
 
     x: float
     y: float
@@ -53,11 +49,11 @@ class Box:
     @property
     def font(self) -> float:
         """Height of the text in m."""
-        return FONT_SHARE * max(self.width, self.height)
+        return FONT_FRACTION * max(self.width, self.height)
 
 
 def box_around(drives: Sequence[RecordedDrive], objects: Sequence[FoundObject]) -> Box:
-    """Return the box that holds the paths, goals, and objects of all drives."""
+    """Return the box around the paths and goals of all drives and the objects."""
     points = [drive.poses.values[:, :2] for drive in drives]
     points += [np.array([[goal.pose.x, goal.pose.y]]) for drive in drives for goal in drive.goals]
     points += [np.array(thing.keyframes)[:, 1:3] for thing in objects]
@@ -75,16 +71,21 @@ def drive_map(
     other: RecordedDrive,
     objects: Sequence[FoundObject],
     incidents: Sequence[Incident],
-    world: Surroundings,
+    world: StaticWorld,
     box: Box,
 ) -> str:
-    """Return an SVG in map coordinates, with y upward. `name` is the class of the drive: "log" or "run"."""
+    """Return an SVG with a drive, its goals, incidents, and objects on the map, and with the path of the other drive.
+
+    `name` is the CSS class of the drive: "log" or "run".
+    """
     grid = world.grid
     height, width = (cells * grid.resolution for cells in grid.shape)
     x, y, _ = grid.origin
     image = _picture(world, drive)
     shapes = [f'<image href="{image}" x="{x:.3f}" y="{-y - height:.3f}" width="{width:.3f}" height="{height:.3f}"/>']
-    shapes.append(f'<polyline class="other {_other(name)}" points="{_points(other.poses.values)}"/>')
+    shapes.append(
+        f'<polyline class="other {"run" if name == "log" else "log"}" points="{_points(other.poses.values)}"/>'
+    )
     shapes += [part for thing in objects for part in _object(thing, box)]
     shapes.append(f'<polyline class="path {name}" points="{_points(drive.poses.values)}"/>')
     shapes += _time_marks(drive, name, box)
@@ -93,30 +94,26 @@ def drive_map(
         shapes.append(f'<circle class="goal" cx="{goal.pose.x:.3f}" cy="{-goal.pose.y:.3f}" r="{0.6 * box.font:.3f}"/>')
         shapes.append(_label(goal.pose.x, goal.pose.y - 1.7 * box.font, label, box, "goalname"))
     for number, incident in enumerate(incidents):
-        at_x, at_y = incident.place
-        tip = f"<title>{text(f'{incident.kind} at {incident.time:.2f} s')}</title>"
+        at_x, at_y = incident.position
+        tip = f"<title>{escape(f'{incident.kind} at {incident.time:.2f} s')}</title>"
         shapes.append(f'<circle class="incident" cx="{at_x:.3f}" cy="{-at_y:.3f}" r="{box.font:.3f}">{tip}</circle>')
         row = 1 + number // 2
         beside = (1.7 * row if number % 2 == 0 else -0.7 - 1.7 * row) * box.font
         label = f"{incident.kind}, {incident.time:.1f} s"
         shapes.append(_label(at_x, at_y + beside, label, box, "incidentname"))
     view = f"{box.x:.3f} {-box.y - box.height:.3f} {box.width:.3f} {box.height:.3f}"
-    return f'<svg role="img" aria-label="{text(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
-
-
-def _other(name: str) -> str:
-    return "run" if name == "log" else "log"
+    return f'<svg role="img" aria-label="{escape(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
 
 
 def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
-    """Return a label that is centered on a point, and kept inside of the box."""
+    """Return an SVG text with the CSS class `kind`, centered on a point but inside of the box."""
     half = 0.27 * box.font * len(label)
     x = min(max(x, box.x + half), box.x + box.width - half)
-    return f'<text class="{kind}" x="{x:.2f}" y="{-y:.2f}" font-size="{box.font:.3f}">{text(label)}</text>'
+    return f'<text class="{kind}" x="{x:.2f}" y="{-y:.2f}" font-size="{box.font:.3f}">{escape(label)}</text>'
 
 
 def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
-    """Yield dots on the path with their times, a dot for the start, and an arrow for the end."""
+    """Yield dots with times on the path, and an arrow at its end."""
     step = next((step for step in TICK_STEPS if drive.duration / step <= MAX_TIME_MARKS), TICK_STEPS[-1])
     step = max(step, 1.0)
     times = np.append(np.arange(0.0, drive.duration, step), drive.duration)
@@ -152,12 +149,12 @@ def _object(thing: FoundObject, box: Box) -> Iterator[str]:
 
 
 def _points(poses: Array) -> str:
-    step = max(1, len(poses) // MAX_POINTS)
+    step = max(1, len(poses) // TARGET_POINTS)
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in poses[::step, :2].tolist())
 
 
-def _picture(world: Surroundings, drive: RecordedDrive) -> str:
-    """Return the map, and what the lidar saw that is not on it, as a data URL of a PNG with a clear background."""
+def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
+    """Return the data URL of a PNG with the map and the returns that are not from walls; the rest is transparent."""
     grid = world.grid
     colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
     colors[grid.cells == UNKNOWN] = UNSEEN
@@ -170,18 +167,18 @@ def _picture(world: Surroundings, drive: RecordedDrive) -> str:
     return f"data:image/png;base64,{base64.b64encode(out.getvalue()).decode()}"
 
 
-def _returns_off_the_map(world: Surroundings, drive: RecordedDrive) -> Array:
-    """Return the ends (n, 2) of the beams that measured something else than walls."""
+def _returns_off_the_map(world: StaticWorld, drive: RecordedDrive) -> Array:
+    """Return the ends (n, 2) in the map frame of the beams that did not end at walls."""
     if drive.scans is None or not len(drive.scans):
         return np.empty((0, 2))
-    scans = drive.scans.every(max(1, len(drive.scans) // MAX_SCANS))
+    scans = drive.scans.thinned(TARGET_SCANS)
     ends: Array = beam_ends(lidar_poses(drive, scans), scans.angles, scans.ranges)[scans.is_hit()]
     return ends[world.distance_to_walls(ends) > WALL_DISTANCE_M]
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Line of a chart: values (n,) at times (n,) in s. `name` is its class."""
+    """Line of a chart: values (n,) at times (n,) in s. `name` is its CSS class."""
 
     name: str
     times: Array
@@ -189,7 +186,7 @@ class Series:
 
 
 def chart(label: str, series: Sequence[Series], unit: str) -> str:
-    """Return an SVG chart of values over time, from 0."""
+    """Return an SVG chart of lines over time, with axes that start at 0. `unit` is that of the values."""
     series = [line for line in series if len(line.times)]
     end = max((float(line.times[-1]) for line in series), default=1.0) or 1.0
     top = max(0.1, *(float(np.max(line.values)) for line in series)) if series else 1.0
@@ -199,20 +196,20 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
         y = CHART_HEIGHT - BOTTOM - up * value / top
         parts.append(f'<line class="axis" x1="{LEFT:g}" y1="{y:.1f}" x2="{CHART_WIDTH - 10:g}" y2="{y:.1f}"/>')
         parts.append(
-            f'<text class="tick" x="{LEFT - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {text(unit)}</text>'
+            f'<text class="tick" x="{LEFT - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {escape(unit)}</text>'
         )
     for value in _ticks(end, 7):
         x = LEFT + across * value / end
         parts.append(f'<text x="{x:.1f}" y="{CHART_HEIGHT - 4:g}" font-size="11">{value:g} s</text>')
     for line in series:
-        step = max(1, len(line.times) // MAX_POINTS)
+        step = max(1, len(line.times) // TARGET_POINTS)
         points = " ".join(
             f"{LEFT + across * time / end:.1f},{CHART_HEIGHT - BOTTOM - up * value / top:.1f}"
             for time, value in zip(line.times[::step].tolist(), line.values[::step].tolist(), strict=True)
         )
         parts.append(f'<polyline class="path line {line.name}" points="{points}"/>')
     view = f"0 -4 {CHART_WIDTH:g} {CHART_HEIGHT + 4:g}"
-    return f'<svg role="img" aria-label="{text(label)}" viewBox="{view}">{"".join(parts)}</svg>'
+    return f'<svg role="img" aria-label="{escape(label)}" viewBox="{view}">{"".join(parts)}</svg>'
 
 
 def _ticks(top: float, count: int) -> list[float]:

@@ -1,20 +1,21 @@
-"""Page that shows a recorded drive and the run of its reconstructed scenario side by side, as one HTML file."""
+"""Creates an HTML page that shows a recorded drive and the run of its reconstructed scenario side by side."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 from collections.abc import Iterator, Sequence
+from html import escape
 
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.static_world import StaticWorld
 from simscen.reconstruction.verifying.comparison import (
     Verification,
     common_times,
     distances_between,
     nearest_returns,
 )
-from simscen.reconstruction.verifying.drawings import Series, box_around, chart, drive_map, text
+from simscen.reconstruction.verifying.drawings import Series, box_around, chart, drive_map
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d2330; --quiet: #5b6475; --page: #fff; --map: #f4f5f7; --line: #ccd1da;
@@ -52,16 +53,16 @@ text.goalname { fill: var(--good); } text.objectname { fill: var(--object); } te
 """
 
 
-def verification_page(name: str, world: Surroundings, objects: Sequence[FoundObject], verified: Verification) -> str:
-    """Return the page as HTML. It loads nothing from the network."""
+def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> str:
+    """Return the page as one HTML text that loads nothing from the network. `name` is that of the scenario."""
     digest = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
     parts = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-        f"<title>{text(name)}: log and run</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>",
-        f"<h1>{text(name)}: the log and a run of its scenario</h1>",
+        f"<title>{escape(name)}: log and run</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>",
+        f"<h1>{escape(name)}: the log and a run of its scenario</h1>",
         *_result(verified),
         *_maps(world, objects, verified),
         *_charts(verified),
@@ -85,15 +86,15 @@ def _result(verified: Verification) -> Iterator[str]:
     if count or verified.new_incidents:
         yield "<ul>"
         for incident in verified.incidents:
-            yield f'<li class="{"yes" if incident.is_reproduced else "no"}">{text(incident.sentence)}</li>'
+            yield f'<li class="{"yes" if incident.is_reproduced else "no"}">{escape(incident.sentence)}</li>'
         for new in verified.new_incidents:
-            yield f'<li class="no">only in the run: {text(new.kind)} at {new.time:.2f} s ({text(new.detail)})</li>'
+            yield f'<li class="no">only in the run: {escape(new.kind)} at {new.time:.2f} s ({escape(new.detail)})</li>'
         yield "</ul>"
     failed = ", ".join(verified.failed)
-    yield f"<p>{text(f'Criteria that fail in the run: {failed}.' if failed else 'All criteria hold in the run.')}</p>"
+    yield f"<p>{escape(f'Criteria that fail in the run: {failed}.' if failed else 'All criteria hold in the run.')}</p>"
 
 
-def _maps(world: Surroundings, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
+def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
     recorded = [incident.recorded for incident in verified.incidents]
     repeated = [incident.repeated for incident in verified.incidents if incident.repeated is not None]
     drives = verified.drive, verified.repeated
@@ -151,7 +152,7 @@ def _charts(verified: Verification) -> Iterator[str]:
 
 
 def _figure(label: str, series: Sequence[Series]) -> str:
-    return f"<figure><figcaption>{text(label)}</figcaption>{chart(label, series, 'm')}</figure>"
+    return f"<figure><figcaption>{escape(label)}</figcaption>{chart(label, series, 'm')}</figure>"
 
 
 def _table(verified: Verification) -> Iterator[str]:
@@ -159,6 +160,6 @@ def _table(verified: Verification) -> Iterator[str]:
     yield '<table>\n<tr><th scope="col">quantity</th><th scope="col">log</th><th scope="col">run</th>'
     yield '<th scope="col">difference</th></tr>'
     for row in verified.quantities:
-        cells = "".join(f"<td>{text(cell)}</td>" for cell in (row.log, row.run, row.difference))
-        yield f'<tr><th scope="row">{text(row.name)}</th>{cells}</tr>'
+        cells = "".join(f"<td>{escape(cell)}</td>" for cell in (row.log, row.run, row.difference))
+        yield f'<tr><th scope="row">{escape(row.name)}</th>{cells}</tr>'
     yield "</table>\n</div>"

@@ -9,9 +9,9 @@ import numpy as np
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Solid
+from simscen.reconstruction.compared_scans import ComparedScans, compare_scans
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues
-from simscen.reconstruction.scan_model import ScanModel, scan_model
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.static_world import StaticWorld
 
 HEIGHT = 0.2
 BEAMS = 360
@@ -37,9 +37,9 @@ ROOM = (
 
 
 @lru_cache(maxsize=1)
-def room() -> Surroundings:
+def room() -> StaticWorld:
     """Return the room without anything in it."""
-    return Surroundings(World("room", ROOM), HEIGHT)
+    return StaticWorld(World("room", ROOM), HEIGHT)
 
 
 def poses(times: np.ndarray, curve: float = 0.3) -> np.ndarray:
@@ -70,7 +70,7 @@ def scans(objects: Any = None, offset: Pose2 = Pose2(0.0, 0.0), seed: int = 1) -
     if objects is None:
         ranges = room().ranges_from(at, ANGLES, 12.0)
     else:
-        worlds = (Surroundings(World("room", ROOM, tuple(objects(time))), HEIGHT) for time in times.tolist())
+        worlds = (StaticWorld(World("room", ROOM, tuple(objects(time))), HEIGHT) for time in times.tolist())
         ranges = np.vstack([world.ranges_from(at[k : k + 1], ANGLES, 12.0) for k, world in enumerate(worlds)])
     ranges = np.round(ranges + np.random.default_rng(seed).normal(0.0, NOISE_M, ranges.shape), 3)
     return Scans(times, times, ranges, ANGLES, 0.12, 12.0, Pose2(0.0, 0.0), HEIGHT, np.zeros(len(times), dtype=bool))
@@ -92,9 +92,9 @@ def drive(measured: Scans | None = None, **changes: Any) -> RecordedDrive:
     return replace(plain, **changes)
 
 
-def model(measured: Scans) -> ScanModel:
+def compared_scans(measured: Scans) -> ComparedScans:
     """Return the comparison of scans with the room."""
-    return scan_model(drive(measured), measured, room())
+    return compare_scans(drive(measured), measured, room())
 
 
 def with_ranges(measured: Scans, ranges: np.ndarray) -> Scans:

@@ -11,7 +11,7 @@ from simscen.reconstruction.verifying.comparison import (
     Verification,
     compare_drives,
     compare_incidents,
-    share_seen_alike,
+    fraction_seen_alike,
 )
 from simscen.reconstruction.verifying.page import verification_page
 
@@ -45,24 +45,24 @@ def test_scans_are_compared_in_the_same_directions_and_without_what_did_not_retu
     zeros = one.scans.ranges.copy()
     zeros[:, ::3] = 0.0
     times = np.arange(0.0, 10.0, 0.1)
-    assert share_seen_alike(one, turned, times) > 0.98
-    assert share_seen_alike(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
-    assert share_seen_alike(one, replace(one, poses=turned.poses), times) < 0.7
+    assert fraction_seen_alike(one, turned, times) > 0.98
+    assert fraction_seen_alike(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
+    assert fraction_seen_alike(one, replace(one, poses=turned.poses), times) < 0.7
 
 
 def test_scans_are_compared_only_where_both_robots_are_at_one_place():
     one = drives.drive(drives.scans())
-    assert share_seen_alike(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
+    assert fraction_seen_alike(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
 
 
 def test_the_same_incident_nearby_is_reproduced():
-    ((found,), others) = compare_incidents([STUCK], [replace(STUCK, time=11.0, place=(3.2, 2.0))])
+    ((found,), others) = compare_incidents([STUCK], [replace(STUCK, time=11.0, position=(3.2, 2.0))])
     assert found.is_reproduced and not others
     assert found.sentence == "reproduced: stuck at 10.00 s (the robot stayed), 1.00 s later and 0.20 m away"
 
 
 def test_an_incident_far_away_is_only_similar():
-    ((found,), _) = compare_incidents([STUCK], [replace(STUCK, place=(6.0, 2.0))])
+    ((found,), _) = compare_incidents([STUCK], [replace(STUCK, position=(6.0, 2.0))])
     assert not found.is_reproduced
     assert found.sentence.startswith("only similar")
 

@@ -7,8 +7,8 @@ import synthetic_drives as drives
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.goals import STOP_SOURCE
 from simscen.reconstruction.drive.recorded_drive import RecordedGoal
-from simscen.reconstruction.scenario.criteria import criteria_of
-from simscen.reconstruction.scenario.incidents import incidents_of, longest_stay
+from simscen.reconstruction.scenario.criteria import propose_criteria
+from simscen.reconstruction.scenario.incidents import find_incidents, longest_stay
 
 REACHED = RecordedGoal("shelf", Pose2(7.0, 3.0), 0.0, 11.5, "reached", source="/goal_pose")
 
@@ -18,11 +18,11 @@ def drive(**changes):
 
 
 def kinds(one):
-    return [incident.kind for incident in incidents_of(one)]
+    return [incident.kind for incident in find_incidents(one)]
 
 
 def limits(one, invalid_goals=False):
-    return {one.kind: dict(one.values) for one in criteria_of(one, incidents_of(one), (), invalid_goals)}
+    return {one.kind: dict(one.values) for one in propose_criteria(one, find_incidents(one), (), invalid_goals)}
 
 
 def test_a_drive_that_reaches_its_goal_has_no_incident():
@@ -31,10 +31,10 @@ def test_a_drive_that_reaches_its_goal_has_no_incident():
 
 def test_a_pressed_bumper_is_a_contact_at_its_time_and_place():
     times = np.arange(0.0, drives.DURATION_S, 0.05)
-    (contact,) = incidents_of(drive(bumper=drives.signal(times, (times > 4.0) & (times < 4.3))))
+    (contact,) = find_incidents(drive(bumper=drives.signal(times, (times > 4.0) & (times < 4.3))))
     assert (contact.kind, contact.criterion) == ("contact", "collisions")
     assert contact.time == pytest.approx(4.05, abs=0.06)
-    assert contact.place == pytest.approx(tuple(drives.poses(np.array([4.05]))[0, :2]), abs=0.05)
+    assert contact.position == pytest.approx(tuple(drives.poses(np.array([4.05]))[0, :2]), abs=0.05)
 
 
 def test_a_belief_far_from_the_truth_is_lost():
@@ -45,7 +45,7 @@ def test_a_belief_far_from_the_truth_is_lost():
 
 
 def test_without_a_ground_truth_an_uncertain_belief_is_lost():
-    plain = drive(has_independent_poses=False)
+    plain = drive(has_true_poses=False)
     values = plain.belief.values.copy()
     values[plain.belief.times > 6.0, 3] = 4.0
     assert kinds(replace(plain, belief=drives.signal(plain.belief.times, values))) == ["lost"]
@@ -71,7 +71,7 @@ def test_a_parked_robot_whose_goal_is_where_it_stopped_is_not_stuck(speed, expec
 
 def test_a_failed_goal_is_an_incident_with_its_code():
     failed = replace(REACHED, status="failed", error="NO_VALID_PATH")
-    (incident,) = incidents_of(replace(drives.drive(), goals=(failed,)))
+    (incident,) = find_incidents(replace(drives.drive(), goals=(failed,)))
     assert (incident.kind, incident.criterion) == ("failed goal", "goals_reached")
     assert "NO_VALID_PATH" in incident.detail
 

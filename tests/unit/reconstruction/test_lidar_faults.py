@@ -7,13 +7,13 @@ import synthetic_drives as drives
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.recorded_drive import no_values
-from simscen.reconstruction.estimators import find_all
+from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.faults.false_returns import glass_fault
 from simscen.reconstruction.faults.lidar_calibration import mount_error, range_error_faults
 from simscen.reconstruction.faults.lidar_readings import blind_sector
 from simscen.reconstruction.objects.clusters import usable_scans
-from simscen.reconstruction.scenario.robot_file import KnownRobot
-from simscen.reconstruction.surroundings import Surroundings
+from simscen.reconstruction.scenario.robot_file import RobotProperties
+from simscen.reconstruction.static_world import StaticWorld
 
 
 def number(fault, key):
@@ -23,8 +23,8 @@ def number(fault, key):
 def all_faults(measured):
     """Return what the estimators find, in their order."""
     drive = replace(drives.drive(measured), odometry=no_values(6), commands=no_values(3), turn_rates=no_values(1))
-    robot = KnownRobot(lidar_noise=drives.NOISE_M, is_known=True)
-    return [fault for fault in find_all(drive, drives.room(), robot).faults if fault.target == "lidar"]
+    robot = RobotProperties(lidar_noise=drives.NOISE_M, is_known=True)
+    return [fault for fault in run_estimators(drive, drives.room(), robot).faults if fault.target == "lidar"]
 
 
 def test_a_good_lidar_has_no_fault():
@@ -34,7 +34,7 @@ def test_a_good_lidar_has_no_fault():
 def test_a_lidar_that_measures_nothing_has_no_error_of_its_mount():
     measured = drives.scans()
     blind = drives.with_ranges(measured, np.full_like(measured.ranges, np.inf))
-    assert mount_error(drives.model(blind), drives.room()) == Pose2(0.0, 0.0, 0.0)
+    assert mount_error(drives.compared_scans(blind), drives.room()) == Pose2(0.0, 0.0, 0.0)
 
 
 def test_invalid_scans_are_garbage_with_their_probability():
@@ -118,17 +118,17 @@ def test_a_turned_lidar_is_a_wrong_mount():
 def test_systematic_errors_of_ranges_are_told_apart(change, kind, key, value):
     measured = drives.scans()
     changed = drives.with_ranges(measured, change(measured.ranges, measured.times))
-    (fault,) = range_error_faults(drives.model(changed))
+    (fault,) = range_error_faults(drives.compared_scans(changed))
     assert (fault.kind, number(fault, key)) == (kind, pytest.approx(value, rel=0.1))
 
 
 def test_beams_that_pass_through_a_named_obstacle_are_glass():
     measured = drives.scans()
     without = [solid for solid in drives.ROOM if solid.name != "shelf"]
-    world = Surroundings(World("room", tuple(without)), drives.HEIGHT)
+    world = StaticWorld(World("room", tuple(without)), drives.HEIGHT)
     through = world.ranges_from(drives.poses(measured.times), drives.ANGLES, 12.0)
-    model = drives.model(drives.with_ranges(measured, through))
-    fault = glass_fault(model, drives.room(), usable_scans(model))
+    compared = drives.compared_scans(drives.with_ranges(measured, through))
+    fault = glass_fault(compared, drives.room(), usable_scans(compared))
     assert fault is not None
     assert (fault.kind, fault.values["of"], number(fault, "probability")) == (
         "glass",
@@ -140,23 +140,23 @@ def test_beams_that_pass_through_a_named_obstacle_are_glass():
 def test_faults_have_the_names_of_the_robots_own_sensors():
     measured = drives.scans()
     drive = drives.drive(drives.with_ranges(measured, np.where(measured.ranges > 3.0, np.inf, measured.ranges)))
-    robot = KnownRobot(sensors={"lidar": "front laser"}, is_known=True)
-    (fault,) = find_all(drive, drives.room(), robot).faults
+    robot = RobotProperties(sensors={"lidar": "front laser"}, is_known=True)
+    (fault,) = run_estimators(drive, drives.room(), robot).faults
     assert (fault.target, fault.kind) == ("front laser", "range_limit")
 
 
 def test_a_fault_of_a_sensor_that_the_robot_lacks_is_only_mentioned():
     drive = drives.drive(drives.scans())
     rates = drives.signal(drive.turn_rates.times, drive.turn_rates.values + 0.05)
-    found = find_all(replace(drive, turn_rates=rates), drives.room(), KnownRobot(sensors={"lidar": "lidar"}))
+    found = run_estimators(replace(drive, turn_rates=rates), drives.room(), RobotProperties(sensors={"lidar": "lidar"}))
     assert found.faults == []
     assert any("imu.bias" in unknown for unknown in found.unknowns)
 
 
 def test_a_map_of_the_same_scans_shows_no_error_of_their_ranges():
     drive = drives.drive(drives.with_ranges(measured := drives.scans(), measured.ranges + 0.05))
-    kinds = [fault.kind for fault in find_all(drive, drives.room()).faults]
+    kinds = [fault.kind for fault in run_estimators(drive, drives.room()).faults]
     assert kinds == ["bias"]
-    built = find_all(drive, drives.room(), is_map_built=True)
+    built = run_estimators(drive, drives.room(), is_map_built=True)
     assert [fault.kind for fault in built.faults] == []
     assert any("--map" in unknown for unknown in built.unknowns)

@@ -31,7 +31,7 @@ def with_odometry(change):
 
 
 def odometry(drive):
-    return list(odometry_faults(motion_steps(drive), separation=0.3))
+    return list(odometry_faults(motion_steps(drive), wheel_separation=0.3))
 
 
 def test_correct_odometry_has_no_fault():
@@ -144,7 +144,7 @@ def test_wheels_of_one_side_that_drive_less_have_a_gain():
     left = 0.7 * moved[:, 3]
     right = moved[:, 3].copy()
     moved[:, 3], moved[:, 5] = (left + right) / 2, (right - left) / 0.3
-    (fault,) = command_faults(replace(plain, odometry=drives.signal(plain.odometry.times, moved)), separation=0.3)
+    (fault,) = command_faults(replace(plain, odometry=drives.signal(plain.odometry.times, moved)), wheel_separation=0.3)
     assert (fault.target, fault.kind) == ("wheels", "gain")
     assert [number(fault, key) for key in ("left", "right")] == pytest.approx([70, 100], abs=4)
 

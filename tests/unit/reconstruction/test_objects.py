@@ -8,7 +8,7 @@ from simscen.reconstruction.objects.find_objects import find_objects
 
 
 def found(objects=None):
-    return find_objects(drives.model(drives.scans(objects)), drives.room(), has_true_poses=True)
+    return find_objects(drives.compared_scans(drives.scans(objects)), drives.room(), has_true_poses=True)
 
 
 def rmse(thing, truth):

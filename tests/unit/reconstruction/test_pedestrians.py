@@ -5,10 +5,10 @@ import pytest
 import synthetic_drives as drives
 
 from simscen.loading.scenario_text import spec_of_text
-from simscen.reconstruction.evidence import Evidence
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.objects.pedestrians import is_person, with_walks
-from simscen.reconstruction.objects.walk_trial import WalkTrial
+from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
+from simscen.reconstruction.objects.pedestrians import fit_pedestrians, is_person
+from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.scenario.scenario_text import _object
 from simscen.run.live_world.pedestrians import PedestrianMap
 
@@ -16,21 +16,21 @@ from simscen.run.live_world.pedestrians import PedestrianMap
 def thing(path, size=(0.25,), name="moving object 1", begin=1.0, end=9.0):
     times = np.arange(begin, end, 0.2)
     frames = tuple((time, *path(time), 0.0) for time in times.tolist())
-    return FoundObject(name, size, frames, None, None, Evidence("seen"))
+    return FoundObject(name, size, frames, None, None, Reason("seen"))
 
 
 def fitted(*things):
-    return with_walks(things, WalkTrial(drives.drive(), PedestrianMap(drives.room().built), 0.2))
+    return fit_pedestrians(things, PedestrianTrial(drives.drive(), PedestrianMap(drives.room().built), 0.2))
 
 
 def test_a_person_who_walks_straight_far_from_the_robot_becomes_a_pedestrian():
     (found,) = fitted(thing(lambda time: (9.0, 0.6 + 0.6 * (time - 1.0))))
-    assert found.name == found.walk.walker.name == "person 1"
-    assert found.walk.rmse < 0.15 and found.walk.time_shift <= 0.2
-    assert found.walk.walker.speed == pytest.approx(0.6, abs=0.06)
-    assert len(found.walk.walker.goals) == 1
-    assert math.dist(found.walk.walker.goals[0], (9.0, 5.3)) < 0.4
-    assert not found.walk.meets_robot
+    assert found.name == found.pedestrian.walker.name == "person 1"
+    assert found.pedestrian.rmse < 0.15 and found.pedestrian.time_shift <= 0.2
+    assert found.pedestrian.walker.speed == pytest.approx(0.6, abs=0.06)
+    assert len(found.pedestrian.walker.goals) == 1
+    assert math.dist(found.pedestrian.walker.goals[0], (9.0, 5.3)) < 0.4
+    assert not found.pedestrian.meets_robot
 
 
 def test_a_corner_of_the_path_becomes_a_goal():
@@ -39,21 +39,21 @@ def test_a_corner_of_the_path_becomes_a_goal():
         return (9.3 - min(way, 3.0), 5.3 - max(0.0, way - 3.0))
 
     (found,) = fitted(thing(path))
-    assert found.walk is not None and found.walk.rmse < 0.3
-    assert len(found.walk.walker.goals) == 2
-    assert math.dist(found.walk.walker.goals[0], (6.3, 5.3)) < 0.3
+    assert found.pedestrian is not None and found.pedestrian.rmse < 0.3
+    assert len(found.pedestrian.walker.goals) == 2
+    assert math.dist(found.pedestrian.walker.goals[0], (6.3, 5.3)) < 0.3
 
 
 def test_a_person_who_walks_through_the_place_of_the_robot_does_not_evade_it():
     x, y, _ = drives.poses(np.array([6.0]))[0].tolist()
     (found,) = fitted(thing(lambda time: (x + 0.45, y + 0.8 * (time - 5.6)), begin=3.0))
-    assert found.walk.meets_robot
-    assert found.walk.walker.blind_to == {"robots"}
+    assert found.pedestrian.meets_robot
+    assert found.pedestrian.walker.blind_to == {"robots"}
 
 
 def test_a_track_that_no_pedestrian_walks_stays_scripted():
     (found,) = fitted(thing(lambda time: (8.5, 3.0 + 1.5 * math.sin(1.2 * time))))
-    assert found.walk is None
+    assert found.pedestrian is None
     assert found.name == "moving object 1"
 
 
@@ -73,5 +73,5 @@ def test_the_written_pedestrian_can_be_read_again():
     text = f"{head}{events}\npass:\n  - collisions: {{max: 0}}\n"
     pedestrian = spec_of_text(text, "scenario.yaml").events[0].do.pedestrian
     assert pedestrian.name == "person 1"
-    assert pedestrian.speed == found.walk.walker.speed
-    assert [tuple(goal) for goal in pedestrian.goals] == list(found.walk.walker.goals)
+    assert pedestrian.speed == found.pedestrian.walker.speed
+    assert [tuple(goal) for goal in pedestrian.goals] == list(found.pedestrian.walker.goals)

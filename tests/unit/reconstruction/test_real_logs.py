@@ -19,13 +19,13 @@ from simscen.cli.main import app
 from simscen.core.errors import InvalidInput
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction import scenario_from_log as scenario_module
-from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, ends_of_motion
+from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, goals_from_motion
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import no_values
-from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
-from simscen.reconstruction.surroundings import Surroundings, map_from_scans, world_from_map
+from simscen.reconstruction.static_world import StaticWorld, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
 
 LIDAR_SILENT = (8.0, 9.5)
@@ -110,11 +110,11 @@ def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_pa
     assert made.contents.start.distance(drives.Pose2(1.0, 3.0)) < 0.1
     (only,) = made.contents.goals
     assert math.dist(only.pose[:2], GOAL) < 0.1
-    (person,) = [thing for thing in made.findings.objects if thing.is_moving]
+    (person,) = [thing for thing in made.estimated.objects if thing.is_moving]
     frames = np.array(person.keyframes)
     true = np.array([walk(time) for time in frames[:, 0].tolist()])
     assert float(np.sqrt(np.mean(np.sum((frames[:, 1:3] - true) ** 2, axis=1)))) < 0.3
-    (fault,) = [fault for fault in made.findings.faults if fault.target == "lidar"]
+    (fault,) = [fault for fault in made.estimated.faults if fault.target == "lidar"]
     assert (fault.kind, fault.begin) == ("off", pytest.approx(LIDAR_SILENT[0], abs=0.15))
     assert fault.duration == pytest.approx(1.5, abs=0.2)
 
@@ -123,8 +123,8 @@ def test_without_a_map_the_walls_are_built_from_the_scans(tmp_path):
     bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     load_scenario(made.file, tmp_path)
-    occupied = np.argwhere(made.surroundings.grid.cells == 100)
-    far = drives.room().distance_to_walls(made.surroundings.grid.center_of(occupied))
+    occupied = np.argwhere(made.static_world.grid.cells == 100)
+    far = drives.room().distance_to_walls(made.static_world.grid.center_of(occupied))
     assert len(occupied) > 200
     assert np.percentile(far, 95) < 0.15
 
@@ -148,7 +148,7 @@ def test_a_drive_without_stops_has_goals_where_its_path_bends():
     times = np.arange(0.0, 20.0, 0.1)
     corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (0.0, 0.1)]
     path = np.column_stack([np.interp(times, [0, 5, 10, 15, 19.9], column) for column in zip(*corners, strict=True)])
-    goals = list(ends_of_motion(drives.signal(times, np.column_stack((path, np.zeros(len(times)))))))
+    goals = list(goals_from_motion(drives.signal(times, np.column_stack((path, np.zeros(len(times)))))))
     np.testing.assert_allclose([goal.pose[:2] for goal in goals], corners[1:], atol=0.05)
     assert [goal.ended for goal in goals] == pytest.approx([5, 10, 15, 19.9], abs=0.1)
     assert [goal.source for goal in goals] == [BEND_SOURCE] * 3 + [STOP_SOURCE]
@@ -161,15 +161,15 @@ def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
 
 
 def test_a_fault_that_does_not_fit_the_sensor_is_only_mentioned(tmp_path, monkeypatch):
-    slow = FoundFault("odom", "slow", {"rate": "400 Hz"}, evidence=Evidence("too slow", 1.0, 2.0))
-    real = scenario_module.find_all
+    slow = FoundFault("odom", "slow", {"rate": "400 Hz"}, reason=Reason("too slow", 1.0, 2.0))
+    real = scenario_module.run_estimators
     monkeypatch.setattr(
-        scenario_module, "find_all", lambda *given: replace(found := real(*given), faults=[*found.faults, slow])
+        scenario_module, "run_estimators", lambda *given: replace(found := real(*given), faults=[*found.faults, slow])
     )
     bag = logs.write_bag(tmp_path / "bag", messages())
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     load_scenario(made.file, tmp_path)
-    assert [fault.kind for fault in made.findings.faults] == ["off"]
+    assert [fault.kind for fault in made.estimated.faults] == ["off"]
     assert any("too slow" in unknown for unknown in made.contents.unknowns)
 
 
@@ -179,9 +179,9 @@ def test_the_assumed_robot_fits_where_it_drove(tmp_path):
     at = np.column_stack((1.0 + 0.5 * times, np.full(len(times), 0.35), np.zeros(len(times))))
     ranges = drives.room().ranges_from(at, drives.ANGLES, 12.0)
     ranges[70:] -= 0.28
-    scans = replace(drives.scans(), times=times, arrivals=times, ranges=ranges, malformed=np.zeros(len(times), bool))
+    scans = replace(drives.scans(), times=times, arrivals=times, ranges=ranges, is_malformed=np.zeros(len(times), bool))
     drive = drives.drive(scans, poses=drives.signal(times, at))
-    walls = Surroundings(world_from_map(map_from_scans(drive), "map"), drives.HEIGHT)
+    walls = StaticWorld(world_from_map(map_from_scans(drive), "map"), drives.HEIGHT)
     nearest = float(walls.distance_to_walls(at[:, :2]).min())
     assert nearest >= 0.15
     written = write_robot_file(drive, tmp_path / "a.robot.yaml", 0.01, nearest - 0.05)
@@ -228,7 +228,7 @@ def test_a_log_without_scans_says_what_could_not_be_found(tmp_path):
     without = [said for said in messages() if said.topic != "/scan"]
     bag = logs.write_bag(tmp_path / "bag", without)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
-    assert made.findings.objects == []
+    assert made.estimated.objects == []
     assert any("no scans" in unknown for unknown in made.contents.unknowns)
 
 

@@ -4,13 +4,13 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.loading.scenario import load_scenario
-from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal, scenario_text
 
 WORLD = {"simscen": 1, "walls": [{"points": [[0, 0], [9, 0], [9, 6], [0, 6], [0, 0]]}]}
-SEEN = Evidence("seen in 40 scans", 1.0, 5.0)
+SEEN = Reason("seen in 40 scans", 1.0, 5.0)
 
 
 def contents(**changes):
@@ -26,14 +26,14 @@ def contents(**changes):
         "estimate": None,
         "stack": {},
         "passing_radius": None,
-        "goals": [ScenarioGoal("a, b: {c}", Pose2(7.0, 3.0), 60.0, Evidence("/goal_pose", 0.0, 20.0))],
+        "goals": [ScenarioGoal("a, b: {c}", Pose2(7.0, 3.0), 60.0, Reason("/goal_pose", 0.0, 20.0))],
         "stops_at_failure": True,
         "time_limit": 100.0,
         "objects": [],
         "kidnaps": [],
         "faults": [],
-        "criteria": [ProposedCriterion("goals_reached", {}, Evidence("held: all goals were reached"))],
-        "evidence": {},
+        "criteria": [ProposedCriterion("goals_reached", {}, Reason("held: all goals were reached"))],
+        "reasons": {},
         "unknowns": ["the footprint"],
     }
     return ScenarioContents(**{**values, **changes})
@@ -64,7 +64,7 @@ def test_the_initial_estimate_is_written(tmp_path, estimate):
     assert written == "unknown" if estimate == "unknown" else written.std == pytest.approx((0.3, 0.2, 0.1), abs=0.01)
 
 
-def test_objects_become_events_with_their_evidence(tmp_path):
+def test_objects_become_events_with_their_reasons(tmp_path):
     box = FoundObject("cart", (0.9, 0.6), ((2.0, 4.0, 1.0, 1.57), (4.0, 4.0, 3.0, 1.57)), 2.0, 6.0, SEEN)
     column = FoundObject("column", (0.2,), ((0.0, 5.0, 5.0, 0.0),), None, None, SEEN)
     scenario, text = loaded(tmp_path, objects=[box, column])
@@ -89,7 +89,7 @@ def test_a_carried_robot_is_kidnapped(tmp_path):
 
 
 def test_goals_that_were_passed_without_a_stop_have_the_radius_of_the_log(tmp_path):
-    scenario, text = loaded(tmp_path, passing_radius=0.5, evidence={"navigation": SEEN})
+    scenario, text = loaded(tmp_path, passing_radius=0.5, reasons={"navigation": SEEN})
     assert scenario.spec.navigation.mode == "navigate_through_poses"
     assert scenario.spec.navigation.radius == 0.5
     assert "# seen in 40 scans" in text

@@ -9,7 +9,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction.drive.run_description import choose_robot
-from simscen.reconstruction.objects.find_objects import object_along
+from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.given_parts import GivenFiles
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 from simscen.run.preparation import prepare
@@ -41,8 +41,8 @@ def test_the_scenario_has_the_chosen_robot_and_the_other_one_as_a_moving_object(
     assert made.contents.start.distance(Pose2(1.0, 1.0)) < 0.01
     (goal,) = made.contents.goals
     assert goal.pose.distance(Pose2(2.5, 1.0)) < 0.01
-    (blue,) = made.findings.objects
-    assert blue.name == "blue" and blue.is_moving and blue.walk is None
+    (blue,) = made.estimated.objects
+    assert blue.name == "blue" and blue.is_moving and blue.pedestrian is None
     x, y, _ = blue.poses_at(np.array([0.0]))[0]
     assert (x, y) == pytest.approx((8.0, 4.0), abs=0.05)
     assert load_scenario(made.file, tmp_path).spec.robot.model == "turtlebot"
@@ -57,6 +57,6 @@ def test_a_robot_of_the_log_must_be_chosen(log, name):
 def test_the_box_of_a_robot_is_around_its_footprint():
     times = np.array([0.0, 1.0])
     poses = np.array([[1.0, 1.0, np.pi / 2], [1.0, 3.0, np.pi / 2]])
-    box = object_along("cart", ((-0.2, -0.3), (0.6, -0.3), (0.6, 0.3), (-0.2, 0.3)), times, poses)
+    box = object_of_robot("cart", ((-0.2, -0.3), (0.6, -0.3), (0.6, 0.3), (-0.2, 0.3)), times, poses)
     assert box.size == (0.8, 0.6)
     assert box.keyframes[0] == pytest.approx((0.0, 1.0, 1.2, np.pi / 2))

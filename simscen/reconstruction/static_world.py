@@ -1,4 +1,4 @@
-"""The static world of a drive, at the height of the lidar, and its map, built from scans by occupancy grid mapping."""
+"""Computes ranges and distances to walls in the static world of a drive, and builds a map from scans if it has none."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 MAP_WALL_HEIGHT_M = 1.0
-"""Height of the walls of a map."""
+"""Height of the walls that are made from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
-"""Distance from walls that counts outside of the map."""
+"""Distance to walls that is returned for points outside of the map."""
 
 
-class Surroundings:
-    """Static world at the height of the lidar, without anything that the reconstruction has to find."""
+class StaticWorld:
+    """World without the objects that the reconstruction has to find, and its map at the height of the lidar in m."""
 
     def __init__(self, world: World, height: float) -> None:
-        """Take the world, with its objects and doors at their initial poses, and the `height` of the lidar in m."""
+        """Cut the world at `height` m. Its bodies, such as doors, count as walls at their initial poses."""
         bodies = [replace(solid, pose=body.pose.compose(solid.pose)) for body in world.bodies for solid in body.solids]
         self.world, self.height = world, height
         mesh = merge_solids((*world.solids, *bodies))
@@ -36,7 +36,7 @@ class Surroundings:
         self._distances: Array = np.asarray(distances) * self.grid.resolution
 
     def ranges_from(self, poses: Array, angles: Array, max_range: float) -> Array:
-        """Return the ranges (n, beams) in m at lidar poses (n, 3) in the map frame; inf beyond `max_range` m.
+        """Return the ranges (n, beams) in m from lidar `poses` (n, 3) in the map frame; inf beyond `max_range` m.
 
         `angles` (beams,) are the directions of the beams in rad in the frame of the lidar.
         """
@@ -47,10 +47,7 @@ class Surroundings:
         return self._scene.cast(origins, rays, max_range).reshape(len(poses), len(angles))
 
     def distance_to_walls(self, points: Array) -> Array:
-        """Return the distance (n,) in m of points (n, 2) to the nearest occupied cell.
-
-        It is UNMAPPED_DISTANCE_M outside of the map.
-        """
+        """Return the distance (n,) in m of `points` (n, 2) in the map frame to the nearest occupied cell."""
         cells = self.grid.cell_of(points)
         inside = self.grid.inside(cells)
         result = np.full(len(points), UNMAPPED_DISTANCE_M)
@@ -59,22 +56,28 @@ class Surroundings:
 
 
 def world_from_map(grid: OccupancyGrid, name: str) -> World:
-    """Return a world whose walls are the occupied cells of a map."""
+    """Return a world with this name whose walls are the occupied cells of a map."""
     return World(name, tuple(walls_from_map(grid, MAP_WALL_HEIGHT_M)), grid=grid)
 
 
 def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
-    """Return the poses (n, 3) of the lidar in the map frame when it measured each scan."""
-    base = drive.poses.poses_at(scans.times)
-    mount: Pose2 = scans.mount
-    c, s = np.cos(base[:, 2]), np.sin(base[:, 2])
-    x = base[:, 0] + c * mount.x - s * mount.y
-    y = base[:, 1] + s * mount.x + c * mount.y
-    return np.column_stack((x, y, base[:, 2] + mount.yaw))
+    """Return the poses x, y, yaw (n, 3) of the lidar in the map frame at the times of the scans."""
+    return offset_poses(drive.poses.poses_at(scans.times), scans.mount)
+
+
+def offset_poses(poses: Array, offset: Pose2) -> Array:
+    """Return the poses x, y, yaw (n, 3) that have the pose `offset` in the frame of each of `poses` (n, 3)."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = poses[:, 0] + c * offset.x - s * offset.y
+    y = poses[:, 1] + s * offset.x + c * offset.y
+    return np.column_stack((x, y, poses[:, 2] + offset.yaw))
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams in the map frame; nan or inf where a range is."""
+    """Return the ends (n, beams, 2) of beams in the frame in which the `poses` (n, 3) of the lidar are given.
+
+    `angles` (beams,) are relative to the lidar. The ends of beams are not finite if their `ranges` (n, beams) are not.
+    """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):
         x = poses[:, 0:1] + ranges * np.cos(directions)
@@ -83,17 +86,17 @@ def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
 
 
 RESOLUTION_M = 0.05
-"""Size of a cell."""
+"""Cell size of the map that is built from scans."""
 MARGIN_M = 1.0
-"""Free margin around everything that was measured."""
-MAX_SCANS = 1500
-"""Maximum number of scans that are used; they are evenly spread over the drive."""
+"""Distance between the border of the map and everything that was measured."""
+TARGET_SCANS = 1500
+"""The scans of a long drive are thinned out evenly to at least this number, and less than twice as many."""
 BODY_RADIUS_M = 0.15
-"""Radius of every robot, as far as the map is concerned: where one drove, no wall stands, however its poses drift."""
+"""Cells that were closer to the path than this are free: every robot has at least this radius."""
 MAX_RANGE_M = 15.0
-"""Range beyond which errors of the heading blur the map."""
+"""Longer ranges are not used, because errors of the heading would blur the map."""
 HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
-"""Change of the log odds of a cell at a hit, and where a beam passes, and their largest magnitude.
+"""Change of a cell's log odds by a beam that ends in it and by one that passes it, and largest magnitude of log odds.
 
 Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
 """
@@ -102,13 +105,12 @@ MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
 
 
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
-    """Return the map that the scans of a drive show along its poses; an empty map if there are no scans."""
+    """Return a map built from the scans of a drive at its poses; without scans, a free map around the driven path."""
     path = drive.poses.values[:, :2]
     if drive.scans is None or not len(drive.scans):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
         return OccupancyGrid(np.zeros(_shape(low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
-    step = max(1, len(drive.scans) // MAX_SCANS)
-    scans = drive.scans.every(step)
+    scans = drive.scans.thinned(TARGET_SCANS)
     poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
     ends = beam_ends(poses, scans.angles, scans.ranges)
     everything = np.concatenate((ends[hits], path))
@@ -124,7 +126,7 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
 
 
 def _driven_over(shape: tuple[int, ...], path: Array) -> Mask:
-    """Return which cells are within BODY_RADIUS_M of a `path` (n, 2) relative to the corner of the map."""
+    """Return which cells (rows, columns) are within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
     is_path = np.zeros(shape, dtype=bool)
     is_path.reshape(-1)[_index(path, shape)] = True
     driven: Mask = distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
@@ -137,9 +139,9 @@ def _shape(low: Array, high: Array) -> tuple[int, int]:
 
 
 def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
-    """Add the beams of one scan from `origin` (2,) to `ends` (n, 2), relative to the corner of the map.
+    """Update the log odds of each cell that beams from `origin` (2,) to `ends` (n, 2) pass or hit, once per scan.
 
-    A cell changes once per scan, because several beams through it write the same value.
+    Coordinates are relative to the corner of the map.
     """
     reach = np.hypot(*(ends - origin).T)
     steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)

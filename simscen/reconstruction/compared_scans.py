@@ -1,4 +1,4 @@
-"""Comparison of scans with the static world: beams that end at it, before it, and behind it."""
+"""Compares each range of a scan with the range that is expected in the static world."""
 
 from __future__ import annotations
 
@@ -9,30 +9,29 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Scans
-from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
-"""Difference between a range and the world that errors of the pose cause."""
+"""Difference from the expected range that errors of true poses, or of estimated poses, explain."""
 BELIEVED_POSE_TOLERANCE_PER_M = 0.02
-"""The same per meter of range, because of errors of the heading."""
+"""Additional difference per meter of range that errors of an estimated heading explain."""
 NOISE_SIGMAS = 4.0
-"""Difference between a range and the world that noise explains, in standard deviations."""
+"""Difference from the expected range that noise explains, in standard deviations of the noise."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
 SMOOTH_STEP_M = 0.1
-"""Maximum difference between the expected ranges of neighbor beams on one surface."""
+"""If the expected ranges of neighbor beams differ by less than this, both beams end at the same smooth surface."""
 
 
 @dataclass(frozen=True, eq=False)
-class ScanModel:
-    """Scans of a drive beside what the static world predicts.
+class ComparedScans:
+    """Measured scans with the ranges that are expected in the static world.
 
     Attributes:
-        scans: The measured scans.
-        poses: Poses (n, 3) of the lidar in the map frame.
-        expected: Ranges (n, beams) to the static world; inf if it is out of reach.
-        noise: Standard deviation (n,) of the ranges of each scan in m.
-        tolerance: Differences (n, beams) in m that noise and errors of the pose explain.
+        poses: Poses x, y, yaw (n, 3) of the lidar in the map frame.
+        expected: Expected ranges (n, beams) in m; inf beyond the maximum range of the lidar.
+        noise: Standard deviation (n,) of the range noise of each scan in m.
+        tolerance: Differences (n, beams) in m between measured and expected range that noise and pose errors explain.
     """
 
     scans: Scans
@@ -43,18 +42,18 @@ class ScanModel:
 
     @cached_property
     def is_hit(self) -> Mask:
-        """Beams (n, beams) that measured something."""
+        """Which beams (n, beams) measured a range within the limits of the lidar."""
         return self.scans.is_hit()
 
     @cached_property
     def residuals(self) -> Array:
-        """Measured minus expected range (n, beams) in m; nan where one of them is missing."""
+        """Measured minus expected ranges (n, beams) in m; nan where one of them is missing."""
         with np.errstate(invalid="ignore"):
             return np.where(self.is_hit & np.isfinite(self.expected), self.scans.ranges - self.expected, np.nan)
 
     @cached_property
     def is_explained(self) -> Mask:
-        """Beams (n, beams) that end at the static world."""
+        """Which beams (n, beams) end at the static world, within the tolerance."""
         with np.errstate(invalid="ignore"):
             ranges = self.scans.ranges
             return (
@@ -63,20 +62,20 @@ class ScanModel:
 
     @cached_property
     def is_short(self) -> Mask:
-        """Beams (n, beams) that end clearly before the static world."""
+        """Which beams (n, beams) end before the static world, by more than the tolerance."""
         with np.errstate(invalid="ignore"):
             return self.is_hit & (self.scans.ranges < self._nearest - self.tolerance)
 
     @cached_property
     def passes_through(self) -> Mask:
-        """Beams (n, beams) that end clearly behind a surface of the static world, or measure nothing."""
+        """Which beams (n, beams) end behind the static world by more than the tolerance, or miss it within range."""
         with np.errstate(invalid="ignore"):
             behind = self.is_hit & (self.scans.ranges > self._farthest + self.tolerance)
         return behind | (self.is_missing & (self._farthest + self.tolerance < self.scans.range_max))
 
     @cached_property
     def is_missing(self) -> Mask:
-        """Beams (n, beams) that measured nothing up to the maximum range."""
+        """Which beams (n, beams) measured nothing up to the maximum range: inf, or a larger range."""
         with np.errstate(invalid="ignore"):
             missing: Mask = (self.scans.ranges == np.inf) | (self.scans.ranges > self.scans.range_max)
         return missing
@@ -96,31 +95,32 @@ class ScanModel:
 
 
 def _over_neighbors(values: Array, choose: np.ufunc) -> Array:
-    """Return the minimum or maximum of each beam and its neighbors, because an edge can lie between two beams."""
+    """Return for each beam `choose` (minimum or maximum) of it and its two neighbors: an edge can lie between beams."""
     result: Array = values.copy()
     choose(result[:, 1:], values[:, :-1], out=result[:, 1:])
     choose(result[:, :-1], values[:, 1:], out=result[:, :-1])
     return result
 
 
-def scan_model(drive: RecordedDrive, scans: Scans, world: Surroundings) -> ScanModel:
-    """Compare scans with the static world."""
+def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> ComparedScans:
+    """Compare scans of a drive with the static world, from the poses of the drive."""
     poses = lidar_poses(drive, scans)
     expected = world.ranges_from(poses, scans.angles, scans.range_max)
     with np.errstate(invalid="ignore"):
         residuals = np.where(scans.is_hit() & np.isfinite(expected), scans.ranges - expected, np.nan)
     noise = range_noise(residuals, expected)
-    fixed = TRUE_POSE_TOLERANCE_M if drive.has_independent_poses else BELIEVED_POSE_TOLERANCE_M
-    growth = 0.0 if drive.has_independent_poses else BELIEVED_POSE_TOLERANCE_PER_M
+    fixed = TRUE_POSE_TOLERANCE_M if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_M
+    growth = 0.0 if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_PER_M
     reach = np.minimum(expected, scans.range_max)
     tolerance = fixed + NOISE_SIGMAS * np.minimum(noise, 0.3)[:, None] + growth * reach
-    return ScanModel(scans, poses, expected, noise, tolerance)
+    return ComparedScans(scans, poses, expected, noise, tolerance)
 
 
 def range_noise(residuals: Array, expected: Array) -> Array:
-    """Return the standard deviation (n,) of the ranges of each scan, nan with too few beams on smooth surfaces.
+    """Return the standard deviation (n,) of the range noise of each scan in m, from residuals and expected ranges.
 
-    It is computed from the differences between neighbor beams, so that errors of the pose do not count.
+    It is computed from differences between neighbor beams on smooth surfaces, to which errors of the pose add nothing.
+    Scans with too few of these beams have the median of the other scans.
     """
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(expected, axis=1))

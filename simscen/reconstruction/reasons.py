@@ -1,4 +1,4 @@
-"""Reconstructed parts of a scenario with the evidence for them: when it was seen, and how sure it is."""
+"""Faults found in a log, reasons for parts of the scenario, and time windows in which a condition holds."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Why a part of the scenario is there.
+class Reason:
+    """Reason for a part of the reconstructed scenario; a comment in the scenario file.
 
     Attributes:
-        text: What the log shows, in one sentence without a period.
-        begin: First time in s at which the log shows it; None if it is not bound to a time.
-        end: Last such time in s.
+        text: What the log shows, as a phrase without a period.
+        begin: Time in s at which the log begins to show it; None if it has no time.
+        end: Time in s until which the log shows it; None for a single time.
         confidence: "high", "medium", or "low".
     """
 
@@ -29,7 +29,7 @@ class Evidence:
 
     @property
     def comment(self) -> str:
-        """The evidence as one line."""
+        """The reason as one line, with times and confidence."""
         times = "" if self.begin is None else f", t = {self.begin:.2f} s"
         times += "" if self.begin is None or self.end is None else f" to {self.end:.2f} s"
         return f"{self.text}{times} (confidence: {self.confidence})"
@@ -37,15 +37,15 @@ class Evidence:
 
 @dataclass(frozen=True)
 class FoundFault:
-    """Fault of a sensor, the wheels, the localizer, or the commands.
+    """Fault that an estimator found in a log.
 
     Attributes:
-        target: What it affects: "lidar", "odom", "imu", "wheels", "cmd_vel", or "localizer".
+        target: Name of the faulty sensor, such as "lidar", "odom", or "imu", or "wheels", "cmd_vel", or "localizer".
         kind: Key of the fault in the scenario language, for example "off".
-        values: Its parameters by key.
-        begin: Start in s; None from the start of the drive.
-        duration: Duration in s; None until the end.
-        evidence: Why it is there.
+        values: Parameters of the fault in the scenario language.
+        begin: Start in s; None for the start of the drive.
+        duration: Duration in s; None until the end of the drive.
+        reason: Reason for which the fault is in the scenario.
     """
 
     target: str
@@ -53,12 +53,12 @@ class FoundFault:
     values: Mapping[str, object] = field(default_factory=dict)
     begin: float | None = None
     duration: float | None = None
-    evidence: Evidence = field(default_factory=lambda: Evidence(""))
+    reason: Reason = field(default_factory=lambda: Reason(""))
 
 
 @dataclass(frozen=True)
 class Window:
-    """Time window from `begin` to `end` in s, and the `first` and `last` index of the samples in it."""
+    """Time window from `begin` to `end` in s, with the indices of its `first` and `last` sample."""
 
     begin: float
     end: float
@@ -77,9 +77,9 @@ class Window:
 
 
 def windows(mask: Mask, times: Array, min_length: float = 0.0, max_gap: float = 0.0) -> list[Window]:
-    """Return the windows in which `mask` (n,) holds at `times` (n,), without those shorter than `min_length` s.
+    """Return the time windows in which all samples of `mask` (n,) at the `times` (n,) are true.
 
-    Two windows that are at most `max_gap` s apart are one.
+    Windows that are at most `max_gap` s apart become one. Windows shorter than `min_length` s are left out.
     """
     indices = np.flatnonzero(mask)
     if not len(indices):

@@ -1,8 +1,8 @@
-"""Simulation of pedestrians in a recorded drive: the robot and other objects move as the log shows."""
+"""Simulates pedestrians in a recorded drive, in which the robot and other objects move as in the log."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,17 +16,17 @@ from simscen.run.live_world.pedestrians import PedestrianMap
 from simscen.sim.body.outline import circle
 
 STEP_S = 0.05
-"""Step of the pedestrian model."""
+"""Time step of the pedestrian simulation."""
 NEAR_M = 4.0
-"""Distance from a pedestrian within which others count."""
+"""Objects and people that are farther from all pedestrians than this are left out of a step, to save time."""
 Walker = tuple[float, WalkingPedestrian]
 """Time in s at which a pedestrian appears, and the pedestrian."""
-GiveUp = Callable[[float, tuple[float, float]], bool]
-"""Returns whether a pedestrian at a time and a position is so far from its track that the rest does not matter."""
+IsGivenUp = Callable[[float, tuple[float, float]], bool]
+"""Returns for a time in s and the position of a pedestrian whether it is so far off its track that the trial ends."""
 
 
-class WalkTrial:
-    """Simulates pedestrians beside the recorded robot, a disc of `robot_radius` m."""
+class PedestrianTrial:
+    """Simulates pedestrians together with the recorded robot, which is a disc of `robot_radius` m."""
 
     def __init__(self, drive: RecordedDrive, world: PedestrianMap, robot_radius: float) -> None:
         self.world = world
@@ -37,26 +37,27 @@ class WalkTrial:
         distances: Array = np.hypot(*(positions - self._poses.poses_at(times)[:, :2]).T)
         return distances
 
-    def positions(
+    def simulate(
         self,
         walkers: Sequence[Walker],
         people: Sequence[FoundObject],
         objects: Sequence[FoundObject],
         end: float,
-        give_up: GiveUp = lambda _time, _position: False,
+        is_given_up: IsGivenUp = lambda _time, _position: False,
     ) -> dict[str, tuple[Array, Array]]:
-        """Return times (n,) and positions (n, 2) of each of `walkers` until `end`, or until one is given up.
+        """Simulate `walkers` until the time `end` in s, or until one of them is given up.
 
-        `people` and `objects` follow their keyframes; the walkers evade `people` as other pedestrians.
+        Return the times (n,) and positions (n, 2) of each by name. `people` and `objects` follow their keyframes. The
+        walkers evade `people` as they evade robots, and avoid `objects` as they avoid walls.
         """
         crowd = Crowd(self.world.walls, self.world.plan_path)
         paths: dict[str, list[tuple[float, float, float]]] = {walker.name: [] for _, walker in walkers}
         waiting = sorted(walkers, key=lambda item: item[0])
         begin = waiting[0][0]
         times = begin + STEP_S * np.arange(int((end - begin) / STEP_S + 1e-9) + 1, dtype=np.float64)
-        robot = _MovingDisc("robot", self._radius, self._poses.poses_at(times))
-        discs = [_MovingDisc(person.name, person.radius, person.poses_at(times)) for person in people]
-        outlines = [_MovingOutline(thing, times) for thing in objects]
+        robot = _RecordedDisc("robot", self._radius, self._poses.poses_at(times))
+        discs = [_RecordedDisc(person.name, person.radius, person.poses_at(times)) for person in people]
+        outlines = [_RecordedOutline(thing, times) for thing in objects]
         present = [np.array([thing.is_there(time) for time in times.tolist()]) for thing in (*people, *objects)]
         for index, time in enumerate(times.tolist()):
             while waiting and waiting[0][0] <= time + 1e-9:
@@ -64,38 +65,34 @@ class WalkTrial:
             poses = crowd.poses()
             for name, pose in poses.items():
                 paths[name].append((time, pose.x, pose.y))
-            if any(give_up(time, (pose.x, pose.y)) for pose in poses.values()):
+            if any(is_given_up(time, (pose.x, pose.y)) for pose in poses.values()):
                 break
-            places = np.array([pose[:2] for pose in poses.values()])
+            positions = np.array([pose[:2] for pose in poses.values()])
             near = [
                 thing
                 for thing, is_present in zip((*discs, *outlines), present, strict=True)
-                if is_present[index] and thing.is_near(index, places)
+                if is_present[index] and thing.is_near(index, positions)
             ]
-            robots = tuple(disc.observed(index) for disc in (robot, *near) if isinstance(disc, _MovingDisc))
-            things = tuple(one.observed(index) for one in near if isinstance(one, _MovingOutline))
+            robots = tuple(disc.observed(index) for disc in (robot, *near) if isinstance(disc, _RecordedDisc))
+            things = tuple(one.observed(index) for one in near if isinstance(one, _RecordedOutline))
             crowd.step(Surroundings(robots, things), STEP_S)
-        return {name: (path[:, 0], path[:, 1:]) for name, path in _arrays(paths)}
+        arrays = {name: np.array(path).reshape(-1, 3) for name, path in paths.items()}
+        return {name: (path[:, 0], path[:, 1:]) for name, path in arrays.items()}
 
 
-def _arrays(paths: dict[str, list[tuple[float, float, float]]]) -> Iterator[tuple[str, Array]]:
-    for name, path in paths.items():
-        yield name, np.array(path).reshape(-1, 3)
-
-
-class _Moving:
-    """Something that follows its poses (n, 3), one for each step."""
+class _RecordedMotion:
+    """Robot, person, or object that has one of the given poses (n, 3) in each step of the simulation."""
 
     def __init__(self, poses: Array) -> None:
         self.poses = poses
 
-    def is_near(self, index: int, places: Array) -> bool:
-        """Return whether it is within NEAR_M of one of the places (m, 2)."""
-        return bool(len(places)) and float(np.hypot(*(places - self.poses[index, :2]).T).min()) < NEAR_M
+    def is_near(self, index: int, positions: Array) -> bool:
+        """Return whether its pose in the step `index` is within NEAR_M of one of the positions (m, 2)."""
+        return bool(len(positions)) and float(np.hypot(*(positions - self.poses[index, :2]).T).min()) < NEAR_M
 
 
-class _MovingDisc(_Moving):
-    """A robot or a person, whom pedestrians evade as another pedestrian."""
+class _RecordedDisc(_RecordedMotion):
+    """Robot or person as a disc that pedestrians evade as a robot."""
 
     def __init__(self, name: str, radius: float, poses: Array) -> None:
         super().__init__(poses)
@@ -108,8 +105,8 @@ class _MovingDisc(_Moving):
         return ObservedRobot(self._name, Pose2(*self.poses[index].tolist()), (vx, vy), self._radius, self._outline)
 
 
-class _MovingOutline(_Moving):
-    """An object, which pedestrians avoid as a wall."""
+class _RecordedOutline(_RecordedMotion):
+    """Object as an outline that pedestrians avoid as a wall."""
 
     def __init__(self, thing: FoundObject, times: Array) -> None:
         super().__init__(thing.poses_at(times))
