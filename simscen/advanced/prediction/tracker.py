@@ -35,7 +35,7 @@ CENTER_STD_M, CENTER_STD_PER_M, HIDDEN_STD_M = 0.02, 0.004, 0.10
 INITIAL_STD_M = 0.1
 """Additional standard deviation in m of the first measurement of a track."""
 GATE_M, GATE_SIGMAS = 0.25, 3.0
-"""Gate of the association: a distance in m plus a number of standard deviations."""
+"""Maximum distance from a track to a cluster that updates it: a part in m plus a number of standard deviations."""
 MIN_START_RADIUS_M = 0.15
 """Minimum radius in m of a cluster that starts a track without having appeared in free space."""
 MIN_HIDDEN_RADIUS_M = 0.3
