@@ -32,7 +32,7 @@ class Trail:
     """
 
     def __init__(self, poses: Sequence[Pose2], pose: Pose2, radius: float, length: float) -> None:
-        """Take earlier poses (oldest first), the current one, the circumscribed radius in m, and the m to add."""
+        """Take earlier poses (oldest first), the current one, the circumscribed radius, and the length to add in m."""
         self._radius = radius
         passed = self._thinned(np.array([pose, *reversed(poses)], dtype=np.float64))
         self.has_strafed = _has_strafed(passed)

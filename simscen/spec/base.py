@@ -171,7 +171,7 @@ class LazySpec:
     name: str
 
     def load(self) -> type[BaseModel]:
-        """Import the module and return the specification."""
+        """Import the module and return the specification class."""
         model: type[BaseModel] = getattr(import_module(self.module), self.name)
         return model
 

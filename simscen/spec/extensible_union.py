@@ -105,7 +105,7 @@ class PluginSpec(LazySpec):
     entry: Entry
 
     def load(self) -> type[BaseModel]:
-        """Import the package and return the specification. Raises BrokenPlugin."""
+        """Import the package and return the specification class. Raises BrokenPlugin."""
         return self.entry.load()
 
     def _validate(self, value: Any) -> BaseModel:

@@ -33,6 +33,7 @@ UNITS: dict[str, dict[str, float]] = {
     "impulse": {"N s": 1.0, "Ns": 1.0},
     "ratio": {"%": 0.01},
 }
+"""Units of each dimension, with their factors to SI units."""
 
 
 @dataclass(frozen=True)

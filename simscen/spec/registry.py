@@ -100,7 +100,7 @@ class Entry:
         return f"{self.distribution} {self.version}".strip() or "simscen"
 
     def load(self) -> type[BaseModel]:
-        """Import the module and return the specification. Raises BrokenPlugin."""
+        """Import the module and return the specification class. Raises BrokenPlugin."""
         if self.problem:
             raise BrokenPlugin(self, self.problem)
         return _load(self)
@@ -116,7 +116,7 @@ class BrokenPlugin(Exception):
 
 
 def shipped(group: str) -> tuple[Entry, ...]:
-    """Return the shipped types of a group, in the order in which it lists them."""
+    """Return the shipped types of a group, in the order of `Group.shipped`."""
     address = GROUPS[group].shipped
     if not address:
         return ()

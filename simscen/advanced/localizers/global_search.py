@@ -31,7 +31,7 @@ MAX_RANGE_M = 15.0
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
 """Maximum number of poses from the coarse grid, of those that are refined, and of those that are returned."""
 NEARBY_STEPS, REFINED_NEARBY_POSES = ((6, 0.2), (9, 0.035)), 12
-"""Number and size (m, rad) of the steps of `search_near` to each side, and number of poses that it refines."""
+"""Steps of `search_near` to each side, as (number, size) in m and in rad; and number of poses that it refines."""
 MIN_SEPARATION = (0.5, 0.2)
 """Poses that differ by no more than both of these values (m, rad) count as the same."""
 PASSED_SHARES = (0.3, 0.55, 0.8)

@@ -89,7 +89,7 @@ class MapTrust:
     def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], zero: float, full: float) -> None:
         """Classify the cells of a map. `beyond`, in the order of `field.table`, marks cells outside the mapped area.
 
-        A scan is ignored if at most `zero` of its beams fit; from `full` on, it has its full weight.
+        A scan is ignored if at most the share `zero` of its beams fits. From the share `full` on, it counts fully.
         """
         self._field, self._zero, self._full = field, zero, full
         mapped = np.where(field.table < FIT_DISTANCE_M, _FITS, _MISSES)

@@ -123,8 +123,8 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
         `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta`
         disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow
-        odometry, and later scans show which particles fit the map. If the map does not show the
-        surroundings, all particles follow scan matching.
+        odometry, and later scans show which particles fit the map. If the map does not show the surroundings, all
+        particles follow scan matching.
         """
         self._settle(delta)
         poses = sample_step(self.particles.poses, step, self._rng)

@@ -1,6 +1,6 @@
 """Relocalization: detects that the particle filter is lost, and searches the map for the robot.
 
-All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.score.
+All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores are those of GlobalSearch.score.
 """
 
 import math

@@ -77,7 +77,7 @@ REFERENCE_POINTS, SCAN_POINTS = 120, 90
 GATES_M, MAX_ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
 """Maximum distance of a point from its nearest neighbor in successive iterations, and maximum number of iterations."""
 LAST_GATE_STEP, CONVERGED_STEP = (0.02, 0.01), (0.002, 0.001)
-"""Changes of the pose (m, rad) by an iteration below which the last of GATES_M is next, and below which it ends."""
+"""Changes of the pose (m, rad) by an iteration below which the last of GATES_M follows, and the match ends."""
 OUTLIER_DISTANCE_M, OUTLIER_RATIO = 0.1, 1.5
 """A point has a quarter of its weight (Geman-McClure) if its distance from its neighbor is OUTLIER_DISTANCE_M, or
 OUTLIER_RATIO times the root mean square of all distances if that is more.
@@ -91,11 +91,11 @@ MIN_NORMAL_COSINE = 0.7
 """Minimum cosine of the angle between the normals of two points on the same surface."""
 MIN_MATCHED_POINTS = 12
 GUESS_STD = (0.15, 0.02, 0.15, 0.03)
-"""Standard deviation of the guess: share of the distance plus m, and share of the rotation plus rad."""
+"""Standard deviation of the guess: a share of the distance plus m, and a share of the rotation plus rad."""
 MAX_BEAM_ANGLE_RAD = 0.04
 """Maximum angle between two beams. With a larger angle, the normals of surfaces are unknown."""
 AGREEMENT = (0.03, 0.1, 0.03, 0.1)
-"""Difference up to which scan matching and odometry agree: m plus share of the distance, rad plus share of rotation."""
+"""Maximum difference of a match that agrees with odometry: m plus a share of the distance, rad plus one of the turn."""
 MIN_OVERLAP = 0.3
 """Share of a scan's points that earlier scans also showed, below which the match is rejected."""
 MAX_OVERLAP_STEP = 0.75, 0.75

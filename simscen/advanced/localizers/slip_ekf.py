@@ -1,7 +1,7 @@
 """Extended Kalman filter of odometry and gyroscope that detects wheel slip in turns, with optional scan matching.
 
 If the wheels slip in a turn, the turn rates of wheels and gyroscope disagree. The wheels then also measure a wrong
-distance. A gyroscope cannot correct it, but scan matching can.
+distance. A gyroscope cannot correct the distance, but scan matching can.
 
 Source: Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter. As in robot_localization, the turn
 rate is a state that both sensors measure. The bias of the gyroscope is also a state; it is measured while the robot

@@ -64,7 +64,7 @@ SLIP_LEVER_M = 0.1
 """Distance from the base to the point around which a slipping robot rotates."""
 SLIP_STD = 0.7
 """Standard deviation of slip in each direction while the wheels slip. It would be 0.58 for a uniform distribution up to
-the possible speed, and 1 if slip always had the possible speed."""
+the possible speed, and 1 if the robot always slipped at the possible speed."""
 PUSHED_SPEED_M_S = 0.3
 """Possible speed of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
 
@@ -73,8 +73,8 @@ PUSHED_SPEED_M_S = 0.3
 class WheelStep:
     """Motion between two odometry messages, as measured by the wheels.
 
-    pose:             motion in the base frame before it
-    seconds:          its duration
+    pose:             motion, in the base frame at its start
+    seconds:          duration
     speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
     slips:            whether the wheels slip
     undetected_slip:  time in s of slip until the end of the step that was not detected before

@@ -110,7 +110,7 @@ class Leg:
     reach: float = FAR_REACH_M
 
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
-        """Return the search for this leg, which has not been started."""
+        """Return a search for this leg, to be started with `solve`."""
         if self.samples is None:
             return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
         return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)

@@ -1,4 +1,4 @@
-"""Tracks of moving obstacles, each a Kalman filter with a constant-velocity model, and when they move and end.
+"""Tracks of obstacles, each a Kalman filter with a constant-velocity model, and the decision which tracks move or end.
 
 The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). The results are
 those of filterpy's KalmanFilter with Q_discrete_white_noise. Because noise and measurements are isotropic, position and
@@ -45,7 +45,7 @@ class ConstantVelocityFilter:
 
 MAX_UPDATES = 10
 """Number of last updates that a track stores."""
-INITIAL_SPEED_STD = 1.5
+INITIAL_SPEED_STD_M_S = 1.5
 """Standard deviation in m/s of the initial velocity."""
 
 
@@ -88,7 +88,7 @@ class Track(ConstantVelocityFilter):
     @classmethod
     def start(cls, tick: int, position: complex, std: float, radius: float) -> "Track":
         """Start a track at a position with a standard deviation in m, and with unknown velocity."""
-        return cls(position, 0j, std * std, 0.0, INITIAL_SPEED_STD**2, radius, position, tick)
+        return cls(position, 0j, std * std, 0.0, INITIAL_SPEED_STD_M_S**2, radius, position, tick)
 
     @property
     def last_update_tick(self) -> int:
@@ -126,7 +126,7 @@ UNSEEN_STANDING_TIMEOUT_S = 0.8
 """Time in s without a hit after which a track ends that is not moving."""
 MAX_POSITION_STD_M = 1.2
 """Standard deviation in m of the position above which a track ends."""
-MAX_SPEED = 4.0
+MAX_SPEED_M_S = 4.0
 """Speed in m/s above which a track is wrong, because it has changed from one obstacle to another."""
 NEARBY_MIN_VISIBLE_UPDATES = 5
 """While another obstacle moves: minimum number of updates with a completely visible cluster before a track moves."""
@@ -179,7 +179,7 @@ class TrackLifecycle:
     def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
         """Return whether a track has ended; `sees_past(track)` returns whether the lidar sees past its position."""
         unseen_s = (tick - track.last_update_tick) / self._rate
-        if abs(track.velocity) >= MAX_SPEED or track.position_std > MAX_POSITION_STD_M:
+        if abs(track.velocity) >= MAX_SPEED_M_S or track.position_std > MAX_POSITION_STD_M:
             return True
         if track.is_moving:
             return unseen_s > VISIBLE_TIMEOUT_S and (unseen_s > HIDDEN_TIMEOUT_S or sees_past(track))

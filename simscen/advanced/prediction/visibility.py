@@ -141,7 +141,7 @@ class EarlierScan:
         return beam.astype(np.int64), np.abs(points)
 
     def passed_beyond(self, beam: Indices, distance: Array) -> Mask:
-        """Return whether beams (…,) passed beyond a distance."""
+        """Return which beams (…,) passed beyond the distances (…,)."""
         return np.asarray(self.free_distances.take(beam) > distance)
 
 
