@@ -86,9 +86,9 @@ class Ranged(Spec):
 
 
 def by_default() -> Any:
-    """Return the default of a field that holds a specification: the one of an empty mapping.
+    """Return the default of a field that holds a specification: the specification of an empty mapping.
 
-    It is created when it is used. Creating it at import would cost every command 10 ms.
+    It is created when it is needed. Creating it at import would cost every command 10 ms.
     """
     return Field(default_factory=dict, validate_default=True)
 
