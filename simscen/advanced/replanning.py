@@ -1,6 +1,6 @@
-"""Replanning only when it pays: on changes of the costmap, around moving obstacles, and with hysteresis.
+"""Decisions of the advanced stack about when to replan, how to plan around moving obstacles, and what to clear.
 
-Plans pass behind moving obstacles: for each cell, the obstacles are predicted for the time at which the robot would
+Plans pass behind moving obstacles. For each cell, the obstacles are predicted for the time at which the robot would
 arrive there in a straight line at full speed. Of the path of a crossing obstacle, only the part where both would meet
 gets a cost.
 """
@@ -28,7 +28,7 @@ from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 DECAY_TIME_S = 2.0
-"""Time in which the cost decays by a factor of e, because no obstacle keeps its velocity forever."""
+"""Time ahead over which the cost decays by a factor of e, because no obstacle keeps its velocity forever."""
 BLOCK_SIZE_M = 0.2
 """Approximate size of the blocks of cells that get the same cost."""
 
@@ -36,8 +36,8 @@ BLOCK_SIZE_M = 0.2
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
     """Return the costmap with costs of at most MAX_NON_OBSTACLE where the robot would meet moving obstacles.
 
-    The robot starts at `robot`, drives at `speed` m/s, and has a `radius` in m. Without such cells, the same object is
-    returned.
+    The robot starts at `robot`, drives at `speed` m/s, and has a `radius` in m. If it would meet none, `costmap` itself
+    is returned.
     """
     if not len(costmap.moving):
         return costmap
@@ -72,7 +72,7 @@ def meets_moving_obstacle(
 ) -> bool:
     """Return whether a robot at `robot` that drives along `path` (x + iy) at `speed` comes too close to an obstacle.
 
-    The distances are those of `MovingObstacles.nearness`, computed with scalars because there are only few points.
+    It is too close if `MovingObstacles.nearness` is positive; computed with scalars because there are only few points.
     """
     moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON_S)
     if not moving.obstacles:
@@ -90,20 +90,20 @@ def meets_moving_obstacle(
     return False
 
 
-CLEARANCE_PERIOD_S = 0.5
-"""Time between two checks for lost clearance."""
+MIN_PLAN_AGE_S = 0.5
+"""Age of a plan from which on it is checked for lost clearance."""
 SHORTCUT_PERIOD_S = 2.0
-"""Time between two checks for a shorter path after obstacles have disappeared."""
+"""Time between two checks whether obstacles have disappeared, so that there may be a shorter path."""
 MOVING_PERIOD_S = 0.5
-"""Time between two plans around moving obstacles."""
+"""Minimum time between two plans around moving obstacles."""
 CAUTIOUS_CLEARANCES_M = (0.10, 0.05)
-"""Additional clearances to try once the controller could not follow a plan."""
+"""Additional clearances that are tried in this order, once the controller could not follow a plan."""
 PREFERRED_CLEARANCE_M, MAX_DETOUR_RATIO = 0.15, 1.15
-"""Larger additional clearance that is used if it makes the path longer by at most this ratio."""
+"""Larger additional clearance that is used if the path with it is at most this many times as long."""
 DISAPPEARED_CELLS = 8
-"""Obstacle cells that must have disappeared before a shorter path is searched; single cells vary with lidar noise."""
+"""A shorter path is searched if more obstacle cells than this have disappeared; a few vary with lidar noise."""
 MAX_LENGTH_RATIO, MIN_SAVING_M = 0.85, 0.5
-"""Hysteresis: a new path must be shorter than the rest of the current one by this ratio and this length."""
+"""Hysteresis: a new path must be shorter than this ratio of the rest of the current plan, and save this length."""
 LOST_CLEARANCE_M = 0.1
 """Clearance that a plan may lose before it is replaced."""
 CLEARANCE_HORIZON_M = 4.0
@@ -119,7 +119,7 @@ class ClearancePlan(FollowedPlan):
         super().__init__(path, radius, costmap)
 
     def compare(self, costmap: CostmapView) -> None:
-        """Compare the plan with a costmap."""
+        """Determine at which points the plan is occupied, and where it has lost clearance."""
         clearance = distances(costmap, self.path.points[:, :2])
         self._occupied = clearance <= np.float32(self._radius)
         min_clearance = self._initial_clearance - np.float32(LOST_CLEARANCE_M)
@@ -144,7 +144,7 @@ class ClearancePlan(FollowedPlan):
 
 
 class AdvancedPlanManager(PlanManager):
-    """Plan manager that plans around predicted obstacles and, with `replanning: on_invalid`, on changes only."""
+    """Plan manager that plans around predicted obstacles. With `replanning: on_invalid`, it replans only on changes."""
 
     plan: ClearancePlan | None
 
@@ -192,7 +192,7 @@ class AdvancedPlanManager(PlanManager):
         if self._costmap.revision != self._checked_revision:
             self._checked_revision = self._costmap.revision
             self._max_obstacle_cells = max(self._max_obstacle_cells, self._costmap.obstacle_cells)
-            if now - self._adopted_at >= CLEARANCE_PERIOD_S and plan.has_lost_clearance():
+            if now - self._adopted_at >= MIN_PLAN_AGE_S and plan.has_lost_clearance():
                 return "tight"
         if now - self._scheduled_at < SHORTCUT_PERIOD_S:
             return ""
@@ -203,7 +203,7 @@ class AdvancedPlanManager(PlanManager):
         return "better" if disappeared and can_be_shorter else ""
 
     def _should_avoid_moving(self, now: float, pose: Pose2, plan: FollowedPlan) -> bool:
-        """Return whether the plan meets a moving obstacle, or avoids one that may have moved away."""
+        """Return whether to replan because the plan meets a moving obstacle, or avoids one that may have moved away."""
         moving = self._costmap.moving
         if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
             return False
@@ -247,16 +247,16 @@ class AdvancedPlanManager(PlanManager):
 
 
 INITIAL_WAIT_S = 10.0
-"""Time until the entire costmap may be cleared again; it doubles each time."""
+"""Time until the entire costmap may be cleared again; doubled after each such clearing."""
 PROGRESS_M = 1.0
-"""Decrease of the distance to the goal after which the last clearing counts as successful."""
+"""Decrease of the distance to the goal after which the last clearing counts as a success, which resets the wait."""
 
 
 class ClearingBackoff:
-    """Clear the entire global costmap at first, then at increasing intervals, otherwise only the area around the robot.
+    """Policy that clears the entire global costmap at increasing intervals, otherwise only the area around the robot.
 
-    Obstacles that were seen earlier may have disappeared. But a robot that clears the costmap each time it finds no
-    path plans around the end of a wall that is out of sight, drives there, sees it, and has forgotten the other end.
+    Clearing helps if obstacles that were seen earlier have disappeared. But a robot that clears everything whenever it
+    finds no path forgets the far end of a wall, and drives back and forth between both ends.
     """
 
     def __init__(self) -> None:
@@ -270,7 +270,7 @@ class ClearingBackoff:
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
         """Return whether to clear the entire global costmap at the time `now` in s, or only the area around the robot.
 
-        `goal_distance` is the straight distance to the goal in m.
+        Call it once per clearing. `goal_distance` is the straight distance to the goal in m.
         """
         if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now

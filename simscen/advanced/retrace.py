@@ -16,27 +16,27 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 
 SPACING_M = 0.01
-"""Distance in m that the footprint moves between two poses of a trail, including rotation."""
+"""Distance in m between two poses of a trail, as returned by `Trail.footprint_distance`."""
 LOOP_CLOSURE_M, MIN_LOOP_M = 0.12, 0.3
-"""A loop, which is removed, returns to within the first distance of a pose after the footprint has moved by at least
-the second one."""
+"""A trail has a loop if it returns to within the first distance of an earlier pose, after the footprint has moved by at
+least the second distance. Loops are removed."""
 MIN_LATERAL_SHARE = 0.1
-"""Share of lateral motion above which the base has strafed; a slipping base has less."""
+"""Share of lateral motion above which the base has strafed. A base that only slips has less."""
 
 
 class Trail:
     """Evenly spaced poses (n, 3) of the robot's path in reverse, without loops, starting at the current pose.
 
-    `along` (n,) is the distance in m that the footprint moves to each pose, in rotations as well. Beyond the known
-    part, the trail continues straight backward.
+    `along` (n,) is the distance in m that the footprint moves to each pose (`footprint_distance`). After the oldest
+    known pose, the trail continues straight backward.
     """
 
-    def __init__(self, poses: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:
+    def __init__(self, poses: Sequence[Pose2], pose: Pose2, radius: float, length: float) -> None:
         """Take earlier poses (oldest first), the current one, the circumscribed radius, and the length to add in m."""
-        self._lever = lever
+        self._radius = radius
         passed = self._thinned(np.array([pose, *reversed(poses)], dtype=np.float64))
         self.has_strafed = _has_strafed(passed)
-        """Whether the base moved sideways."""
+        """Whether the base drove sideways."""
         trail = self._without_loops(passed)
         x, y, yaw = trail[-1].tolist()
         end = (x - length * math.cos(yaw), y - length * math.sin(yaw), yaw)
@@ -49,10 +49,10 @@ class Trail:
         """Distance (n,) in m that the base drives to each pose."""
 
     def footprint_distance(self, poses: Array, others: Array) -> Array:
-        """Return the distances (…,) in m that the footprint moves from poses (…, 3) to others."""
+        """Return the distances (…,) in m from poses (…, 3) to others, plus the turn times the circumscribed radius."""
         turned = np.abs(wrap_array(poses[..., 2] - others[..., 2]))
         return np.asarray(
-            np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._lever * turned
+            np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._radius * turned
         )
 
     def _thinned(self, trail: Array) -> Array:
@@ -90,6 +90,7 @@ def _has_strafed(passed: Array) -> bool:
 HORIZON_S = 1.0
 """Horizon in s of each candidate command: 15 cm at Nav2's backup_speed."""
 TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
+"""Times in s at which a candidate command is checked for collisions."""
 MIN_FREE_STEPS = 3
 """Number of steps of TIMES that must be free if no command is free for the whole horizon."""
 SLACK_CELLS = 0.3
@@ -97,23 +98,23 @@ SLACK_CELLS = 0.3
 DEVIATION_WEIGHT = 2.0
 """Weight of the deviation from the trail relative to the progress along it."""
 MIN_GAIN_M = 0.01
-"""Minimum advantage in m of a command over standing still."""
+"""Minimum difference in m between the score of a command and that of standing still."""
 WINDOW_M = 0.5
-"""Length in m of the trail in which the robot is located."""
+"""Length in m of the part of the trail, from the last position on, in which the robot is located."""
 SPEED_RATIOS = (-1.0, -0.5, 0.0, 0.5)
 """Candidate speeds relative to the maximum; also forward, because a trail can have cusps."""
 TURN_RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
 """Candidate turn rates in rad/s."""
 LATERAL_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Candidate lateral speeds relative to the maximum, for a holonomic base whose trail has lateral motion."""
+"""Candidate lateral speeds relative to the maximum, for a holonomic base that has strafed along its trail."""
 
 
 class TrailFollower:
     """Follows the trail of the robot backward; straight backward where there is no trail.
 
     A robot at an angle between two posts can neither turn nor leave in a straight line, but it can leave on the path
-    on which it entered. Each step compares a few velocities on the local costmap and takes the one with the most
-    progress along the trail, so that slipping wheels do not lead the robot away from it.
+    on which it entered. Each step compares a few velocities on the local costmap, and takes the one with the most
+    progress and the least deviation. Slipping wheels therefore do not lead the robot away from its trail.
     """
 
     def __init__(self, setting: Setting, speed: float) -> None:
@@ -142,7 +143,7 @@ class TrailFollower:
         return [*(Pose2(*each) for each in remaining[::-1].tolist()), *poses[first_new:]]
 
     def locate(self, pose: Pose2) -> None:
-        """Locate the robot on the trail; it never moves forward on it."""
+        """Locate the robot on the trail, never before the position where it was located last."""
         window, self._last = self._window(), pose
         self._index += int(self._trail.footprint_distance(self._trail.poses[window], np.array(pose)).argmin())
 
@@ -161,10 +162,10 @@ class TrailFollower:
         return slice(self._index, int(np.searchsorted(along, along[self._index] + WINDOW_M, side="right")))
 
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the free command with the most progress, or one that is free at first, or None.
+        """Return the best command that is free of collisions, or one that is free at first, or None.
 
-        None means that standing still is as good. If the collision monitor rejects the best command, because it sees
-        obstacles more precisely than the costmap, other backward commands are tried.
+        None means that no better command than standing still is free. If the collision monitor rejects the best one,
+        because it sees obstacles more precisely than the costmap, other backward commands are tried.
         """
         *scores, stop_score = self._scores(pose).tolist()
         has_strafed, is_vetoed = self._trail.has_strafed, False
@@ -189,10 +190,10 @@ class TrailFollower:
         return fallback
 
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
-        """Return which of the poses (n, 3) collide, unless the robot collided as much on its trail or does so now.
+        """Return which of the poses (n, 3) collide, except with cells that were or are as near to the robot.
 
-        The robot has passed the trail, so that collisions there by less than a cell are errors of the costmap. Deeper
-        collisions are due to obstacles that appeared later.
+        The robot has passed its trail. Collisions there by less than a cell are therefore errors of the costmap, and
+        deeper ones are due to obstacles that appeared later.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -221,7 +222,6 @@ class TrailFollower:
 
 
 def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
-    """Return the candidate commands of a robot."""
     commands = list[Twist]()
     for speed_ratio, lateral_ratio, rate in product(
         SPEED_RATIOS, LATERAL_RATIOS if robot.max_lateral > 0.0 else (0.0,), TURN_RATES
@@ -239,7 +239,7 @@ TIME_ALLOWANCE_RATIO = 1.5
 
 
 class Retrace:
-    """Drives back along the trail of the robot until it can turn in place."""
+    """Recovery behavior that drives back along the trail of the robot until the robot can turn in place."""
 
     name = "retrace"
 
@@ -253,10 +253,10 @@ class Retrace:
         self._follower.start(pose, max(self._spec.backup_dist, self._spec.retrace_dist))
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command, or None when the robot has driven back far enough or cannot get any further.
+        """Return the command, `seconds` after the start; None if the robot has driven back far enough or cannot go on.
 
-        Raises BACKUP_COLLISION_AHEAD if the robot cannot move by a single cell, BACKUP_TIMEOUT, or
-        BACKUP_INVALID_INPUT.
+        Raises NavigationFailure: BACKUP_INVALID_INPUT if the robot cannot reverse, BACKUP_TIMEOUT, or
+        BACKUP_COLLISION_AHEAD if it could not move by a single cell.
         """
         follower = self._follower
         if follower.speed <= 0.0:

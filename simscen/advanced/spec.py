@@ -13,11 +13,11 @@ PARAMETER_SETS: Mapping[str, Mapping[str, object]] = {
     "default": {},
     "consistent": {"covariance": "scatter", "sure_update_interval": 1},
 }
-"""Default values by the name of a parameter set."""
+"""Values that replace the defaults of ScanMatchingAmcl, by the name of the parameter set."""
 
 
 class ScanMatchingAmcl(AmclParameters):
-    """AMCL with scan matching, relocalization search and map trust. Takes all parameters of `amcl`, too."""
+    """AMCL with scan matching, relocalization, and less trust in an outdated map. Also has the parameters of `amcl`."""
 
     component: ClassVar[str] = "simscen.advanced.localizers.build:scan_matching_amcl"
     precomputation: ClassVar[str] = "simscen.advanced.localizers.build:precompute"
@@ -27,30 +27,30 @@ class ScanMatchingAmcl(AmclParameters):
     sigma_hit: Annotated[Length, Field(ge=0.001)] = 0.1
     """Standard deviation of the endpoints of beams that hit an obstacle of the map."""
     match_scans: bool = True
-    """Predict the motion by matching each scan with those of the last meters, with odometry as the initial guess."""
+    """Predict the motion by matching each scan with earlier scans, with odometry as the initial guess."""
     likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 0.3
     """Exponent of the product over the beams. Below 1 because beams err together; `likelihood_field_prob` only."""
     beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
     """Whether beams that end outside the map, or in unknown space next to free space, are ignored (`say_nothing`) or
     count as a miss, as in Nav2. `likelihood_field_prob` only."""
     map_trust_none: Probability = 0.45
-    """A scan is ignored if no more than this share of its beams fits the map, while the particles are one narrow group:
-    the robot is where it is believed to be, and its surroundings have changed."""
+    """A scan is ignored if at most this share of its beams fits the map. This applies only while the particles are one
+    narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
-    """A scan has its full weight if at least this share of its beams fits the map; 0 = every scan, as in Nav2."""
+    """A scan has its full weight if at least this share of its beams fits the map. 0 = every scan has, as in Nav2."""
     settling_distance: NonNegativeLength = 4.0
     """Distance from a given initial pose over which the weight of scans grows from a fifth to its full value, since one
     room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as in Nav2."""
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
-    """How a lost robot is found: the scans of the last meters are matched with the whole map, or only random particles
-    at the start and by `recovery_alpha_*` find it, as in Nav2. `scan_matching` ignores `recovery_alpha_*`, because
-    random particles at poses that look alike would lead away from a correct pose."""
+    """How a lost robot is found. `scan_matching`: by matching the scans of the last meters with the whole map.
+    `random`: by random particles at the start and from `recovery_alpha_*`, as in Nav2. `scan_matching` ignores
+    `recovery_alpha_*`, because random particles at poses that look alike would lead away from a correct pose."""
     sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
-    """Number of scans per comparison with the map while the robot is certain of its pose: map, scan matching and
-    odometry agree. The other scans are only matched with each other. Always 1 with `covariance: scatter`."""
+    """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
+    matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
-    """Source of the covariance: the particles, as in Nav2, or also the scatter of the last estimates about the matched
-    motion and the residuals of the beams. `scatter` needs `match_scans`."""
+    """Source of the covariance. `particles`: the particles, as in Nav2. `scatter`: also the differences of the last
+    estimates from the motion by scan matching, and the residuals of the beams. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -62,21 +62,20 @@ class ScanMatchingAmcl(AmclParameters):
 
 
 class SlipEkf(EkfParameters):
-    """EKF of odometry and gyroscope that detects wheel slip in turns, with optional laser odometry. Uses no map."""
+    """EKF of odometry and gyroscope that detects wheel slip in turns, with optional scan matching. Uses no map."""
 
     component: ClassVar[str] = "simscen.advanced.localizers.build:slip_ekf"
     type: Literal["slip_ekf"]
     wheel_slip: Probability = 0.0
-    """Standard deviation of the share of the distance by which the robot slips; a slip lasts about one second."""
+    """Standard deviation of slip, as a share of the distance driven. Slip changes within about one second."""
     match_scans: bool = False
-    """Correct the distance by matching each scan with those of the last meters. The covariance stays that of the
-    wheels."""
+    """Correct the distance by matching each scan with earlier scans. The covariance remains that without correction."""
 
 
 class MedialAxisPlanner(OmplParameters):
-    """BIT* on samples of the medial axis near the cheapest path over a coarse grid, then an optimization of the path.
+    """BIT* on samples of the medial axis near the cheapest path over a coarse grid. The path is then optimized.
 
-    For cars and long hulls: RRT-Connect over poses, confined to near-shortest paths over a coarse grid.
+    For cars and long hulls: RRT-Connect over poses in the region of near-shortest paths over a coarse grid.
     """
 
     component: ClassVar[str] = "simscen.advanced.planners.medial_axis_planner:medial_axis_planner"

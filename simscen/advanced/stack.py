@@ -1,4 +1,4 @@
-"""The advanced stack and its builder: the reference stack with motion prediction and compensation of wheel slip."""
+"""The advanced stack and its builder: the reference stack with motion prediction and slip compensation."""
 
 import math
 from typing import Any
@@ -17,20 +17,20 @@ from simscen.stack.protocols import Controller, Planner
 from simscen.stack.reference import ReferenceStack
 
 DECAY_DISTANCE_M = 0.5
-"""Distance in which an earlier estimate decays by a factor of e, because the ground changes."""
+"""Distance driven in which the weight of an earlier measurement decays by a factor of e, because the ground changes."""
 MAX_CURVATURE_PER_M = 1.0
-"""Limit of the estimated curvature, in case of a broken sensor."""
+"""Limit of the estimate to both sides. Only a broken sensor would measure more."""
 
 
 class TurnSlipObserver:
-    """Estimates the curvature that the wheels do not measure, from wheel odometry and fused odometry."""
+    """Estimates the turn in rad per meter driven that the wheels do not measure, and compensates commands for it."""
 
     def __init__(self) -> None:
         self._curvature = 0.0
         self._before: tuple[Pose2, Pose2] | None = None
 
     def update(self, wheels: Pose2, fused: Pose2) -> None:
-        """Update the estimate with poses of wheel and fused odometry; ignores values that are not finite."""
+        """Update the estimate with poses of wheel odometry and fused odometry. Ignore them if they are not finite."""
         if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
             return
         before, self._before = self._before, (wheels, fused)
@@ -56,12 +56,12 @@ ROBOT_FRAME = Pose2(0.0, 0.0)
 
 
 class AdvancedStack(ReferenceStack):
-    """Reference stack that predicts and avoids moving obstacles, also while it stands."""
+    """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal."""
 
     def __init__(
         self, *parts: Any, prediction: MotionPrediction, turn_slip: TurnSlipObserver | None, **options: Any
     ) -> None:
-        """Take the arguments of ReferenceStack, and the additional components."""
+        """Take the arguments of ReferenceStack, and two more components. If `turn_slip` is None, slip is ignored."""
         super().__init__(*parts, **options)
         self._prediction, self._turn_slip = prediction, turn_slip
         self._has_moving_obstacles = False
@@ -112,7 +112,7 @@ class AdvancedStack(ReferenceStack):
         return command if self._turn_slip is None else self._turn_slip.compensate(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
-        """Step aside for moving obstacles, and return."""
+        """Make the robot step aside for moving obstacles, and drive back to its position afterward."""
         command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
@@ -124,8 +124,8 @@ class AdvancedStackBuilder(StackBuilder):
     """Builder of the advanced stack: replaces the plan manager, the clearing policy, and the stack itself."""
 
     def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
-        """Make a plan manager that avoids moving obstacles at the full speed of the controller."""
-        self._full_speed = controller.full_speed
+        """Make the plan manager, which predicts obstacles for a robot that drives at the controller's full speed."""
+        self._full_speed = controller.full_speed  # `make_stack`, which is called later, needs it
         return AdvancedPlanManager(
             self.spec.planner,
             planner,

@@ -11,7 +11,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import walk
 from simscen.loading.yaml.tree import Keys
 from simscen.spec.choice import Choice
-from simscen.spec.registry import Entry, find, origin_of
+from simscen.spec.registry import Entry, entries_of, find
 
 _HEADER_PREFIX = "plugin."
 """Beginning of the keys of plugins in the header of a log."""
@@ -73,9 +73,9 @@ def _used(keys: Keys, part: Any) -> Iterator[Entry]:
     """Yield the plugin that defines a part of a specification, if one does; `keys` are those of the part."""
     if isinstance(part, Choice):
         entry = find(part.group, part.kind) if part.original_class is not None else None
-        if entry is not None and not entry.shipped:
+        if entry is not None and not entry.is_shipped:
             yield entry
         return
-    candidates = origin_of(type(part))
+    candidates = entries_of(type(part))
     named = [entry for entry in candidates if entry.name in (getattr(part, "type", None), *keys[-1:])]
     yield from named or candidates[:1]

@@ -127,7 +127,7 @@ _NameOrParameters = Annotated[
 ]
 
 
-Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrParameters, named=True)]
+Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrParameters, allows_names=True)]
 
 
 class Recovery(Spec):

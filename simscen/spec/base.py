@@ -1,4 +1,4 @@
-"""Base classes of the specifications that users write in YAML, and imports of them at their first use."""
+"""Base classes of the specifications that users write in YAML, and import of specifications at their first use."""
 
 import ast
 import inspect
@@ -27,7 +27,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Spec(BaseModel):
-    """Base of all specifications: strict, frozen, finite, and closed (an unknown key is an error)."""
+    """Base of all specifications: no type conversion, frozen, finite numbers only, and an unknown key is an error."""
 
     model_config = ConfigDict(
         strict=True,
@@ -56,7 +56,7 @@ def _no_boolean(value: Any) -> Any:
 
 
 LanguageVersion = Annotated[Literal[1], BeforeValidator(_no_boolean)]
-"""Version of the language that a file is written for."""
+"""Version of the scenario language that a file is written in."""
 
 T = TypeVar("T")
 
@@ -68,10 +68,10 @@ class Value(RootModel[T], Generic[T]):
 
 
 class Ranged(Spec):
-    """Specification in which no `min_…` may be greater than its `max_…`."""
+    """Specification in which no field `min_…` may be greater than the field `max_…` of the same name."""
 
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
-    """Names of the maximums that are no limit if they are 0 or less."""
+    """Names of the fields `max_…` that mean "no limit" if they are 0 or less."""
 
     @model_validator(mode="after")
     def _check_order(self) -> "Ranged":
@@ -86,15 +86,15 @@ class Ranged(Spec):
 
 
 def by_default() -> Any:
-    """Return the default of a field that holds a mapping: `{}`, validated when it is used.
+    """Return the default of a field that holds a specification: the specification of an empty mapping.
 
-    An instance as default would build its validator at import, which costs every command 10 ms.
+    It is created when it is needed. Creating it at import would cost every command 10 ms.
     """
     return Field(default_factory=dict, validate_default=True)
 
 
 def type_discriminator(default: str) -> Callable[[Any], str | None]:
-    """Return a discriminator that selects a member of a union by its `type`; a missing `type` means `default`."""
+    """Return a pydantic discriminator that selects a member of a union by `type`; a missing `type` means `default`."""
 
     def tag(value: Any) -> str | None:
         if isinstance(value, dict):
@@ -105,7 +105,7 @@ def type_discriminator(default: str) -> Callable[[Any], str | None]:
 
 
 def field_docs(model: type) -> dict[str, str]:
-    """Return the docstrings of the fields of a model and its base classes, by field name."""
+    """Return the docstrings of all fields of a model, also inherited ones, by field name."""
     docs: dict[str, str] = {}
     for base in reversed(model.__mro__):
         if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
@@ -136,22 +136,22 @@ def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
 class Component(Spec):
     """Specification of an object that is built for a run: a part of a stack, a whole stack, or a sensor.
 
-    The class of the object is imported when the run is assembled, so files are validated without the libraries that it
-    needs.
+    The class of the object is imported when the run is assembled. Files are therefore validated without the libraries
+    that the class needs.
     """
 
     component: ClassVar[str]
-    """`package.module:Class`, called as `Class(specification, setting)`."""
+    """Address `package.module:Class` of a class or function that is called with the specification and the setting."""
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Return why this class is not a valid specification of a component, or ""."""
+        """Return why this class is not a valid specification of a component; "" if it is."""
         valid = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
         return "" if valid else "it has no attribute `component` of the form package.module:Class"
 
     @classmethod
     def implementation(cls) -> Any:
-        """Import and return the class that `component` names. Raises ImportError or AttributeError."""
+        """Import and return the class or function that `component` names. Raises ImportError or AttributeError."""
         module, _, name = cls.component.partition(":")
         return getattr(import_module(module), name)
 
@@ -165,13 +165,13 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation that stands for the specification class `name` of `module`."""
+    """Annotation of a field whose specification is the class `name` of `module`, imported when the field is used."""
 
     module: str
     name: str
 
     def load(self) -> type[BaseModel]:
-        """Import the module and return the specification."""
+        """Import the module and return the specification class."""
         model: type[BaseModel] = getattr(import_module(self.module), self.name)
         return model
 
@@ -192,5 +192,5 @@ class LazySpec:
 
 
 def annotation_of(field: FieldInfo) -> Any:
-    """Return the type of a field: its annotation, or the specification of its LazySpec, which is loaded."""
+    """Return the type of a field: its annotation, or the specification of its LazySpec, which is imported."""
     return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)

@@ -1,7 +1,7 @@
 """Base class of mappings in a file that must have exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
 
-simscen ships some of the keys, and installed packages can add others. They are searched only if a file uses a key that
-simscen does not ship, or if all keys are requested.
+simscen ships some of the keys, and installed packages can add others. Packages are searched only if a file uses a key
+that simscen does not ship, or if all keys are requested.
 """
 
 import contextlib
@@ -19,10 +19,10 @@ class Choice(Spec):
     """Mapping with exactly one key out of several, e.g. `spawn: {…}`, plus optional modifiers.
 
     A subclass has one optional field for each choice; the fields in `modifiers` can be combined with any choice. Unlike
-    for a union with a `type` key, editors and validators can report the exact mistake.
+    with a union by `type`, editors and validators can report the exact mistake.
 
     If `group` is a group of the registry, installed packages can add choices. A mapping with an added key becomes an
-    instance of an extended class (`with_installed_choices`) that has a field for each of them.
+    instance of an extended class (`with_installed_choices`) that has a field for each added choice.
     """
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
@@ -32,18 +32,18 @@ class Choice(Spec):
 
     @classmethod
     def choices(cls) -> dict[str, str]:
-        """Return the field names of the choices by their keys in YAML."""
+        """Return the name of the field of each choice, by the key in YAML."""
         return {f.alias or name: name for name, f in cls.model_fields.items() if name not in cls.modifiers}
 
     @classmethod
     @cache
     def known_keys(cls) -> frozenset[str]:
-        """Return all valid keys, including modifiers."""
+        """Return all valid keys in YAML, including modifiers."""
         return frozenset(field.alias or name for name, field in cls.model_fields.items())
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the address "module:Class" of the specification of each key; keys without one are left out."""
+        """Return the addresses "module:Class" of the specifications by key; choices without one are left out."""
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
 
@@ -68,7 +68,7 @@ class Choice(Spec):
     @classmethod
     @cache
     def _python_names(cls) -> frozenset[str]:
-        """Return the names of fields whose key differs, e.g. `for_`."""
+        """Return the names of fields that differ from their keys in YAML, e.g. `for_`."""
         return frozenset(name for name, field in cls.model_fields.items() if field.alias not in (None, name))
 
     @model_validator(mode="after")
@@ -85,19 +85,19 @@ class Choice(Spec):
 
     @property
     def kind(self) -> str:
-        """Key of the choice."""
+        """The key that is given."""
         return self._given()[0]
 
     @property
     def chosen(self) -> BaseModel:
-        """Specification of the choice."""
+        """The specification under the key that is given."""
         spec = getattr(self, self.choices()[self.kind])
         assert isinstance(spec, BaseModel)
         return spec
 
     @property
     def added_by(self) -> str:
-        """Text to append to a message, which names the package that added the key; "" if simscen ships the key.
+        """Text for messages that names the package that added the key; "" if simscen ships the key.
 
         Example: " (criterion `dwell` of yardwork 1.2)"
         """
@@ -106,7 +106,7 @@ class Choice(Spec):
         from simscen.spec.registry import find
 
         found = find(self.group, self.kind)
-        return f" ({self.group} `{self.kind}` of {found.origin})" if found is not None and not found.shipped else ""
+        return f" ({self.group} `{self.kind}` of {found.origin})" if found is not None and not found.is_shipped else ""
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         if self.original_class is None:
@@ -157,7 +157,7 @@ def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
 
 
 def empty_instance(original_class: type[Choice]) -> Choice:
-    """Return an instance without fields of the extended class, for unpickling.
+    """Return an instance of the extended class without fields, for unpickling.
 
     Pickle cannot import an extended class by its name, because each process creates the class at run time.
     """
@@ -166,7 +166,7 @@ def empty_instance(original_class: type[Choice]) -> Choice:
 
 
 def _address(field: FieldInfo) -> str:
-    """Return the address of the specification of a field; "" for a list or for the choice itself."""
+    """Return the address of the specification of a field; "" for a list and for another choice."""
     lazy = next((item for item in field.metadata if isinstance(item, LazySpec)), None)
     if lazy is not None:
         return f"{lazy.module}:{lazy.name}"

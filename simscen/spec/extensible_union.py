@@ -1,4 +1,4 @@
-"""Unions discriminated by `type` whose members are shipped with simscen or added by installed packages."""
+"""Unions of specifications, selected by `type`, to which installed packages can add members."""
 
 import math
 from collections.abc import Iterator
@@ -13,37 +13,37 @@ from simscen.spec.base import LazySpec, Typed
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen names", "simscen mappings"
-"""Keys of schema metadata: the group that packages can extend, and whether names and mappings are valid values."""
+"""Keys of schema metadata: the group that packages can extend; whether names are valid values; whether mappings are."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Annotation of a field with a specification of a group; `shipped_union` contains the shipped types.
+    """Annotation of a field that is a specification of a group of the registry; `shipped_union` has the shipped types.
 
-    A mapping with another `type` is validated by the specification that an installed package adds under that name. With
-    `named`, the name alone is also valid.
+    A mapping with another `type` is validated by the specification that an installed package adds under that name. If
+    `allows_names`, the name of a type alone is also valid.
     """
 
     group: str
     shipped_union: Any
-    named: bool = False
+    allows_names: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         inner = handler.generate_schema(self.shipped_union)
-        metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.named, MAPPINGS_ALLOWED_KEY: True}
+        metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.allows_names, MAPPINGS_ALLOWED_KEY: True}
         return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
 
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
-        if self.named and isinstance(value, str) and value not in _names(self.group):
-            return specification(_find_or_raise(self.group, value), {})
+        if self.allows_names and isinstance(value, str) and value not in _names(self.group):
+            return validate_plugin_spec(_find_or_raise(self.group, value), {"type": value})
         name = value.get("type") if isinstance(value, dict) else None
         if not isinstance(name, str) or name in _names(self.group):
             return validate_shipped(value)
         entry = find(self.group, name)
         if entry is not None:
-            return specification(entry, value)
+            return validate_plugin_spec(entry, value)
         details = InitErrorDetails(type=_unknown(self.group, name), loc=("type",), input=name)
         raise ValidationError.from_exception_data("type", [details])
 
@@ -68,13 +68,8 @@ BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
 """Name of a recovery behavior, as in the events of the log."""
 
 
-def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
-    """Return the specification of an installed package with these values; `type` can be omitted."""
-    return validate_plugin_spec(entry, {**value, "type": entry.name})
-
-
 def installed_specs(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield names and specifications that installed packages add to a group, without broken ones."""
+    """Yield the name and class of each usable specification that installed packages add to a group."""
     for entry in installed(group):
         if entry.problem or entry.name in _names(group):
             continue
@@ -100,17 +95,17 @@ def _unknown(group: str, name: str) -> PydanticCustomError:
 
 
 _CHECKED_PROPERTIES = ("horizon", "clearance_range")
-"""Properties of criteria that are used before a run, in s and m."""
+"""Properties that criteria may have: a time in s and a distance in m that are used before a run."""
 
 
 @dataclass(frozen=True)
 class PluginSpec(LazySpec):
-    """Annotation that stands for a specification that an installed package adds."""
+    """Annotation of a field whose specification an installed package adds."""
 
     entry: Entry
 
     def load(self) -> type[BaseModel]:
-        """Import the package and return the specification. Raises BrokenPlugin."""
+        """Import the package and return the specification class. Raises BrokenPlugin."""
         return self.entry.load()
 
     def _validate(self, value: Any) -> BaseModel:
@@ -118,7 +113,7 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """Return the specification of an entry with these values; any error of its package becomes a validation error."""
+    """Validate a value with the specification of an entry. Any error of the package becomes a validation error."""
     try:
         return _checked(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
@@ -135,7 +130,7 @@ def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
 
 
 def _checked(entry: Entry, spec: BaseModel) -> BaseModel:
-    """Return the specification. Raises BrokenPlugin if a property that is used before a run is not a valid number."""
+    """Return `spec`. Raises BrokenPlugin if a property that is used before a run is not a valid number."""
     for name in _CHECKED_PROPERTIES:
         number = getattr(spec, name) if hasattr(type(spec), name) else 0.0
         if isinstance(number, bool) or not isinstance(number, int | float) or not (0 <= number < math.inf):

@@ -15,13 +15,14 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Time of turning before and after a corner, or a quarter of the time along a shorter leg."""
+"""Time of turning before a corner, and after it. On a short leg, at most a quarter of the leg's duration."""
 SMOOTH_DURATION_FACTOR = 1.5
-"""Duration of an eased leg from rest to rest, relative to a leg at constant speed with the same top speed."""
+"""Duration of a leg with `ease: smooth`, relative to a leg at constant speed with the same top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6
 """Largest difference in m and rad between the first and the last keyframe of a loop."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
+"""Time, x, y, and yaw. Not strict, because YAML has lists instead of tuples."""
 
 
 def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
@@ -32,7 +33,7 @@ def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tup
 
 
 class Motion(Spec):
-    """A scripted motion."""
+    """A scripted motion along waypoints at a speed, or through timed keyframes."""
 
     through: Annotated[list[PlaceOrPoint], Field(min_length=1, max_length=1000)] | None = None
     """Waypoints after the current position: [x, y] in the world frame, or names of places. The object moves along
@@ -139,7 +140,7 @@ class _Leg(NamedTuple):
 
 
 def _at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times and poses at constant speed; half of each turn is made before the corner and half after it."""
+    """Return times in s and poses at constant speed. Half of each turn is made before the corner, half after it."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         duration = leg.length / speed
@@ -163,7 +164,7 @@ def _at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tupl
 
 
 def _with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times and poses with a stop at the end of each leg and a turn in place at each corner."""
+    """Return times in s and poses with a stop at the end of each leg and a turn in place at each corner."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         time += SMOOTH_DURATION_FACTOR * leg.length / speed
@@ -176,7 +177,7 @@ def _with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float
 
 
 class Shaped(Spec):
-    """Object with one simple shape that stands on the ground or at the height `z`."""
+    """Object with one simple shape, whose underside is at the height `z`."""
 
     box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
     """Box: length along x, width along y, height."""
@@ -201,7 +202,7 @@ class Shaped(Spec):
         return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 
     def solid(self, name: str) -> Solid:
-        """Return the shape in the frame of the object, whose origin is on the ground below it."""
+        """Return the shape with a name, in the frame of the object, whose origin is on the ground below the object."""
         shape: Shape
         if self.box is not None:
             shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2

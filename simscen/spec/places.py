@@ -1,7 +1,7 @@
 """Names, points, poses, and references to named things in specifications.
 
 A field of type `PlaceOrPose` or `PlaceOrPoint` also accepts the name of a place. The loader replaces the name by the
-pose of the place (`loading/known_names.py`), so code that uses a specification only sees poses and points.
+pose of the place (`loading/named_places.py`), so code that uses a specification only sees poses and points.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def _reject_path(name: str) -> str:
-    """Return the name; raise an error for `../x` and `/x`, but not for `1 m/s`, because files are named after it."""
+    """Return the name. Raise an error for `../x` and `/x`, because files are named after it, but not for `1 m/s`."""
     if name[0] in "/\\" or not {".", ".."}.isdisjoint(name.replace("\\", "/").split("/")):
         raise PydanticCustomError("path_name", "must not be a path")
     return name
@@ -66,7 +66,7 @@ class PoseSpec(Spec):
 
     @property
     def place(self) -> str:
-        """Name of the place that this pose was written as; "" if the file contains the pose itself."""
+        """Name of the place if the file contains a name instead of the pose, otherwise ""."""
         return self._place
 
     def with_place(self, place: str) -> PoseSpec:
@@ -77,7 +77,7 @@ class PoseSpec(Spec):
 
     @property
     def pose(self) -> Pose2:
-        """The pose as plain data."""
+        """The pose as a tuple (x, y, yaw)."""
         return Pose2(self.x, self.y, self.yaw)
 
 
@@ -89,8 +89,7 @@ class ReferenceTo:
     """Annotation of a string that must be the name of an existing `target`; the loader checks that it exists.
 
     `object`: anything that can be touched. `movable`: an object with its own pose. `mover`: a movable or another robot.
-    `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of a filter mask;
-    masks of criteria are in the `masks` of their Case.
+    `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of a filter mask.
     """
 
     target: Target
@@ -118,7 +117,7 @@ def _name_or_value(value: Any) -> str:
 class PlaceAllowed(ReferenceTo):
     """Annotation of a pose in the world frame that can also be given as the name of a place.
 
-    `keywords` are texts with another meaning in this field.
+    `keywords` are texts that do not name a place but have another meaning in this field.
     """
 
     target: Target = "place"
@@ -130,7 +129,7 @@ class PlaceAllowed(ReferenceTo):
         return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _name_or_value)
 
     def value_at(self, pose: PoseSpec) -> Any:
-        """Return the value of the field that replaces the name of a place with this pose."""
+        """Return the value that replaces the name of a place with this pose."""
         return pose
 
 
@@ -144,7 +143,7 @@ class PlaceAllowedForPoint(PlaceAllowed):
 
 @dataclass(frozen=True)
 class PlaceShorthand:
-    """Annotation of a mapping that can also be given as the name of a place, the value of its key `key`."""
+    """Annotation of a mapping for which the name of a place can be given instead, meaning `{key: name}`."""
 
     key: str
 
@@ -181,7 +180,7 @@ class SpeedMask(Spec):
     """Increase of the limit per unit of value (multiplier of CostmapFilterInfo): percent or m/s."""
 
     def over(self, grid: OccupancyGrid) -> SpeedLimits:
-        """Return the speed limits for the cells of the mask."""
+        """Return the speed limits, given the mask as a grid."""
         from simscen.core.environment.costmap_filters import SpeedLimits
 
         return SpeedLimits(grid, self.type == "percent", self.base, self.multiplier)

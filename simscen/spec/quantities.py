@@ -1,4 +1,4 @@
-"""Numbers with units. A plain number is in SI units; a string has a unit, whose dimension is checked."""
+"""Types of physical quantities in YAML: a number in SI units, or text with a unit whose dimension is checked."""
 
 import math
 import re
@@ -33,6 +33,7 @@ UNITS: dict[str, dict[str, float]] = {
     "impulse": {"N s": 1.0, "Ns": 1.0},
     "ratio": {"%": 0.01},
 }
+"""Units of each dimension, with their factors to SI units."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class Quantity:
 class AnyQuantity:
     """Annotation of a float in SI units whose dimension depends on another field of the same specification.
 
-    It only adds units to the JSON schema. The specification that contains the field must convert text to a number.
+    It only adds units to the JSON schema. The specification with the field must convert text itself (`si_number`).
     """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -144,7 +145,7 @@ Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
 
 
 class Amount(NamedTuple):
-    """A number and its unit; "" for a bare number."""
+    """A number and its unit, which is "" if none is given."""
 
     number: float
     unit: str = ""
@@ -152,7 +153,7 @@ class Amount(NamedTuple):
 
 @dataclass(frozen=True)
 class _ParsedAmount:
-    """Annotation of a value that is read as an Amount, of any dimension, and keeps its unit."""
+    """Annotation of an Amount of any dimension, given as a number or as text."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(_parse_amount)
@@ -165,7 +166,7 @@ AnyAmount = Annotated[Amount, _ParsedAmount()]
 
 
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
-    """Return the numbers in a common unit, and that unit: their own if it is the same for all, otherwise SI ("").
+    """Return the numbers in a common unit, and the unit: that of all amounts if it is the same, otherwise "" for SI.
 
     Raises ValueError if their dimensions differ.
     """

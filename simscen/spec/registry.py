@@ -36,10 +36,10 @@ _ADDRESS = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
 
 @dataclass(frozen=True)
 class Group:
-    """Kind of types that packages can add.
+    """Kind of types that packages can add, such as criteria.
 
-    `base` is the address of the base class of all specifications of the group. `shipped` is the address of the list of
-    shipped types: a Choice, or a mapping of names to "module:Class". `reserved` names have another meaning in files.
+    `base` is the address of the base class of all specifications of the group. `shipped` is the address of the shipped
+    types: a Choice, or a mapping of names to "module:Class". `reserved` names have another meaning in files.
     """
 
     base: str
@@ -69,15 +69,15 @@ GROUPS: dict[str, Group] = {
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
     "metric": Group("simscen.criteria.base:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
-"""Groups `simscen.<kind>` of entry points by kind."""
+"""All groups by kind. The name of a group of entry points is `simscen.<kind>`."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Type of a group: its name and the address of its specification, `value` = "package.module:Class".
+    """Type that files can use: its group, name, and the address of its specification, `value` = "module:Class".
 
-    `distribution` and `version` belong to the package that adds it; they are "" for a shipped type. `problem` is
-    the reason why it cannot be used, as far as known without importing it.
+    `distribution` and `version` are those of the package that adds the type; "" for a shipped type. `problem` is the
+    reason why the type cannot be used, as far as it is known without an import; "" if there is none.
     """
 
     group: str
@@ -87,10 +87,10 @@ class Entry:
     version: str = ""
     problem: str = ""
     folder: str = ""
-    """Folder of the search path in which its package is installed."""
+    """Folder of the search path in which the package is installed."""
 
     @property
-    def shipped(self) -> bool:
+    def is_shipped(self) -> bool:
         """Whether simscen ships this type."""
         return not self.distribution
 
@@ -100,14 +100,14 @@ class Entry:
         return f"{self.distribution} {self.version}".strip() or "simscen"
 
     def load(self) -> type[BaseModel]:
-        """Import the module and return the specification. Raises BrokenPlugin."""
+        """Import the module and return the specification class. Raises BrokenPlugin."""
         if self.problem:
             raise BrokenPlugin(self, self.problem)
         return _load(self)
 
 
 class BrokenPlugin(Exception):
-    """A type of an installed package cannot be used; `why` is the reason and `hint` how to find out more."""
+    """A type of an installed package cannot be used. `why` is the reason; `hint` says how to find out more."""
 
     def __init__(self, entry: Entry, why: str, hint: str = "") -> None:
         self.entry, self.why = entry, why
@@ -116,7 +116,7 @@ class BrokenPlugin(Exception):
 
 
 def shipped(group: str) -> tuple[Entry, ...]:
-    """Return the shipped types of a group in the order of its list."""
+    """Return the shipped types of a group, in the order of `Group.shipped`."""
     address = GROUPS[group].shipped
     if not address:
         return ()
@@ -131,14 +131,14 @@ def installed(group: str) -> tuple[Entry, ...]:
 
 
 def entries(group: str) -> tuple[Entry, ...]:
-    """Return all types of a group: the shipped ones, then the installed ones with other names."""
+    """Return all types of a group: the shipped types, then the installed types with other names."""
     own = shipped(group)
     names = {entry.name for entry in own}
     return (*own, *(entry for entry in installed(group) if entry.name not in names))
 
 
 def find(group: str, name: str) -> Entry | None:
-    """Return the type with this name, or None. Packages are searched only if no shipped type has the name."""
+    """Return the type with this name, or None. Packages are only searched if no shipped type has the name."""
     own = next((entry for entry in shipped(group) if entry.name == name), None)
     return own or next((entry for entry in installed(group) if entry.name == name), None)
 
@@ -148,8 +148,8 @@ def unknown_groups() -> tuple[Entry, ...]:
     return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
 
 
-def origin_of(spec: type) -> tuple[Entry, ...]:
-    """Return the entries of installed packages with this specification; () for a shipped one."""
+def entries_of(spec: type) -> tuple[Entry, ...]:
+    """Return the entries of installed packages whose specification is this class; () if simscen ships the class."""
     package = spec.__module__.partition(".")[0]
     if package == "simscen":
         return ()
@@ -176,7 +176,7 @@ def _installed_entries() -> tuple[Entry, ...]:
 
 
 def _read_entries() -> Iterator[Entry]:
-    """Yield the entry points of all importable packages; of packages with the same name, only those of the first."""
+    """Yield the entry points of all importable packages; for several with the same name, only those of the first."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
@@ -209,10 +209,10 @@ def _mentions_simscen(package: Distribution) -> bool:
 
 
 def search_path() -> list[str]:
-    """Return the search path of modules without the folders that Python adds by itself.
+    """Return the search path of modules without the two folders that Python adds by itself.
 
-    These are the working directory and the folder of the program. A dist-info folder next to scenarios must not be able
-    to run code.
+    These are the working directory and the folder of the program. Without them, a dist-info folder next to scenarios
+    cannot run code.
     """
     program = getattr(sys.modules.get("__main__"), "__file__", None)
     implicit = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
@@ -222,7 +222,7 @@ def search_path() -> list[str]:
 
 
 def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
-    """Return why an entry cannot be used, as far as known without importing it, or ""."""
+    """Return why an entry cannot be used, as far as it is known without an import; "" if there is no reason."""
     group = GROUPS.get(entry.group)
     if group is None:
         return f"there is no group `{PREFIX}{entry.group}`"

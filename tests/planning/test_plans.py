@@ -8,7 +8,7 @@ import pytest
 from generated_worlds import ROBOT, cheapest_cost, costmap_of, forest, large_maze, maze, random_query, rooms
 
 from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
-from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refined
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refine
 from simscen.advanced.spec import MedialAxisPlanner as MedialAxisSpec
 from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
@@ -115,7 +115,7 @@ def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
         (first,) = next(search_regions.searches(rates, find_endpoints(rates, start, goal, 0.5), seed))
         points = first.search(seed, 20_000).solve(simplify=False)
         assert points is not None
-        assert rates.along(refined(rates, np.array(points))) < 1.05 * optimum
+        assert rates.along(refine(rates, np.array(points))) < 1.05 * optimum
 
 
 def corridor_with_a_corner() -> Flatland:

@@ -1,4 +1,4 @@
-"""Factories of the advanced localizers, named by the `component` of their specifications."""
+"""Functions that build the advanced localizers. The attribute `component` of a specification names one of them."""
 
 from dataclasses import dataclass, replace
 
@@ -43,7 +43,7 @@ def slip_ekf(spec: model.SlipEkf, setting: Setting) -> Localizer:
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Everything that scan-matching AMCL computes from a map. Independent of the run, so all runs share it."""
+    """Everything that scan-matching AMCL computes from a map before a run. All runs on the map share it."""
 
     sensor: SensorModel
     free_space: FreeSpace
@@ -75,5 +75,5 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
 
 
 def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
-    """Compute the models of a map and the tables of its search before runs are forked."""
+    """Compute the models of a map and the tables of its search, before worker processes are forked that share them."""
     map_models(grid, spec).search.precompute()

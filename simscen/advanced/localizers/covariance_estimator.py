@@ -7,33 +7,33 @@ import numpy as np
 
 from simscen.advanced.localizers.map_trust import ScanResiduals
 from simscen.advanced.localizers.scan_matcher import COVARIANCE_FLOOR
-from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
+from simscen.advanced.localizers.scan_memory import step_length
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotation_matrix
 
 WINDOW_SIZE = 36
 """Number of recent corrections that are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
-"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, measured by `_distance`.
+"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, by `step_length`.
 
 The errors of poses 4 m apart have the correlations 0.4, 0.4 and 0.1, both with correct maps and with moved furniture.
 """
 DRIFT_VARIANCE = np.square((0.002, 0.002, 0.0016))
-"""Variance (m², m², rad²) of the drift of scan matching per meter, if scans show enough."""
+"""Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
-"""Factor by which each correction reduces the weight of everything learned before."""
+"""Factor on the weight of everything learned before, at each correction."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
-"""Prior of the ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, for beams
-whose residuals are as large as `sigma_hit`, and its weight in corrections."""
+"""Initial ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, if residuals
+are as large as `sigma_hit`. The weight is the number of corrections that count as much as this ratio."""
 EXPECTED_WEIGHT = 0.05
-"""Weight of the ratio that residuals and prior give, in independent corrections. It decides if the robot hardly moves,
-because the poses of one place share their errors."""
+"""Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections. The expected ratio
+dominates while the robot hardly moves, because poses close to each other share their errors."""
 DEGREES_OF_FREEDOM = 6.0
 """Degrees of freedom of a covariance that is estimated from few, correlated corrections."""
 ODOMETRY_STD = 0.05, 0.05
 """Prior standard deviations of odometry in m and rad per meter."""
 ODOMETRY_STD_WEIGHT = 0.2
-"""Weight of this prior, as sum of squared steps in m²: about three steps."""
+"""Weight of ODOMETRY_STD, as a sum of squared step lengths in m²: that of about three steps."""
 MIN_COVARIANCE = np.diag(np.square((1e-3, 1e-3, 1e-3)))
 """Added to each covariance (m², m², rad²), so that none is singular."""
 
@@ -53,7 +53,7 @@ class CovarianceEstimator:
       scatter.
 
     The ratio is the mean of both, divided by the share of the beams that the map explains, because some of these fit by
-    chance. As the covariance is estimated, errors have a Student's t-distribution, whose variance is greater by
+    chance. Because the covariance is estimated, errors have a Student's t-distribution, whose variance is greater by
     DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2). Between corrections, the covariance grows by the errors of
     odometry that scan matching has observed.
     """
@@ -74,31 +74,31 @@ class CovarianceEstimator:
         self._residuals: deque[ScanResiduals] = deque(maxlen=WINDOW_SIZE)
         self._base: Pose2 | None = None
 
-    def compare(self, matched: Pose2, odometry: Pose2) -> None:
-        """Learn the error of odometry from a step of scan matching, without the latter's own variance."""
+    def learn_odometry_error(self, matched: Pose2, odometry: Pose2) -> None:
+        """Learn the error of odometry from one step, measured by scan matching and by odometry."""
         x, y, yaw = odometry.between(matched)
         self._odometry_square = max(
             0.0,
             FORGETTING_FACTOR * self._odometry_square + (x * x + y * y - COVARIANCE_FLOOR[0] - COVARIANCE_FLOOR[1]) / 2,
         )
         self._yaw_square = max(0.0, FORGETTING_FACTOR * self._yaw_square + yaw * yaw - COVARIANCE_FLOOR[2])
-        self._step_square = FORGETTING_FACTOR * self._step_square + _distance(odometry) ** 2
+        self._step_square = FORGETTING_FACTOR * self._step_square + step_length(odometry) ** 2
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
         """Return the covariance (3, 3) of a pose with heading `yaw` after `delta`, measured by odometry."""
-        c, s, share = math.cos(yaw), math.sin(yaw), _distance(delta) ** 2 / self._step_square
+        c, s, share = math.cos(yaw), math.sin(yaw), step_length(delta) ** 2 / self._step_square
         translation_variance = self._odometry_square * share
         noise = translation_variance, 0.0, 0.0, translation_variance, 0.0, self._yaw_square * share
         return propagate_covariance(covariance, c * delta.x - s * delta.y, s * delta.x + c * delta.y, noise)
 
-    def drive(self, base: Pose2, step_covariance: Array | None) -> None:
+    def propagate_poses(self, base: Pose2, step_covariance: Array | None) -> None:
         """Propagate all poses to `base`, the robot's pose in the scan matcher's frame.
 
         `step_covariance` (3, 3) is that of the step, in the base frame before it; None if odometry measured the step.
         """
         last, self._base = self._base or base, base
         step = last.between(base)
-        distance = _distance(step)
+        distance = step_length(step)
         if step_covariance is None:
             share = distance**2 / self._step_square
             step_covariance = np.diag(
@@ -114,7 +114,7 @@ class CovarianceEstimator:
         self._distances = self._distances + distance
 
     def estimate(self, pose: Pose2, covariance: Array, residuals: ScanResiduals | None) -> Array:
-        """Return the covariance (3, 3) of `pose` after a correction at the base of the last `drive`.
+        """Return the covariance (3, 3) of `pose` after a correction at the base of the last `propagate_poses`.
 
         `covariance` is that of the particles; `residuals` are those of the scan, None if the map explains nothing.
         """
@@ -137,7 +137,7 @@ class CovarianceEstimator:
 
     def _add(self, pose: Pose2, weight: float) -> None:
         """Add a pose; `weight` in 1/m² is the inverse variance of its particles."""
-        assert self._base is not None  # `drive` precedes every correction
+        assert self._base is not None  # `propagate_poses` precedes every correction
         recent = slice(1 - WINDOW_SIZE, None)
         self._poses = np.vstack((self._poses[recent], pose))
         self._bases = np.vstack((self._bases[recent], self._base))
@@ -146,7 +146,7 @@ class CovarianceEstimator:
         self._weights = np.append(self._weights[recent], weight)
 
     def _mean_residuals(self) -> tuple[float, float]:
-        """Return the share of explained beams in the last scans, and their root mean square residual in `sigma_hit`."""
+        """Return the share of explained beams in the last scans, and the RMS of their residuals in `sigma_hit`."""
         if not self._residuals:
             return 1.0, 1.0
         explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))
@@ -155,8 +155,8 @@ class CovarianceEstimator:
     def _scatter_ratio(self, own: Array, expected: Array) -> Array:
         """Return the ratio (3,) of the poses' scatter to their own standard deviations (longitudinal, lateral, yaw).
 
-        `own` (3,) are the variances of the particles. A pose's difference from the newest pose has the less weight,
-        the more of it is drift. `expected` (3,) are the squared ratios to assume without poses.
+        `own` (3,) are the variances of the particles. The difference of a pose from the newest pose has less weight if
+        more of it is drift. `expected` (3,) are the squared ratios to assume without poses.
         """
         x, y, yaw = self._poses[-1]
         rotations = self._poses[:, 2] - self._bases[:, 2]
@@ -174,8 +174,3 @@ class CovarianceEstimator:
         squares = (weights * np.square(errors)).sum(axis=0) / own + EXPECTED_WEIGHT * expected
         ratio: Array = np.sqrt(squares / ((weights * independent).sum(axis=0) + EXPECTED_WEIGHT))
         return ratio
-
-
-def _distance(step: Pose2) -> float:
-    """Return the length of a step in m; a rotation by 1 rad counts as METERS_PER_RAD."""
-    return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)

@@ -1,8 +1,8 @@
 """Search of a robot's pose on the whole map by correlative scan matching over the likelihood field.
 
-Source: Olson, Real-time correlative scan matching (ICRA 2009), section III. Each pose of a coarse grid is scored by the
-share of endpoints that lie near obstacles of the map and by the share of the beams' paths that is free. The best poses
-are refined. The search is deterministic, and its time depends only on the size of the map.
+Source: Olson, Real-time correlative scan matching (ICRA 2009), section III. The score of each pose of a coarse grid
+consists of the share of endpoints near obstacles of the map and the share of points along the beams in free space. The
+best poses are refined. The search is deterministic, and its time depends only on the size of the map.
 """
 
 import cmath
@@ -22,36 +22,36 @@ ENDPOINT_STD_M = 0.2
 """Standard deviation of the distance of an endpoint from its obstacle."""
 MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
 """Distance from obstacles beyond which an endpoint has the score 0."""
-COARSE_CELL_M = 0.2
-HEADING_COUNT = 180
-"""Number of headings of the coarse grid."""
-COARSE_POINTS, POINTS = 80, 240
-"""Maximum number of points that are matched on the coarse grid, and later."""
+COARSE_CELL_M, HEADING_COUNT = 0.2, 180
+"""Cell size and number of headings of the coarse grid."""
+COARSE_POINTS, FINAL_POINTS = 80, 240
+"""Maximum number of endpoints, and of points along beams, that are used for the search and for the final scores."""
 MAX_RANGE_M = 15.0
-"""Endpoints farther away are ignored, because the resolution of the coarse headings moves them too far."""
+"""Points farther away are ignored, because they move too far from one heading of the coarse grid to the next."""
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
-"""Number of poses that the coarse search and the refinement pass on, and of the results."""
+"""Maximum number of poses from the coarse grid, of those that are refined, and of those that are returned."""
 NEARBY_STEPS, REFINED_NEARBY_POSES = ((6, 0.2), (9, 0.035)), 12
-"""Number and size of the steps to each side of a search nearby (m, rad), and number of poses that are refined."""
+"""Steps of `search_near` to each side, as (number, size) in m and in rad; and number of poses that it refines."""
 MIN_SEPARATION = (0.5, 0.2)
-"""Poses that are closer to each other than both of these distances (m, rad) count as the same."""
+"""Poses that differ by no more than both of these values (m, rad) count as the same."""
 PASSED_SHARES = (0.3, 0.55, 0.8)
-"""Positions along a beam, as shares of its length, that must be free."""
+"""Points along a beam, as shares of its length, that should be free."""
 FREE_WEIGHT = 0.5
-"""Weight of the free paths. The weight of the endpoints is 1."""
+"""Weight of the points along beams in a score. The weight of the endpoints is 1."""
 
 Levels = npt.NDArray[np.uint8]
+"""Scores as integers, 0 … 255."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Endpoints of beams, `ends` (n,), and points on their paths, `passed` (m,), in the frame of a pose."""
+    """What the lidar sees: endpoints of beams, `ends` (n,), and points along them, `passed` (m,), in the base frame."""
 
     ends: Plane
     passed: Plane
 
     def thinned(self, count: int) -> "View":
-        """Return at most `count` of each, evenly spaced."""
+        """Return at most `count` of `ends` and of `passed`, evenly spaced."""
         return View(_thin(self.ends, count), _thin(self.passed, count))
 
 
@@ -66,10 +66,10 @@ def _thin(points: Plane, count: int) -> Plane:
 
 
 class GlobalSearch:
-    """Finds the poses on a map that explain a view best."""
+    """Finds the poses on a map at which a view fits best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Search this map. `field` is the obstacle field of the same map, if it is already known."""
+        """Search this map. `field` are the distances from its obstacles, if they have already been computed."""
         self._grid, self._given_field = grid, field
 
     def precompute(self) -> None:
@@ -82,7 +82,7 @@ class GlobalSearch:
         if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
         poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
-        fine = near_view.thinned(POINTS)
+        fine = near_view.thinned(FINAL_POINTS)
         coarse = near_view.thinned(COARSE_POINTS)
         poses, _ = distinct(poses, self.score(poses, coarse), REFINED_POSES)
         for meters, turn in ((0.1, 1.0), (0.05, 0.5)):
@@ -90,9 +90,9 @@ class GlobalSearch:
         return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
-        """Return poses and scores like `search`, but within NEARBY_STEPS of `pose` (3,)."""
+        """Return poses and scores like `search`, but only near `pose` (3,), see NEARBY_STEPS."""
         near_view = _without_far_points(view)
-        coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(POINTS)
+        coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(FINAL_POINTS)
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
         poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
         poses, _ = distinct(poses, self.score(poses, coarse), REFINED_NEARBY_POSES)
@@ -108,11 +108,8 @@ class GlobalSearch:
         scores: Array = np.asarray(total) / sum(weight for _, _, weight in nonempty)
         return scores
 
-    def matching_share(self, poses: Array, view: View) -> Array:
-        """Return the share (n,) of the endpoints that are near obstacles at each of the `poses` (n, 3)."""
-        return self._mean(self._nearness_table, poses, view.ends)
-
     def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
+        """Return the mean (n,) of the table's values at the points, 0 … 1, for each of the `poses` (n, 3)."""
         blocks = [
             table.take(self._field.endpoint_cells(poses[begin : begin + 512], points)).mean(axis=1)
             for begin in range(0, len(poses), 512)
@@ -200,7 +197,7 @@ def _pooled(levels: Levels, factor: int) -> Levels:
 
 
 def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
-    """Return the best of `poses` (n, 3) with MIN_SEPARATION, best first, at most `max_count`, and their scores."""
+    """Return the best of `poses` (n, 3) that are not the same (MIN_SEPARATION), best first, and their scores."""
     order = np.argsort(-scores, kind="stable")
     remaining = poses[order]
     chosen_indices: list[int] = []

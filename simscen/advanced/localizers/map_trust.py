@@ -12,10 +12,11 @@ from simscen.stack.localizers.particles import Particles
 
 
 class ScanResiduals(NamedTuple):
-    """Residuals of one scan.
+    """Residuals of one scan, of the beams that end on the mapped area.
 
     explained:    share of the beams that the map explains
-    mean_square:  of the distances of these beams' endpoints from obstacles, over `sigma_hit`²; others count as 0
+    mean_square:  mean squared distance of the endpoints from obstacles, in units of `sigma_hit`²; a beam that the map
+                  does not explain counts as 0
     """
 
     explained: float
@@ -33,7 +34,7 @@ class MapResiduals:
     def __init__(
         self, field: DistanceField, beyond: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
     ) -> None:
-        """Create residuals of a map. `beyond` (flat, as the field's table) marks cells outside the mapped area."""
+        """Take a map and AMCL's parameters. `beyond` marks cells of `field.table` that are outside the mapped area."""
         self._field, self._beyond = field, beyond
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
@@ -49,7 +50,7 @@ class MapResiduals:
 
 
 FIT_DISTANCE_M = 0.3
-"""A beam fits if it ends this near to an obstacle of the map."""
+"""A beam fits the map if it ends closer than this to an obstacle."""
 CLUSTER_RADIUS_M = 1.0
 """Particles that are all within this distance of their mean are one narrow cluster."""
 SAMPLED_PARTICLES = 50
@@ -66,30 +67,31 @@ _UNMAPPED, _FITS, _MISSES = 0, 1, 2
 class ScanWeight(NamedTuple):
     """Weight of a scan.
 
-    `exponent` of its likelihood in 0 … 1; share of beams that are `fitting`, of those that end on the mapped area; and
-    which of the beams are used, `counting` (b,), None for all.
+    exponent:       exponent of its likelihood, 0 … 1
+    fitting_share:  share of the beams that fit the map, of those that end on the mapped area
+    used_hits:      mask (m,) of the beams with a hit that are used; None for all
     """
 
     exponent: float
-    fitting: float
-    counting: npt.NDArray[np.bool_] | None
+    fitting_share: float
+    used_hits: npt.NDArray[np.bool_] | None
 
 
 class MapTrust:
-    """Determines the weight of scans: small where the map does not agree with them.
+    """Determines the weight of each scan, which is small if the map does not agree with it.
 
     If the particles are one narrow cluster, the pose is right, or the relocalization will find that it is wrong. Beams
-    that do not fit then show that the map is outdated, and beams that do fit may do so by chance and move the cluster.
-    If the particles have spread outside the map, the first beams that touch the map would attract them to a wrong pose,
-    so beams that end outside the mapped area are never used.
+    that do not fit then show that the map is outdated. The other beams may fit by chance and move the cluster. Outside
+    the map, particles spread, and the first beams that touch the map would attract them to a wrong pose. A scan of
+    which few beams end on the mapped area is therefore ignored as well.
     """
 
-    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], none: float, full: float) -> None:
-        """Classify the cells of a map. `beyond` (flat, as the field's table) marks cells outside the mapped area.
+    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], zero: float, full: float) -> None:
+        """Classify the cells of a map. `beyond`, in the order of `field.table`, marks cells outside the mapped area.
 
-        A scan is ignored up to the share `none` of beams that fit, and has its full weight from the share `full` on.
+        A scan is ignored if at most the share `zero` of its beams fits. From the share `full` on, it counts fully.
         """
-        self._field, self._none, self._full = field, none, full
+        self._field, self._zero, self._full = field, zero, full
         mapped = np.where(field.table < FIT_DISTANCE_M, _FITS, _MISSES)
         self._class_table = np.where(beyond, _UNMAPPED, mapped).astype(np.uint8)
 
@@ -104,10 +106,10 @@ class MapTrust:
         exponent = _ramp(known_share, *MAPPED_SHARE)
         if not particles.within(CLUSTER_RADIUS_M):
             return ScanWeight(exponent, fitting, None)
-        counting = None
+        used = None
         if known_share < 1.0:
-            counting = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
-        return ScanWeight(exponent * _ramp(fitting, self._none, self._full), fitting, counting)
+            used = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
+        return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used)
 
     def fitting_share(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
         """Return the share of the beams that fit at `poses` (n, 3), of those that end on the mapped area.
@@ -125,7 +127,6 @@ class MapTrust:
         return self._field.endpoint_cells(poses[::step], beams.ends)
 
     def _classes(self, cells: Cells) -> npt.NDArray[np.uint8]:
-        """Return the classes of cells."""
         classes: npt.NDArray[np.uint8] = self._class_table.take(cells, mode="wrap")
         return classes
 

@@ -1,4 +1,4 @@
-"""Particle filter that can follow scan matching, distrust an outdated map, and be redistributed; its sensor model."""
+"""Particle filter and sensor model of scan-matching AMCL."""
 
 import math
 
@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.relocalization import sample_around
-from simscen.advanced.localizers.scan_matcher import Step, apply_step
-from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
+from simscen.advanced.localizers.pose_prior import CERTAIN_STD
+from simscen.advanced.localizers.scan_matcher import Step, sample_step
+from simscen.advanced.localizers.scan_memory import step_length
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.costmap.distance_transform import MAX_REACH_CELLS, squared_distances_within
 from simscen.stack.localizers.beams import Beams
@@ -33,13 +33,13 @@ MAX_WALL_THICKNESS_M = 1.0
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
-    """`likelihood_field_prob` whose product is raised to a power below 1, because neighboring beams err together."""
+    """`likelihood_field_prob` with the likelihood raised to a power below 1, because neighboring beams err together."""
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,
         exponent: float = 1.0, unmapped: npt.NDArray[np.bool_] | None = None,
     ) -> None:  # fmt: skip
-        """Create the model. `unmapped` (flat, as the field's table) marks cells where beams carry no information."""
+        """Create the model. `unmapped`, in the order of `field.table`, marks cells where beams carry no information."""
         super().__init__(field, z_hit, z_rand, sigma_hit, skipping)
         self.exponent, self._unmapped = exponent, unmapped
 
@@ -52,7 +52,7 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
 
 
 def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
-    """Return the unknown cells, with a border of one cell, in which a beam may end without the map's knowledge.
+    """Return the cells outside the mapped area: unknown ones that a beam can reach. The mask has a border of one cell.
 
     These are the unknown cells whose nearest known cell is free, and those deeper than MAX_WALL_THICKNESS_M behind a
     wall. No beam reaches other unknown cells, since a wall stops it.
@@ -73,7 +73,7 @@ def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
 
 
 ODOMETRY_SHARE = 0.2
-"""Share of the particles that follow odometry where odometry and scan matching disagree."""
+"""Share of the particles that follow odometry if odometry and scan matching disagree."""
 FIRST_SCAN_WEIGHT = 0.2
 """Weight of the first scan after an initial pose: the exponent of the scan's likelihood.
 
@@ -84,7 +84,7 @@ CERTAIN_FIT = 0.9
 
 
 class ScanMatchingParticleFilter(ParticleFilter):
-    """The reference particle filter with other motion input and with scans that count less where the map is wrong."""
+    """Particle filter that can move by scan matching, and that gives scans less weight where the map is outdated."""
 
     _spec: ScanMatchingAmcl
 
@@ -92,26 +92,26 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self, spec: ScanMatchingAmcl, motion: MotionModel, sensor: SensorModel, free_space: FreeSpace,
         rng: np.random.Generator, trust: MapTrust | None = None,
     ) -> None:  # fmt: skip
-        """Create the filter. `trust` rates how well the map shows the robot's surroundings; None trusts it fully."""
+        """Create the filter. `trust` determines the weight of scans; with None, all have their full weight."""
         self._trust = trust
         super().__init__(spec, motion, sensor, free_space, rng)
 
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
         super().begin(estimate)
-        if self._spec.relocalization == "scan_matching":  # random particles would compete with its search
+        if self._spec.relocalization == "scan_matching":  # random particles would compete with the search
             self._recovery = Recovery(0.0, 0.0)
-        self._map_weight, self._is_one_group = 1.0, False
-        self.fitting = 0.0
-        """Share of the last scan's beams that fit the map at the particles, where the map shows anything."""
+        self._map_weight, self._is_one_cluster = 1.0, False
+        self.fitting_share = 0.0
+        """Share of the last scan's beams that fit the map at the particles, of those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
         self._scan_weight = FIRST_SCAN_WEIGHT if has_prior else 1.0
 
     @property
     def is_certain(self) -> bool:
-        """Whether the map explains nearly the whole last scan, and the particles are one narrow group."""
-        is_mapped = self._map_weight == 1.0 and self.fitting >= CERTAIN_FIT
-        return is_mapped and self._is_one_group and self._recovery.share == 0
+        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow cluster."""
+        is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
+        return is_mapped and self._is_one_cluster and self._recovery.share == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
@@ -122,12 +122,12 @@ class ScanMatchingParticleFilter(ParticleFilter):
         """Move each particle by its own sample of a motion from scan matching.
 
         `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta`
-        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the
-        motion model of odometry, and later scans show which particles fit the map. If the map does not show the
-        surroundings, all particles follow scan matching.
+        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow
+        odometry, and later scans show which particles fit the map. If the map does not show the surroundings, all
+        particles follow scan matching.
         """
         self._settle(delta)
-        poses = apply_step(self.particles.poses, step, self._rng)
+        poses = sample_step(self.particles.poses, step, self._rng)
         if self._map_weight > 0 and not step.agrees(delta):
             by_odometry = self._rng.random(len(poses)) < ODOMETRY_SHARE
             poses[by_odometry] = self._motion.sample(self.particles.poses[by_odometry], delta, self._rng)
@@ -140,25 +140,26 @@ class ScanMatchingParticleFilter(ParticleFilter):
         than the initial pose. Turns count as distance, too.
         """
         if self._scan_weight < 1.0:
-            distance = math.hypot(delta.x, delta.y) + METERS_PER_RAD * abs(delta.yaw)
-            self._scan_weight = min(1.0, self._scan_weight + distance / self._spec.settling_distance)
+            self._scan_weight = min(1.0, self._scan_weight + step_length(delta) / self._spec.settling_distance)
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
-        drawn = sample_around(poses, shares, self._bound.max_samples, self._rng)
+        count = self._bound.max_samples
+        drawn = poses[self._rng.choice(len(poses), count, p=shares)] + self._rng.normal(0.0, CERTAIN_STD, (count, 3))
+        drawn[:, 2] = wrap_array(drawn[:, 2])
         self.particles = Particles.equal(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
         return summarize(self.particles, self._sensor.peak_power)
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return the exponent of the scan's likelihood by map trust and settling, and the beams the map covers."""
+        """Return the weight of a scan, which is the exponent of its likelihood, and the beams to use."""
         if self._trust is not None and len(beams.ends):
-            self._map_weight, self.fitting, counting = self._trust.weight(self.particles, beams)
-            if counting is not None and self._map_weight > 0:
-                beams = beams.keeping_hits(counting)
+            self._map_weight, self.fitting_share, used_hits = self._trust.weight(self.particles, beams)
+            if used_hits is not None and self._map_weight > 0:
+                beams = beams.keeping_hits(used_hits)
         return self._map_weight * self._scan_weight, beams
 
     def _resample(self) -> None:
-        self._is_one_group = are_compact(self.particles)
+        self._is_one_cluster = are_compact(self.particles)
         super()._resample()

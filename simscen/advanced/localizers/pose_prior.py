@@ -19,15 +19,14 @@ MAX_SLIP_DIFFERENCE = 0.1, 0.5
 wheels' step.
 
 If both limits are exceeded, the scans show people who walk next to the robot. Slipping wheels differ by at most 40 %,
-except if they spin on the spot. Then scans show nothing new.
+except if they spin while the robot stands. The scans then show no motion anyway.
 """
 KNOWN_STEP_STD_M = 0.012
-"""Largest standard deviation of a step by scans for which the scans determine the step; above it, the wheels do.
+"""Standard deviation of a step above which the wheels determine the step, and not the scans.
 
 An example is a step along a corridor that looks the same everywhere. Wheel slip lasts for some time, so that the errors
 of such steps add up in one direction.
 """
-
 
 NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -48,7 +47,7 @@ class ObservedMotion:
 
     @property
     def is_scene_moving(self) -> bool:
-        """Whether scans and wheels differ by more than slip can cause. Then the scans show moving objects."""
+        """Whether scans and wheels differ by more than slip can cause, because the scans show moving objects."""
         apart = math.hypot(self.disagreement.x, self.disagreement.y)
         if self.step is None or apart < MAX_SLIP_DIFFERENCE[0]:
             return False
@@ -56,7 +55,7 @@ class ObservedMotion:
         return apart > MAX_SLIP_DIFFERENCE[1] * math.hypot(wheels.x, wheels.y)
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
-        """Return the errors in m and rad that have the same direction in this motion and similar ones.
+        """Return the errors in m and rad of this motion that have the same direction as those of the next motions.
 
         `meters` is the distance driven as returned by `traveled`, in which rotations count as well.
         """
@@ -74,8 +73,8 @@ class PosePrior:
     pose:              certain pose in the map
     base:              pose of the base at the same time in a slowly drifting frame: that of scan matching or odometry
     std (3,):          standard deviations of `pose` in m, m and rad
-    covariance (3, 3): covariance of the motion since then, from independent errors, in the drifting frame
-    systematic_error:  sum of the errors that always have the same direction, in m and rad
+    covariance (3, 3): covariance of the motion since then in the drifting frame, only for independent errors
+    systematic_error:  sum of the other errors, which have the same direction in all steps, in m and rad
     """
 
     pose: Pose2
@@ -90,7 +89,7 @@ class PosePrior:
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
     def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
-        """Return the prior after `motion`, a drive of `meters` (see `traveled`) from `before` to `base`."""
+        """Return the prior after `motion` from `before` to `base`, over `meters` as returned by `traveled`."""
         meter, rad = motion.systematic_error(meters)
         meter, rad = self.systematic_error[0] + meter, self.systematic_error[1] + rad
         noise = NO_NOISE if motion.step is None else rotate_covariance(motion.step.covariance, before.yaw)
@@ -98,11 +97,11 @@ class PosePrior:
         return replace(self, covariance=covariance, systematic_error=(meter, rad))
 
     def expected(self, base: Pose2) -> Array:
-        """Return the pose (3,) in the map of a base at `base`, if there was no drift since the certain pose."""
+        """Return the pose (3,) in the map of a robot at `base`, without any drift since the certain pose."""
         return np.array(self.pose.compose(self.base.between(base)))
 
     def negative_log_likelihood(self, poses: Array, base: Pose2) -> Array:
-        """Return the negative log-likelihood (n,) of each of the `poses` (n, 3), relative to the expected pose."""
+        """Return the negative log-likelihoods (n,) of `poses` (n, 3) of a robot at `base`; 0 at the expected pose."""
         frame = rotation_matrix(self.pose.yaw - self.base.yaw)
         meter, rad = self.systematic_error
         std = np.square(self.std + np.array((meter, meter, rad)))

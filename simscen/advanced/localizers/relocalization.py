@@ -1,4 +1,7 @@
-"""Relocalization: detects that the particle filter is lost, and searches the map for the robot."""
+"""Relocalization: detects that the particle filter is lost, and searches the map for the robot.
+
+All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores are those of GlobalSearch.score.
+"""
 
 import math
 from collections import deque
@@ -9,13 +12,11 @@ from simscen.advanced.localizers.global_search import MIN_SEPARATION, GlobalSear
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD, ObservedMotion, PosePrior
 from simscen.advanced.localizers.scan_memory import ScanMemory, traveled
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.particles import pose_errors
-
-# All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.score.
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
 """The robot may be lost if the mean share of fitting beams in this many scans is below the second value."""
@@ -27,13 +28,13 @@ MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
 """A robot without initial pose gets a pose if the score of this pose, over at least MIN_LENGTH_M driven, exceeds that
 of any other pose by MIN_LEAD."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
-"""A robot that had a pose gets another one if, in addition, the score exceeds that of its pose by MIN_GAIN and is at
-least MIN_SCORE, in two searches that agree."""
+"""A robot that had a pose gets another one if two searches agree. The score must be above MIN_SCORE, and exceed that of
+any other pose by MIN_LEAD and that of the current pose by MIN_GAIN."""
 CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
-"""Distance driven after which the poses near the current one are searched, if its score is below CERTAIN_SCORE."""
+"""Distance driven after which poses near the current pose are searched, unless its score is above CERTAIN_SCORE."""
 MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
 """The estimate is moved to a nearby pose if the score of that pose is at least MIN_NEAR_SCORE, exceeds that of any
-other pose by MIN_LEAD, and exceeds that of the estimate by MIN_GAIN, or by CERTAIN_GAIN if it is above CERTAIN_SCORE.
+other pose by MIN_LEAD, and exceeds that of the estimate by MIN_GAIN. Above CERTAIN_SCORE, CERTAIN_GAIN suffices.
 
 Scores are reduced by SCORE_SCALE times the negative log-likelihood of the drift since the last certain pose, because in
 a changed corridor a pose one meter away may have a better score by chance.
@@ -47,12 +48,12 @@ SAME_POSE = 0.7, 0.3
 AGREEMENT_LENGTH_M = 2.0
 """Distance driven over which searches must agree."""
 UNMAPPED_DISTANCE_M, RETURN_SCORE, RETURN_LEAD = 5.0, 0.9, 0.1
-"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score
-and lead exceed these values. They are higher because unmapped rooms often resemble mapped ones."""
+"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score and
+lead exceed these values, which are higher than usual because unmapped rooms often resemble mapped ones."""
 SCORE_SCALE = 0.02
 """Difference of two scores for which one pose is e times as likely as the other, and gets e times as many particles."""
-NO_MOTION = ObservedMotion()
-"""The motion of a robot without scan matching."""
+UNOBSERVED_MOTION = ObservedMotion()
+"""The motion if there is no scan matching."""
 
 
 class Relocalizer:
@@ -64,7 +65,7 @@ class Relocalizer:
     """
 
     def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
-        """Create the relocalizer. The initial `estimate` is used for the first `settling` m driven."""
+        """Create the relocalizer. For the first `settling` m driven, it also searches near the initial `estimate`."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._has_pose, self._estimate, self._settling = estimate.pose is not None, estimate, settling
         self._initial: PosePrior | None = None
@@ -78,7 +79,7 @@ class Relocalizer:
 
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
-        motion: ObservedMotion = NO_MOTION, fitting_share: float | None = None,
+        motion: ObservedMotion = UNOBSERVED_MOTION, fitting_share: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
         """Return poses (k, 3) where the robot may be, with their shares (k,); None if the estimate should be kept.
 
@@ -103,7 +104,7 @@ class Relocalizer:
             self._mapped_at = self._driven
         if self._has_pose and (found := self._search_nearby(base, current)) is not None:
             return found
-        if self._has_pose and not (self._is_in_doubt() or self._is_unmapped):
+        if self._has_pose and not (self._update_doubt() or self._is_unmapped):
             return None
         if self._since_search < self._interval:
             return None
@@ -115,7 +116,7 @@ class Relocalizer:
         return self._memory.add(scan, base, *limits)
 
     def _propagate(self, base: Pose2, motion: ObservedMotion) -> None:
-        """Propagate the priors of the pose. If the robot was carried, they are forgotten."""
+        """Propagate the priors of the pose, or forget them if the robot was carried."""
         last, self._last = self._last, base
         if last is None:
             if self._estimate.pose is not None:
@@ -136,12 +137,11 @@ class Relocalizer:
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the most likely pose given the initial pose and all scans since, if the particles are elsewhere.
+        """Return the most likely pose, given the initial pose and all scans since; None if the estimate is near it.
 
         In a room whose furniture was moved, one scan may fit a wrong pose, and the next scans, which show the same,
         confirm it. All scans together, and the condition that beams cross only free space, often show that this pose is
-        wrong. If the map shows little of the scans, so that many poses fit by chance, only the expected pose is
-        considered.
+        wrong. If the map shows little of the surroundings, many poses fit by chance, and only the expected pose counts.
         """
         if not self._memory.length:
             return None
@@ -164,7 +164,7 @@ class Relocalizer:
         return poses[best : best + 1], np.ones(1)
 
     def _search_nearby(self, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the pose if it is near the current one, after an inexact initial pose or after drift without a map."""
+        """Return a better pose near the current one, e.g. after drift outside the map; None if there is none."""
         if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
             return None
         self._since_check, view = 0.0, self._memory.view_from(base)
@@ -198,8 +198,8 @@ class Relocalizer:
         self._certain = PosePrior.at(poses[0], base)
         return poses, np.ones(1)
 
-    def _is_in_doubt(self) -> bool:
-        """Return whether recent scans do not fit. When the doubt begins, earlier scans may be from another place."""
+    def _update_doubt(self) -> bool:
+        """Return whether recent scans do not fit. When this begins, forget scans that may be from another place."""
         is_in_doubt = (
             len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE
         )
@@ -221,7 +221,7 @@ class Relocalizer:
         return self._is_unmapped and self._certain is not None
 
     def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the poses that fit, or for a robot that had a pose, the one that two searches agree on."""
+        """Return the poses that fit; for a robot that had a pose, only a pose that two searches agree on, or None."""
         poses, scores = self._search.search(view)
         last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
         if not len(poses):
@@ -258,11 +258,3 @@ def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -
     """Return whether the motion of the base leads from the first pose to the second."""
     difference = first.compose(first_base.between(second_base)).between(second)
     return math.hypot(difference.x, difference.y) < SAME_POSE[0] and abs(difference.yaw) < SAME_POSE[1]
-
-
-def sample_around(poses: Array, shares: Array, count: int, rng: np.random.Generator) -> Array:
-    """Return particles (count, 3) around `poses` (k, 3), each with its share (k,)."""
-    chosen = rng.choice(len(poses), count, p=shares)
-    drawn: Array = poses[chosen] + rng.normal(0.0, CERTAIN_STD, (count, 3))
-    drawn[:, 2] = wrap_array(drawn[:, 2])
-    return drawn

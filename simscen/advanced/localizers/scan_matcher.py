@@ -20,18 +20,19 @@ from simscen.stack.localizers.particles import columns, wrapped
 
 BASELINE_M = 0.15
 """Distance between the two points whose line gives the normal of the point between them."""
-MAX_BEND_RATIO = 0.05
-"""Maximum distance of the point from this line, as a ratio of its length."""
+MAX_BEND_M = 0.05
+"""Maximum distance of the point from this line."""
 MAX_LINE_M = 0.5
-"""Maximum length of this line. Points farther apart are not on the same surface."""
+"""Maximum length of this line, at least four beam spacings. Points farther apart are not on the same surface."""
 MAX_RANGE_M = 20.0
+"""Points farther away are not used."""
 
 _NONE: Plane = np.empty(0, dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Points (n,) and the normals (n,) of their surfaces, as complex numbers."""
+    """Points (n,) on surfaces, and the unit normals (n,) there, all as x + iy."""
 
     points: Plane
     normals: Plane
@@ -49,8 +50,8 @@ class Surface:
         return Surface(self.points.take(chosen), self.normals.take(chosen))
 
 
-def surfaces_of(scan: Scan) -> Surface:
-    """Return the surface that a scan hit, in the base frame, without points at edges, whose normal is unknown."""
+def extract_surface(scan: Scan) -> Surface:
+    """Return the hits of a scan in the base frame, without those at edges, where the normal is unknown."""
     ranges = scan.ranges
     hit = ((ranges > scan.range_min) & (ranges < min(scan.range_max, MAX_RANGE_M))).nonzero()[0]
     if len(hit) < 3:
@@ -64,25 +65,25 @@ def surfaces_of(scan: Scan) -> Surface:
     length = np.abs(along)
     bent = np.abs(((points - before).conj() * along).imag)
     # A line of length 0 fails the second comparison.
-    flat = ((length < np.maximum(MAX_LINE_M, 4 * gap * ranges)) & (bent < MAX_BEND_RATIO * length)).nonzero()[0]
+    flat = ((length < np.maximum(MAX_LINE_M, 4 * gap * ranges)) & (bent < MAX_BEND_M * length)).nonzero()[0]
     normals = along.take(flat) * -1j / length.take(flat)
     return Surface(points.take(flat) + complex(scan.mount.x, scan.mount.y), normals)
 
 
 REFERENCE_SCANS = 4
-"""Number of scans that a new one is matched with."""
+"""Number of earlier scans that a new scan is matched with."""
 REFERENCE_POINTS, SCAN_POINTS = 120, 90
-"""Maximum number of points of each of these scans, and of the new one."""
+"""Maximum number of points of each of these scans, and of the new scan."""
 GATES_M, MAX_ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
-"""Maximum distance of a point from its nearest neighbor, for each iteration, and maximum number of iterations."""
+"""Maximum distance of a point from its nearest neighbor in successive iterations, and maximum number of iterations."""
 LAST_GATE_STEP, CONVERGED_STEP = (0.02, 0.01), (0.002, 0.001)
-"""Motion (m, rad) of an iteration below which the last gate is next, and below which the iterations end."""
+"""Changes of the pose (m, rad) by an iteration below which the last of GATES_M follows, and the match ends."""
 OUTLIER_DISTANCE_M, OUTLIER_RATIO = 0.1, 1.5
-"""Distance from its neighbor at which a point has a quarter of its weight (Geman-McClure): the first, or the second
-times the root mean square of all distances if that is more.
+"""A point has a quarter of its weight (Geman-McClure) if its distance from its neighbor is OUTLIER_DISTANCE_M, or
+OUTLIER_RATIO times the root mean square of all distances if that is more.
 
-If most points fit, a person who walks along does not change the match. If none fits, the robot's motion differs from
-that of its wheels, and all points must keep their weight.
+If most points fit, a person who walks along does not change the match. If none fits, the wheels have slipped, and all
+points must keep their weight.
 """
 POINT_STD_M = 0.03
 """Standard deviation of the distance of points from surfaces, including correlations."""
@@ -90,22 +91,20 @@ MIN_NORMAL_COSINE = 0.7
 """Minimum cosine of the angle between the normals of two points on the same surface."""
 MIN_MATCHED_POINTS = 12
 GUESS_STD = (0.15, 0.02, 0.15, 0.03)
-"""Standard deviation of the guess: share of the distance and m, share of the rotation and rad."""
+"""Standard deviation of the guess: a share of the distance plus m, and a share of the rotation plus rad."""
 MAX_BEAM_ANGLE_RAD = 0.04
-"""Maximum angle between two beams. With a larger one, the normals of surfaces are unknown."""
+"""Maximum angle between two beams. With a larger angle, the normals of surfaces are unknown."""
 AGREEMENT = (0.03, 0.1, 0.03, 0.1)
-"""Difference up to which scan matching and odometry agree: m and share of the distance, rad and share of the rotation.
-"""
+"""Maximum difference of a match that agrees with odometry: m plus a share of the distance, rad plus one of the turn."""
 MIN_OVERLAP = 0.3
-"""Share of a scan's points that earlier scans showed, below which the scans do not show the motion."""
+"""Share of a scan's points that earlier scans also showed, below which the match is rejected."""
 MAX_OVERLAP_STEP = 0.75, 0.75
-"""Longest step between two scans (m, rad) after which a small overlap means something: below MIN_OVERLAP, that the
-robot was carried elsewhere.
+"""Longest step between two scans (m, rad) after which an overlap below MIN_OVERLAP means that the robot was carried.
 
-After a longer one, e.g. around a corner between sparse scans, the scans may share little anyway.
+After a longer step, e.g. around a corner between sparse scans, the scans may share little anyway.
 """
 COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
-"""Factor of the match's own covariance, and variances (m², m², rad²) added to it.
+"""Factor on the covariance of the least-squares solution, and variances (m², m², rad²) added to it.
 
 They are fitted to observed errors: consecutive scans share the errors of their surfaces.
 """
@@ -125,7 +124,7 @@ class _Reference:
     """
 
     def __init__(self, frames: Iterable[Surface], middle: complex) -> None:
-        """Combine scans. `middle` is a point near the robot, which keeps rounding errors of squares small."""
+        """Combine scans. Distances are computed relative to `middle`, near the robot, to keep rounding errors small."""
         seen = list(frames)
         self._points = np.concatenate([frame.points for frame in seen])
         self._normals = np.concatenate([frame.normals for frame in seen])
@@ -138,7 +137,7 @@ class _Reference:
         self._compared[2] = (around * around.conj()).real * -0.5
 
     def equations(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
-        """Return the normal equations of a scan at `pose`.
+        """Return the normal equations of a scan, `own` in the base frame, for a base at `pose`.
 
         None if too few points have a neighbor within `gate` m with a similar normal.
         """
@@ -187,8 +186,8 @@ class Step:
         )
 
 
-def apply_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
-    """Return `poses` (n, 3), each moved by its own sample of a step."""
+def sample_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
+    """Return `poses` (n, 3), each moved by its own random sample of a step."""
     ahead, left, turn = np.dot(_root(step.covariance), rng.standard_normal((3, len(poses))))
     ahead += step.delta.x
     left += step.delta.y
@@ -203,7 +202,7 @@ def apply_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
 
 
 class ScanMatcher:
-    """Estimates the motion of the base from the scans of one lidar.
+    """Estimates the motion of the base by matching successive scans of one lidar.
 
     `pose` is that of the base in a frame that begins at the first scan and drifts slowly.
     """
@@ -212,7 +211,7 @@ class ScanMatcher:
         self._frames: deque[Surface] = deque(maxlen=REFERENCE_SCANS)
         self.pose = Pose2(0.0, 0.0, 0.0)
         self.overlap: float | None = None
-        """Share of the last scan's points that earlier scans showed; None if unknown or after a long step."""
+        """Share of the last scan's points that earlier scans also showed; None if unknown or after a long step."""
 
     @property
     def was_carried(self) -> bool | None:
@@ -225,7 +224,7 @@ class ScanMatcher:
         if abs(scan.angle_increment) > MAX_BEAM_ANGLE_RAD:
             self.pose = self.pose.compose(guess)
             return None
-        seen = surfaces_of(scan)
+        seen = extract_surface(scan)
         found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
         if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None

@@ -1,4 +1,4 @@
-"""AMCL that matches consecutive scans, searches the map when it is lost, and compares fewer scans while certain."""
+"""AMCL that matches each scan with earlier ones, and searches the whole map when the robot is lost."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_trust import MapResiduals, MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
-from simscen.advanced.localizers.relocalization import NO_MOTION, Relocalizer
+from simscen.advanced.localizers.relocalization import UNOBSERVED_MOTION, Relocalizer
 from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
@@ -41,8 +41,8 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
     ) -> None:  # fmt: skip
         """Create the localizer.
 
-        search:     finds the pose of a lost robot; without it, only random particles do
-        residuals:  measures how well the map explains a scan, for the covariance; without it, particles alone give it
+        search:     search for a lost robot, and map trust; None if only random particles find a lost robot
+        residuals:  measures how well the map explains a scan; None if the covariance is that of the particles alone
         """
         self._search, self._residuals = search, residuals
         self._update_interval = spec.sure_update_interval if residuals is None else 1
@@ -57,7 +57,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         estimates_covariance = self._residuals is not None and self._matcher is not None
         self._covariance_estimator = CovarianceEstimator() if estimates_covariance else None
         self._matched: tuple[str, Pose2] | None = None  # lidar and odometry of the last matched scan
-        self._motion_observed = NO_MOTION  # the motion since the last update
+        self._motion_observed = UNOBSERVED_MOTION  # the motion since the last update
         self._consistent_updates = 0  # consecutive updates in which map, scans and wheels agreed
         self._skipped = 0  # consecutive scans that were not compared with the map
 
@@ -68,7 +68,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._relocalize(self._relocalizer, scan, odometry)
 
     def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles as the scans show, and weigh them unless the robot is certain of its pose."""
+        """Move the particles, by scan matching if possible. Weigh them unless `sure_update_interval` skips the scan."""
         matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
         was_carried = None if self._matcher is None else self._matcher.was_carried
         self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
@@ -78,11 +78,12 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             if not (agreed := matched.agrees(delta)):
                 self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
             if self._covariance_estimator is not None:
-                self._covariance_estimator.compare(matched.delta, delta)
+                self._covariance_estimator.learn_odometry_error(matched.delta, delta)
         elif delta is not None:
             self._filter.move(delta)
         if self._covariance_estimator is not None:
-            self._covariance_estimator.drive(self._base(odometry), None if matched is None else matched.covariance)
+            step_covariance = None if matched is None else matched.covariance
+            self._covariance_estimator.propagate_poses(self._base(odometry), step_covariance)
         self._mark_updated(scan, odometry)
         certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
         self._skipped = self._skipped + 1 if certain and self._skipped + 1 < self._update_interval else 0
@@ -103,7 +104,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
-        """Return the motion since the last update by scan matching of the first lidar; None if scans do not show it."""
+        """Return the motion since the last update, from scans of the first lidar only; None if they do not show it."""
         sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
             return None
@@ -119,7 +120,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             relocalizer.add_scan(scan, base, range_limits, self._motion_observed)
             return
         believed = self._correction.map_from_odom.compose(odometry)
-        fitting_share = self._filter.fitting if self._consistent_updates else None
+        fitting_share = self._filter.fitting_share if self._consistent_updates else None
         found = relocalizer.update(scan, base, believed, range_limits, self._motion_observed, fitting_share)
         if found is not None:
             self._correction = Correction(*self._filter.redistribute(*found), odometry, scan.tick)

@@ -1,6 +1,7 @@
-"""Scans of the last meters, combined by odometry. Together, they identify a pose far better than one scan."""
+"""Memory of the scans of the last meters, combined by odometry. Many scans identify a pose far better than one."""
 
 import cmath
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -12,12 +13,13 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
 
 MEMORY_LENGTH_M = 6.0
-"""Distance driven after which scans are forgotten, because errors of the odometry have distorted them."""
+"""Distance driven after which scans are forgotten, because odometry has drifted too far since."""
 BEAMS_PER_SCAN = 40
+"""Maximum number of beams of a scan that are stored."""
 MIN_SPACING_M = 0.2
 """Minimum distance driven between two scans that are stored."""
 METERS_PER_RAD = 0.5
-"""Distance that a rotation counts as, because the lidar also measures new surroundings then."""
+"""Distance that a rotation by 1 rad counts as, because the lidar also measures new surroundings while it turns."""
 
 
 _BEAM_SHARES = np.array([[share] for share in (*PASSED_SHARES, 1.0)])
@@ -47,7 +49,10 @@ class ScanMemory:
         return self._scans[-1].driven - self._scans[0].driven if self._scans else 0.0
 
     def add(self, scan: Scan, odometry: Pose2, min_range: float, max_range: float) -> Plane:
-        """Add a scan, with ranges between `min_range` and `max_range`. Return its endpoints in the base frame."""
+        """Add a scan with its ranges between the limits in m, unless it is closer than MIN_SPACING_M to the last one.
+
+        `odometry` is the pose of the base in any frame that drifts slowly. Return the endpoints (n,) in the base frame.
+        """
         ends = endpoints_of(scan, min_range, max_range)
         if self._scans:
             last = self._scans[-1]
@@ -71,20 +76,25 @@ class ScanMemory:
             self._scans.popleft()
 
     def view_from(self, odometry: Pose2) -> View:
-        """Return all stored points in the frame of a base at `odometry`."""
+        """Return all stored scans (at least one) in the frame of a base at `odometry`."""
         points = np.concatenate([stored.points for stored in self._scans], axis=1)
         points -= complex(odometry.x, odometry.y)
         points *= cmath.rect(1.0, -odometry.yaw)
         return View(points[-1], points[:-1].ravel())
 
 
+def step_length(step: Pose2) -> float:
+    """Return the length of a step in m; a rotation by 1 rad counts as METERS_PER_RAD."""
+    return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)
+
+
 def traveled(before: Pose2, after: Pose2) -> float:
-    """Return the distance in m between two poses; a rotation by 1 rad counts as METERS_PER_RAD."""
+    """Return the distance in m between two poses, with rotations as in `step_length`."""
     return before.distance(after) + METERS_PER_RAD * abs(wrap(after.yaw - before.yaw))
 
 
 def endpoints_of(scan: Scan, min_range: float, max_range: float) -> Plane:
-    """Return endpoints (n,) in the base frame of evenly spaced beams of a scan that hit something."""
+    """Return the endpoints (n,) in the base frame of at most BEAMS_PER_SCAN beams that hit something in this range."""
     min_range, max_range = max(scan.range_min, min_range), min(scan.range_max, max_range, MAX_RANGE_M)
     hit = ((scan.ranges > min_range) & (scan.ranges < max_range)).nonzero()[0]
     if len(hit) > BEAMS_PER_SCAN:

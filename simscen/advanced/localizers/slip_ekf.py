@@ -1,7 +1,7 @@
 """Extended Kalman filter of odometry and gyroscope that detects wheel slip in turns, with optional scan matching.
 
-If the wheels slip in a turn, the turn rates of wheels and gyroscope disagree. The wheels then also measure a distance
-that the robot did not drive. A gyroscope cannot measure this distance, but scan matching can.
+If the wheels slip in a turn, the turn rates of wheels and gyroscope disagree. The wheels then also measure a wrong
+distance. A gyroscope cannot correct the distance, but scan matching can.
 
 Source: Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter. As in robot_localization, the turn
 rate is a state that both sensors measure. The bias of the gyroscope is also a state; it is measured while the robot
@@ -19,11 +19,11 @@ from simscen.advanced.localizers.slip_model import (
     RATE,
     SLIP_LEVER_M,
     SLIP_X,
-    Model,
     SlipDetector,
-    Step,
-    apply_step,
-    motion_model,
+    StepModel,
+    WheelStep,
+    pose_model,
+    predict_state,
     rate_model,
 )
 from simscen.advanced.spec import SlipEkf
@@ -50,8 +50,8 @@ class ScanMatchingCorrection:
     def correction(self, scan: Scan) -> tuple[float, float]:
         """Return the translation (x, y) in m, in the map frame, to add to dead reckoning since the last scan.
 
-        It is 0 if scans do not show the motion. It is also 0 if the difference is too large for slip, because then the
-        scans show moving objects.
+        It is 0 if scans do not show the motion, or if they differ too much from dead reckoning (`Step.agrees`). In the
+        latter case, they probably show moving objects.
         """
         if not self._dead_reckoning:
             return 0.0, 0.0
@@ -86,8 +86,8 @@ _GYRO_MEASUREMENT[0, [RATE, BIAS]] = 1.0
 class SlipEkfLocalizer:
     """Dead reckoning with the heading from odometry and gyroscope. It uses no map, so it drifts.
 
-    If the two turn rates disagree by more than their noise, the wheels slip. Then only the gyroscope determines the
-    turn, and the uncertainty of the translation increases with the speed.
+    If the turn rates of wheels and gyroscope disagree by more than their noise, the wheels slip. Then only the
+    gyroscope determines the turn, and the uncertainty of the translation increases with the speed.
     """
 
     def __init__(self, spec: SlipEkf, estimate: Estimate, tick_rate: int) -> None:
@@ -122,7 +122,7 @@ class SlipEkfLocalizer:
         if last is not None:
             step = self._step(last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate)
             self._measure(step)
-            self._predict(motion_model(self._spec, self._filter.x, step), apply_step(self._filter.x, step))
+            self._predict(pose_model(self._spec, self._filter.x, step), predict_state(self._filter.x, step))
         self._readings.clear()
         if self._scan_correction is not None:
             self._scan_correction.add_pose(odometry.tick, self.pose)
@@ -152,14 +152,14 @@ class SlipEkfLocalizer:
 
     @property
     def pose(self) -> Pose2:
-        """The pose of the estimate."""
+        """The estimated pose."""
         x, y, yaw = self._filter.x[:RATE].tolist()
         return Pose2(x, y, wrap(yaw))
 
-    def _step(self, pose: Pose2, seconds: float) -> Step:
-        """Return the step from one odometry message to the next, and whether the wheels slipped."""
+    def _step(self, pose: Pose2, seconds: float) -> WheelStep:
+        """Return the step of the wheels by `pose` in `seconds`, with the slip that was detected in it."""
         speed = math.hypot(pose.x, pose.y) / seconds
-        without_slip = Step(pose, seconds, speed)
+        without_slip = WheelStep(pose, seconds, speed)
         if not self._readings:
             return without_slip
         turn = self._turn_rate - float(self._filter.x[BIAS])
@@ -169,9 +169,9 @@ class SlipEkfLocalizer:
             return without_slip
         pushed_speed = PUSHED_SPEED_M_S if abs(turn) > abs(pose.yaw / seconds) else 0.0
         possible_speed = max(self._speed, speed, SLIP_LEVER_M * abs(innovation), pushed_speed)
-        return Step(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
+        return WheelStep(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
 
-    def _measure(self, step: Step) -> None:
+    def _measure(self, step: WheelStep) -> None:
         """Estimate the turn rate from the wheels, unless they slip, and from the gyroscope."""
         model = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
         predicted = model.f @ self._filter.x
@@ -188,7 +188,7 @@ class SlipEkfLocalizer:
         if not step.slips:
             self._speed = step.speed
 
-    def _wheel_noise(self, step: Step) -> float:
+    def _wheel_noise(self, step: WheelStep) -> float:
         """Return the variance of the wheels' turn rate in (rad/s)²."""
         turned = step.length + abs(step.pose.yaw)
         return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_RATE_STD_RAD_S**2
@@ -202,7 +202,7 @@ class SlipEkfLocalizer:
     def _gyro_noise(self) -> float:
         return self._spec.gyro_noise**2 / len(self._readings)
 
-    def _predict(self, model: Model, state: Array) -> None:
+    def _predict(self, model: StepModel, state: Array) -> None:
         """Predict the filter to `state` (7,), with the covariance of the model."""
         self._filter.F, self._filter.Q = model.f, model.q
         self._filter.predict(state)

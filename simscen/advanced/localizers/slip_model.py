@@ -1,4 +1,4 @@
-"""Wheel slip: its detection by comparing turn rates, and the motion model of the EKF that estimates it."""
+"""Detection of wheel slip by comparing turn rates, and the motion model of the EKF that estimates slip."""
 
 import math
 from collections import deque
@@ -10,7 +10,7 @@ from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 
 GATE = 15.1
-"""Ratio of squared innovation and variance above which the wheels are assumed to slip. Without slip, one of 10 000
+"""Ratio of squared innovation to its variance above which the wheels are assumed to slip. Without slip, one of 10 000
 steps exceeds it (chi-square)."""
 WINDOW_S, WINDOW_GATE = 0.5, 24.0
 """Time over which innovations are summed to detect small slip, and the gate of the sum. Without slip, one of a million
@@ -20,7 +20,7 @@ RELEASE_S, RELEASE_GATE = 0.15, 4.0
 
 
 class SlipDetector:
-    """Detects wheel slip by the innovations of the turn rate."""
+    """Detects wheel slip by the difference between the turn rates of gyroscope and wheels."""
 
     def __init__(self) -> None:
         self._recent: deque[tuple[float, float, float]] = deque()  # rad, rad², seconds of each step
@@ -42,7 +42,7 @@ class SlipDetector:
         return seconds if known else max(seconds, lasted)
 
     def _slow_slip(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the time in s over which the sum of the innovations exceeds its gate; 0 if it does not."""
+        """Return the time in s over which the innovations have been summed if the sum exceeds its gate, otherwise 0."""
         self._recent.append((innovation, noise, seconds))
         window, gate = (RELEASE_S, RELEASE_GATE) if self._slips_slowly else (WINDOW_S, WINDOW_GATE)
         while len(self._recent) > 1 and sum(step[2] for step in self._recent) > window + 1e-9:
@@ -54,7 +54,7 @@ class SlipDetector:
 X, Y, YAW, RATE, BIAS, SLIP_X, SLIP_Y = range(7)
 """Indices of the state: pose in the map, turn rate, gyroscope bias, longitudinal and lateral slip.
 
-Slip is the speed that the wheels do not measure, as a share of the robot's possible speed (`Step.speed`).
+Slip is the speed that the wheels do not measure, as a share of the robot's possible speed (`WheelStep.speed`).
 """
 SLIP_TIME_S = 1.0
 """Correlation time of slip."""
@@ -63,18 +63,18 @@ UNKNOWN_RATE_STD_RAD_S = 10.0
 SLIP_LEVER_M = 0.1
 """Distance from the base to the point around which a slipping robot rotates."""
 SLIP_STD = 0.7
-"""Standard deviation of slip in both directions while the wheels slip. It would be 0.58 for a uniform distribution up
-to the possible speed, and 1 if slip were always equal to the possible speed."""
+"""Standard deviation of slip in each direction while the wheels slip. It would be 0.58 for a uniform distribution up to
+the possible speed, and 1 if the robot always slipped at the possible speed."""
 PUSHED_SPEED_M_S = 0.3
 """Possible speed of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
 
 
 @dataclass(frozen=True)
-class Step:
-    """Motion between two odometry messages.
+class WheelStep:
+    """Motion between two odometry messages, as measured by the wheels.
 
-    pose:             motion by the wheels, in the base frame before it
-    seconds:          its duration
+    pose:             motion, in the base frame at its start
+    seconds:          duration
     speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
     slips:            whether the wheels slip
     undetected_slip:  time in s of slip until the end of the step that was not detected before
@@ -88,19 +88,19 @@ class Step:
 
     @property
     def length(self) -> float:
-        """Distance by the wheels in m."""
+        """Distance driven in m."""
         return math.hypot(self.pose.x, self.pose.y)
 
 
 @dataclass(frozen=True)
-class Model:
-    """Jacobian `f` (7, 7) of a step, and its process noise `q` (7, 7)."""
+class StepModel:
+    """Linearized model of a step: Jacobian `f` (7, 7) of the state, and process noise `q` (7, 7)."""
 
     f: Array
     q: Array
 
 
-def rate_model(spec: SlipEkf, step: Step, noise: float, slipped: bool) -> Model:
+def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped: bool) -> StepModel:
     """Return the model of turn rate, bias and slip from one step to the next.
 
     `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped` states whether the wheels slipped in the
@@ -115,11 +115,11 @@ def rate_model(spec: SlipEkf, step: Step, noise: float, slipped: bool) -> Model:
     elif not step.slips:
         f[SLIP_X, SLIP_X] = math.exp(-step.seconds / SLIP_TIME_S)
         q[SLIP_X, SLIP_X] = spec.wheel_slip**2 * (1.0 - f[SLIP_X, SLIP_X] ** 2)
-    return Model(f, q)
+    return StepModel(f, q)
 
 
-def apply_step(state: Array, step: Step) -> Array:
-    """Return the state (7,) after a step.
+def predict_state(state: Array, step: WheelStep) -> Array:
+    """Return the state (7,) after a step. Only the pose changes.
 
     If the turn differs from that of the wheels, the translation is rotated by half of the difference.
     """
@@ -129,8 +129,8 @@ def apply_step(state: Array, step: Step) -> Array:
     return after
 
 
-def motion_model(spec: SlipEkf, state: Array, step: Step) -> Model:
-    """Return the model of the pose, for a step from `state` (7,)."""
+def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> StepModel:
+    """Return the model of the pose for a step from `state` (7,); `predict_state` is the nonlinear function."""
     dx, dy = _translation(state, step)
     c, s = _direction(state, step)
     f, q = np.eye(7), np.zeros((7, 7))
@@ -141,16 +141,16 @@ def motion_model(spec: SlipEkf, state: Array, step: Step) -> Model:
     if step.length > 0:
         wheels = c * step.pose.x - s * step.pose.y, s * step.pose.x + c * step.pose.y
         q[:2, :2] = spec.translation_noise**2 / step.length * np.outer(wheels, wheels)
-    return Model(f, q)
+    return StepModel(f, q)
 
 
-def _direction(state: Array, step: Step) -> tuple[float, float]:
+def _direction(state: Array, step: WheelStep) -> tuple[float, float]:
     """Return the cosine and sine of the direction of a step."""
     along = float(state[YAW] + (state[RATE] * step.seconds - step.pose.yaw) / 2)
     return math.cos(along), math.sin(along)
 
 
-def _translation(state: Array, step: Step) -> tuple[float, float]:
+def _translation(state: Array, step: WheelStep) -> tuple[float, float]:
     """Return the translation of a step along x and y of the map in m."""
     c, s = _direction(state, step)
     slid = step.speed * step.seconds

@@ -1,8 +1,8 @@
-"""Informed set: the region that near-shortest paths can pass, measured along a coarse grid.
+"""Informed set: the region of near-shortest paths over a coarse grid, in which OMPL's planners sample.
 
-Source: Gammell et al., Informed RRT* (2014). Their informed set is the ellipse of points x with |start x| + |x goal| ≤
-c. Between walls, straight distances are too short, so both are measured along a coarse grid here. OMPL's planners
-sample only in this region, and so find a path sooner.
+Source: Gammell et al., Informed RRT* (2014). Their informed set is an ellipse: the points whose straight distances from
+start and goal add up to at most a limit. Between walls, straight distances are too short. Both are therefore measured
+over a coarse grid here, so that planners find a path sooner.
 
 Two blocks of the grid are connected if free cells touch across their border. A gap narrower than a block therefore
 stays open, and a wall thinner than a block stays closed.
@@ -25,23 +25,23 @@ BLOCK_M, COST_BLOCK_M = 0.2, 0.15
 """Approximate size of the blocks, for lengths and for costs."""
 MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
 """Maximum number of blocks; Dijkstra's algorithm takes 10 ms for 40 000. Blocks of larger maps are larger, but not
-wider than the robot, because both sides of a wall inside a block would be the same place."""
+wider than the robot, because a wall inside a block would not separate its two sides."""
 PATH_SPACING_M = 0.45
-"""Distance between the points of a path where there is much clearance."""
+"""Distance between the points that `path` returns where there is ample clearance."""
 MAX_LEG_M = 30.0
-"""Maximum length of a path that is searched at once."""
+"""Maximum distance between two of the `waypoints`."""
 Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
     """Points on near-shortest paths from start to goal; `length` is the approximate length of the shortest path in m.
 
-    A path goes to the 16 nearest neighbors of a block (a king's and a knight's moves in chess), so that its length is
-    at most 2.8 % too long.
+    From each block, a path can go to 16 neighbors (a king's and a knight's moves in chess), so that it is at most
+    2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
-        """Search the shortest paths, or if `by_cost` the cheapest ones, whose cost is in m of free space."""
+        """Search the shortest paths. If `by_cost`, lengths are costs instead, in m of driving through free space."""
         size, max_blocks = (COST_BLOCK_M, MAX_COST_BLOCKS) if by_cost else (BLOCK_M, MAX_BLOCKS)
         max_factor = max(1, int(2.0 * costs.inscribed / costs.resolution))
         min_factor = min(math.ceil(math.sqrt(costs.height * costs.width / max_blocks)), max_factor)
@@ -59,10 +59,10 @@ class InformedSet:
         self.length = float(distances[0][end_blocks[1]])
         self._inside = b"\1" * len(self._through)
 
-    def narrow(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
-        """Keep only blocks on paths longer than the shortest by at most the ratio `slack` and two block diagonals.
+    def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
+        """Restrict the set to paths that exceed the shortest path by at most the ratio `slack` and two block diagonals.
 
-        `section` is the range of distances in m along such a path to keep.
+        `section` is the range of distances in m along such a path to keep. Replaces earlier restrictions.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
         is_inside = self._through <= self.length * (1.0 + slack) + tolerance
@@ -77,7 +77,7 @@ class InformedSet:
         return inside
 
     def lengths_through(self, points: Array) -> Array:
-        """Return the lengths, or the costs, of the shortest paths through each of the points (n, 2)."""
+        """Return the length or cost (n,) of the shortest path through each of the points (n, 2)."""
         return np.asarray(self._through[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
@@ -85,9 +85,9 @@ class InformedSet:
         return np.asarray(rows * self._width + columns)
 
     def path(self, costmap: CostmapView, ample_clearance: float) -> Array:
-        """Return the points (n, 2) with the most clearance in the blocks of the shortest path, without its ends.
+        """Return the point with the most clearance in each block of the shortest path, (n, 2), without start and goal.
 
-        Where the clearance is at least `ample_clearance` m, the points are PATH_SPACING_M apart.
+        Where the clearance is at least `ample_clearance` m, only points that are PATH_SPACING_M apart are returned.
         """
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
@@ -102,7 +102,7 @@ class InformedSet:
         return points
 
     def waypoints(self, costmap: CostmapView) -> list[tuple[Point, float]]:
-        """Return points that divide a near-shortest path, at most MAX_LEG_M apart, with their distances along it.
+        """Return points that divide a near-shortest path, at most MAX_LEG_M apart, each with its distance along it.
 
         A tree planner needs far fewer samples for several short legs than for one long path through many doors.
         """
@@ -146,7 +146,7 @@ class InformedSet:
 
 
 def _as_blocks(free: Mask, factor: int) -> Mask:
-    """Return the cells as blocks (rows, columns, factor, factor); the last blocks are filled up with occupied cells."""
+    """Return cells as blocks (rows, columns, factor, factor). The last blocks are filled up with occupied cells."""
     height, width = (-(-side // factor) * factor for side in free.shape)
     padded = np.zeros((height, width), dtype=bool)
     padded[: free.shape[0], : free.shape[1]] = free
@@ -154,7 +154,7 @@ def _as_blocks(free: Mask, factor: int) -> Mask:
 
 
 def _steps(blocks: Mask) -> dict[tuple[int, int], Mask]:
-    """Return for each move (rows, columns) to one of 16 neighbors the blocks from which it is possible.
+    """Return the blocks from which each move (rows, columns) is possible; for 8 of 16 moves, the others are opposite.
 
     A move to one of the four adjacent blocks is possible if free cells touch on both sides of the border. Other moves
     are possible if the blocks between can be crossed in this way; a knight's move needs both ways around.

@@ -1,7 +1,7 @@
 """Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path.
 
-The optimization places points across the path at several stations along it. Viterbi's algorithm finds the cheapest path
-through one point of each station. The path stays on the same side of each obstacle.
+The optimization divides the path by stations, and places several points across the path at each. Viterbi's algorithm
+finds the cheapest path through one point of each station. The path stays on the same side of each obstacle.
 """
 
 import math
@@ -35,11 +35,11 @@ from simscen.stack.setting import Setting
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Rounds of refinement: distance between stations in m, maximum offset in m, and number of points per station."""
 MIN_SEGMENTS = 2
-"""Minimum number of segments, so that there is a station to move."""
+"""Minimum number of segments of a path, so that there is a station between its ends."""
 Costs = npt.NDArray[np.float32]
 
 
-def refined(costs: TraversalCosts, points: Array) -> Array:
+def refine(costs: TraversalCosts, points: Array) -> Array:
     """Return the cheapest path near a path (n, 2) with the same ends, smoothed."""
     points = _with_shortcuts(costs, points)
     cost = costs.along(points)
@@ -59,7 +59,7 @@ def refined(costs: TraversalCosts, points: Array) -> Array:
 
 
 def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path with shortcuts: straight lines to the farthest point to which they are not more expensive."""
+    """Return the path with straight shortcuts wherever they are not more expensive."""
     resampled = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
     rows = resampled.tolist()
     cost = [0.0]
@@ -106,7 +106,7 @@ def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, st
 
 
 def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
-    """Return the costs (n - 1, k, k) from each point of a station to each of the next; `points` (n, k, 2)."""
+    """Return the costs (n - 1, k, k) from each point of a station to each point of the next; `points` (n, k, 2)."""
     before = ((points[:-1] - costs.origin) / costs.resolution).astype(np.float32)[:, :, None]
     step = ((points[1:] - costs.origin) / costs.resolution).astype(np.float32)[:, None] - before
     samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
@@ -121,11 +121,11 @@ def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
 
 
 MAX_CACHED_CELLS = 500_000
-"""Largest costmap for which intermediate results are kept for the next plan, which takes up to 10 MB."""
+"""Largest costmap for which intermediate results are kept for the next plan; they take up to 10 MB."""
 
 
 def medial_axis_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Build the planner in the plane, or over poses for cars and long hulls."""
+    """Build the planner: in the plane, or over poses for cars and long hulls."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return MedialAxisPlanner(spec, setting.robot)
@@ -194,8 +194,8 @@ class MedialAxisPlanner:
 
 
 def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path, refined and led around corners; None if it passes a blocked cell between two checks."""
-    path = avoid_cell_corners(costs, spaced(refined(costs, points), SPACING_M))
+    """Return the path, refined and led around corners of blocked cells; None if it crosses a blocked cell."""
+    path = avoid_cell_corners(costs, spaced(refine(costs, points), SPACING_M))
     return path if path is not None else avoid_cell_corners(costs, spaced(points, SPACING_M))
 
 
@@ -208,38 +208,39 @@ ATTEMPTS = (
     (2.0, 0.0, 0.4, POSE_SPACING_M),
     (2.0, 0.0, 0.4, POSE_SPACING_M / 10),
 )
-"""Slack of the informed set as a ratio, part of `hull_clearance`, share of the iterations, and spacing of checks in m.
+"""Successive attempts: `slack` of the informed set, ratio of `hull_clearance`, share of the iterations, and spacing of
+collision checks in m.
 
 Cars need wider sets than discs because they swing out.
 """
 
 
 class ConfinedPosePlanner(PosePlanner):
-    """Plans over poses in the informed set, so that the tree does not grow into wrong rooms."""
+    """Plans over poses, but only in the informed set, so that the tree does not grow into wrong rooms."""
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         """Yield the attempts, in increasingly wide informed sets."""
         informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
         for slack, part, fraction, spacing in ATTEMPTS:
-            informed.narrow(slack)
+            informed.restrict(slack)
             clearance = part * self._spec.hull_clearance
             yield Attempt(informed.bounds(), informed.contains, clearance, fraction, spacing)
 
 
 MAX_COSTLY_RATIO = 0.5
-"""Maximum share of the distance to the goal that is searched separately. A larger part does not save time."""
+"""Maximum share of a straight path that is replaced by a detour. A larger detour does not save time."""
 MARGIN_BEHIND_M, MARGIN_AROUND_M = 2.0, 2.0
-"""Margins of the part of the costmap that is searched: behind the costly cells, and around both ends."""
+"""Margins of the part of the costmap in which a detour is planned: behind the costly cells, and around both ends."""
 MAX_COST_RATIO = 1.01
-"""Maximum ratio of the cost of the path to the straight distance. Plans are within 5 % of the optimum."""
+"""Maximum ratio of the cost of a path with a detour to the straight distance. Usual plans cost up to 5 % too much."""
 PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
-"""Returns a path (n, 2) to a pose on a part of the costmap, and its cost. Raises NavigationFailure."""
+"""Function that returns a path (n, 2) to a pose on a part of the costmap, and its cost. Raises NavigationFailure."""
 
 
 def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
-    """Return a straight path (n, 2), with a detour by `plan_part` around costly cells near the start.
+    """Return a straight path (n, 2), with a detour planned by `plan_part` if there are costly cells near the start.
 
-    None if such a path may cost too much.
+    Cells within `radius` m of an obstacle are costly. None if the path may cost too much.
     """
     length = start.distance(goal)
     costly = costly_distance(costmap, start, goal, radius)

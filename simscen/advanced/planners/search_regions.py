@@ -1,4 +1,4 @@
-"""Searches of the medial-axis planner, in the order in which they are tried, each wider than the one before.
+"""Searches of the medial-axis planner in the order in which they are tried, each in a wider region than the last.
 
 Sampling on the medial axis finds narrow passages that uniform samples miss (Wilmarth, Amato and Stiller 1999). On the
 axis, the distance to the nearest obstacle decreases to both sides.
@@ -22,18 +22,18 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
 BLOCK_M = 0.1
-"""Approximate size of the blocks of cells."""
+"""Approximate size of the blocks of cells in which the medial axis is determined."""
 RIDGE_OFFSET_M = 0.2
 """Distance to each side of the axis at which the clearance must be smaller."""
 NARROW_SPACING_M, AXIS_SPACING_M, OPEN_SPACING_M = 0.3, 0.8, 1.1
 """Distance between samples in narrow passages, on the rest of the axis, and elsewhere."""
 NARROW_MARGIN_M = 0.15
-"""Clearance beyond the smallest one up to which a passage is narrow: a line between two samples hardly fits there."""
+"""A passage is narrow if its clearance exceeds that of the narrowest one by less than this."""
 Mask = npt.NDArray[np.bool_]
 
 
 def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:
-    """Return centers of `free` cells (n, 2) that depend on the seed, with `density` times as many samples per meter."""
+    """Return random centers (n, 2) of `free` cells: many on the medial axis, few elsewhere; all times `density`."""
     rng = np.random.default_rng(seed)
     factor = max(1, round(BLOCK_M / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution
@@ -55,7 +55,7 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
 
 
 def _ridges(clearance: npt.NDArray[np.float32], reach: int, drop: float) -> Mask:
-    """Return the blocks whose clearance decreases by `drop` within `reach` blocks in two opposite directions."""
+    """Return the blocks whose clearance decreases by `drop` m within `reach` blocks in two opposite directions."""
     padded = np.pad(clearance, reach)
     height, width = clearance.shape
     lowered = clearance - np.float32(drop)
@@ -84,14 +84,14 @@ def _thinned(mask: Mask, spacing: float, rng: np.random.Generator) -> npt.NDArra
 DENSITIES = (1, 2, 4, 8)
 """Sample densities of successive searches, relative to the usual density."""
 CORRIDOR_SLACKS = (0.05, 0.15, 1.0)
-"""Ratio by which paths in the corridor may be longer than the shortest path over the coarse grid."""
+"""Ratios by which paths in successive corridors may be longer than the shortest path over the coarse grid."""
 COST_SLACK = 0.15
 """Ratio by which paths in the first search may cost more than the cheapest path over the coarse grid."""
 MAX_SAMPLES = 3000
-"""Maximum number of samples of the first search; those on the cheapest paths are kept. BIT* takes about ten iterations
-for each."""
+"""Maximum number of samples of the first search, because BIT* takes about ten iterations for each. Those on the
+cheapest paths are kept."""
 REACH_M = 1.8
-"""Distance up to which samples are connected if the points of the coarse path are among them."""
+"""Distance up to which samples are connected if they include the points of the coarse path."""
 FAR_REACH_M = 2.3
 """Distance up to which samples are connected otherwise."""
 AMPLE_CLEARANCE_M = 0.15
@@ -100,9 +100,9 @@ AMPLE_CLEARANCE_M = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A part of a path that BIT* searches for.
+    """A part of the path, to be found by BIT*.
 
-    It connects the given `samples` (n, 2) up to a distance of `reach` m. If they are None, BIT* draws its own samples.
+    BIT* connects the `samples` (n, 2) up to a distance of `reach` m. If they are None, it draws its own samples.
     """
 
     problem: Problem
@@ -110,14 +110,14 @@ class Leg:
     reach: float = FAR_REACH_M
 
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
-        """Return the search."""
+        """Return a search for this leg, to be started with `solve`."""
         if self.samples is None:
             return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
         return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
 
 
 def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iterator[Leg]]:
-    """Yield searches, each as its successive legs.
+    """Yield the searches, each as an iterator of the successive legs to search for.
 
     The first one samples the medial axis, and sparsely the open space, near the cheapest path over the coarse grid. If
     the medial axis has more than MAX_SAMPLES, searches in corridors follow. The last ones sample everywhere, with
@@ -135,9 +135,9 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
 
 
 def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Array:
-    """Return the samples on near-cheapest paths over the coarse grid, and the points of the cheapest path."""
+    """Return samples (n, 2): those on near-cheapest paths over the coarse grid, and points of the cheapest path."""
     informed = InformedSet(costs, ends.start, ends.goal, by_cost=True)
-    informed.narrow(COST_SLACK)
+    informed.restrict(COST_SLACK)
     chosen = samples[informed.contains_points(samples)]
     if len(chosen) > MAX_SAMPLES:
         chosen = chosen[np.argsort(informed.lengths_through(chosen), kind="stable")[:MAX_SAMPLES]]
@@ -148,18 +148,18 @@ def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Ar
 def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet, slack: float) -> Iterator[Leg]:
     """Yield the legs of a path in the corridor of near-shortest paths over the coarse grid.
 
-    A leg must be solved before the next one is taken, because the corridor is narrowed to each leg in turn.
+    A leg must be solved before the next one is taken, because the corridor is restricted to each leg in turn.
     """
     waypoints = informed.waypoints(costs.costmap) if slack < 1.0 else []
     leg_start, distance_before = ends.start, 0.0
     for waypoint, along in [*waypoints, (ends.goal, np.inf)]:
-        informed.narrow(slack, (distance_before, along))
+        informed.restrict(slack, (distance_before, along))
         yield Leg(Problem(leg_start, waypoint, informed.bounds(), _motion_within(costs.between, informed)))
         leg_start, distance_before = waypoint, along
 
 
 def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
-    """Return the cost function of motions with the value inf outside the informed set."""
+    """Return the cost function `motion`, but inf for motions outside the informed set."""
     contains = informed.contains
 
     def confined_motion(ax: float, ay: float, bx: float, by: float) -> float:
@@ -176,8 +176,8 @@ CHECKS_BEFORE_FIRST_BATCH = 4
 class _SampledValidity(StateValidity):
     """Validity check that also replaces each state that OMPL draws by the next of the samples.
 
-    OMPL's Python bindings (2.0.1) cannot give a planner a sampler of states. BIT* checks the validity of each state
-    that it has drawn before it uses the state, and continues with the moved one.
+    With OMPL's Python bindings (2.0.1), a planner cannot get a sampler of states. But BIT* checks the validity of each
+    state that it has drawn, and continues with the replaced state.
     """
 
     def __init__(self, problem: Problem, samples: Array) -> None:
@@ -186,7 +186,7 @@ class _SampledValidity(StateValidity):
         self._remaining: Iterator[list[float]] = iter(samples.tolist())
 
     def __call__(self, state: Any) -> bool:
-        """Return whether a state is valid. A state that is drawn after the last sample is not."""
+        """Replace a drawn state by the next sample, and return whether it is valid; False after the last sample."""
         if (state[0], state[1]) in self._ends:
             return super().__call__(state)
         sample = next(self._remaining, None)
@@ -197,7 +197,7 @@ class _SampledValidity(StateValidity):
 
 
 class SampledSearch(OmplSearch):
-    """One batch of BIT* on `samples` (n, 2), of which two are connected if they are at most `reach` m apart."""
+    """One batch of BIT* on `samples` (n, 2), which are connected if they are at most `reach` m apart."""
 
     def __init__(self, problem: Problem, samples: Array, reach: float, seed: int, max_iterations: int) -> None:
         all_samples = PlannerSpec(max_iterations=max_iterations, cost_threshold_ratio=0.0)
@@ -213,7 +213,7 @@ class SampledSearch(OmplSearch):
         planner.setRewireFactor(self._reach / _connection_radius(self.problem.bounds, len(self._samples) + 2))
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Return a condition that stops BIT* at its second batch, which is reduced to one sample beforehand."""
+        """Return a condition that stops BIT* at its second batch, which is reduced to one sample to save time."""
         batches, remaining = planner.numBatches, self.spec.max_iterations
 
         def should_stop() -> bool:

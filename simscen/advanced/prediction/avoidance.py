@@ -1,8 +1,8 @@
 """Avoidance of moving obstacles: compares trajectories of the robot with the predicted positions of the obstacles.
 
 As long as the controller's trajectory is safe, its command stays. Otherwise, a few hundred trajectories are compared:
-the controller's own at lower speeds, and sequences of two velocities. The cost is the risk of coming too close, and
-among safe trajectories the lack of progress. The robot therefore slows down early, passes behind obstacles, and steps
+the controller's own at lower speeds, and sequences of two velocities. The main cost is the risk of coming too close.
+Among safe trajectories, progress decides. The robot therefore slows down early, passes behind obstacles, and steps
 aside when it stands. (Trajectory rollouts as in Fox, Burgard, Thrun 1997 and, with moving obstacles, Seder and Petrović
 2007.)
 """
@@ -24,24 +24,25 @@ from simscen.stack.protocols import CostmapView, RobotModel
 MIN_DISTANCE_M = 0.25
 """Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
 DECAY_TIME_S = 1.2
-"""Time in s in which the weight of a predicted event decays by a factor of e."""
+"""Time ahead in s over which the weight of a predicted event decays by a factor of e."""
 DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
+"""Weight of a predicted event at each of TIMES."""
 APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
-"""Weights of the closest approach, of a collision, and of the mean nearness."""
+"""Weights of the closest approach to moving obstacles, of a collision with them, and of the mean nearness."""
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
 """Weight of a collision with a static obstacle, and the distance in m to keep from it."""
 PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, OTHER_COST = 1.0, 0.15, 0.08, 0.1
-"""Weights of progress, of driving backward, of a changed command, and of not using the controller's trajectory."""
+"""Weights of progress, of driving backward, of a changed command, and of another trajectory than the controller's."""
 SAFE_RISK = 0.02
-"""Risk below which the controller's command stays."""
+"""Risk (`Avoidance._risk`) up to which the controller's command stays."""
 RESUME_RISK = 0.01
-"""Risk below which the controller gets back control after avoidance."""
+"""Risk up to which the controller gets back control after avoidance; less than SAFE_RISK, as a hysteresis."""
 SPEED_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Factors on the controller's speed that are tried on its own trajectory."""
 BATCH_SIZE, ROUNDING = 64, 1e-9
-"""Number of trajectories that are evaluated together, and the tolerance for rounding of their costs."""
+"""Number of trajectories that are evaluated together, and the tolerance for rounding errors of costs."""
 MAX_ROUND_DIFFERENCE_M = 0.15
-"""Maximum difference in m of circumscribed and inscribed radius for which a robot counts as round."""
+"""Maximum difference in m of circumscribed and inscribed radius of a robot that is treated as a disc."""
 
 
 class Avoidance:
@@ -61,7 +62,7 @@ class Avoidance:
         return TrajectorySampler(self._robot, self._speed)
 
     def reset(self) -> None:
-        """Reset, because nothing moves."""
+        """Forget the last avoidance command, because nothing moves."""
         self._last = None
 
     def steer(
@@ -76,7 +77,7 @@ class Avoidance:
     ) -> Twist:
         """Return a safe command instead of `command`; the same object if it is safe.
 
-        All arguments are in one frame. `path` is the path that the robot follows; without one, it stays at `home`.
+        All arguments are in one frame. The robot follows `path`; without one, it stays near `home`, or where it is.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON_S)
         if not near.obstacles:
@@ -97,7 +98,7 @@ class Avoidance:
     def _is_surely_safe(
         self, command: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
     ) -> bool:
-        """Return True if a quick check shows that the controller's trajectory comes close to nothing."""
+        """Return True if a quick check shows that the controller's trajectory stays away from all obstacles."""
         if path is None or len(path) < 2 or command.vx == 0.0:
             return False
         position, speed, deviation = path.position_over_time(pose, twist, command, self._robot)
@@ -113,7 +114,7 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None,
     ) -> Twist:
-        """Return the first command of the trajectory with the lowest cost; the first one of several.
+        """Return the first command of the cheapest trajectory; of several, the controller's own or that first in order.
 
         The risk is only computed for trajectories that can be the best by their other costs, in order of these.
         """
@@ -151,7 +152,7 @@ class Avoidance:
         min_clearance: float,
         extra: float,
     ) -> Array:
-        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles cost within `min_clearance` m."""
+        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles count within `min_clearance` m."""
         cost = self._risk(rollouts, moving)
         progress = self._progress(rollouts.x[:, -1], rollouts.y[:, -1], pose, goal)
         cost += self._static_costs(rollouts, costmap, min_clearance) - PROGRESS_WEIGHT * progress
@@ -216,15 +217,15 @@ class Avoidance:
 
 
 ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
-"""Distance in m and angle in rad within which the robot is at its stand position."""
-LEAVE_DISTANCE_M = 0.15
-"""Distance in m from which the robot returns."""
+"""Distance in m and angle in rad within which the robot has returned to its stand position."""
+RETURN_DISTANCE_M = 0.15
+"""Distance in m from its stand position at which the robot starts to return."""
 RETURN_SPEED_RATIO, RETURN_GAIN = 0.3, 1.0
 """Maximum speed of returning relative to full speed, and gain in 1/s of the speed on the distance."""
 RETURN_TURN_RATE_RAD_S = 1.0
 """Maximum turn rate of returning."""
 MAX_BEARING_RAD = 0.4
-"""Angle in rad to the line back above which the robot turns before it drives."""
+"""Angle in rad between the heading and the way back above which the robot turns in place first."""
 
 
 class StandPosition:
@@ -244,19 +245,19 @@ class StandPosition:
         """Forget the pose, because the robot drives."""
         self._home, self._is_away = None, False
 
-    def home(self, pose: Pose2, moving: bool) -> Pose2 | None:
-        """Return the stand position, which is set when the first obstacle moves nearby; None before."""
-        if self._home is None and moving:
+    def remember(self, pose: Pose2, has_moving: bool) -> Pose2 | None:
+        """Return the stand position: the pose at which an obstacle moved for the first time; None before that."""
+        if self._home is None and has_moving:
             self._home = pose
         return self._home
 
     def return_command(self, pose: Pose2) -> Twist:
-        """Return the command to return; STOP at the stand position, and for a robot that cannot turn in place."""
+        """Return the command to drive back; STOP at the stand position, and for a robot that cannot turn in place."""
         home = self._home
         if home is None or not self._can_turn_in_place:
             return STOP
         distance = home.distance(pose)
-        self._is_away = distance > (ARRIVED_M if self._is_away else LEAVE_DISTANCE_M)
+        self._is_away = distance > (ARRIVED_M if self._is_away else RETURN_DISTANCE_M)
         if not self._is_away:
             turn = wrap(home.yaw - pose.yaw)
             return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP

@@ -1,4 +1,7 @@
-"""Clusters of a scan: runs of neighboring beams that hit the same obstacle, and the cylinder that fits them."""
+"""Clusters of a scan: neighboring beams that hit the same obstacle, and the cylinder that fits them.
+
+Hits that are close together form a segment. A segment is divided into clusters where two adjacent obstacles meet.
+"""
 
 import cmath
 import math
@@ -19,8 +22,8 @@ MIN_RISE_M = 0.1
 """Two adjacent obstacles are separated if the range rises by more than this in m between them."""
 BOTH_EDGES = 2
 """Number of visible edges of a completely visible obstacle."""
-RUN_SEPARATION_M = 1e3
-"""Distance in m added from run to run, to process all runs in one array without mixing them. Larger than any range."""
+SEGMENT_OFFSET_M = 1e3
+"""Offset in m between segments, to process all of them in one array without mixing them. Larger than any range."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
 """Largest half of the angle that a cluster covers, in rad, for computing its radius, which is infinite at 90°."""
 MIN_HITS = 3
@@ -28,7 +31,7 @@ MIN_HITS = 3
 ROUNDING_M = 1e-6
 """Tolerance in m for rounding."""
 MAX_ITERATIONS, CONVERGED_STEP_M = 4, 3e-3
-"""Maximum number of Gauss-Newton iterations, and the step in m below which they end."""
+"""Maximum number of Gauss-Newton iterations of `fit_circle`, and the step in m below which they end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -49,10 +52,10 @@ class Hits:
     points: Points
     gap_ratio: float
 
-    def may_share_run(self, indices: list[int], count: int) -> bool:
-        """Return False if no run can contain `count` of the hits with these indices, which must ascend.
+    def may_share_segment(self, indices: list[int], count: int) -> bool:
+        """Return False if no segment can contain `count` of the hits with these indices, which must ascend.
 
-        This is a fast check before the runs are computed.
+        This is a fast check before the segments are computed.
         """
         linked = 1
         for one, other in pairwise(indices):
@@ -62,24 +65,24 @@ class Hits:
         return False
 
     def _may_link_next(self, hit: int) -> bool:
-        """Return whether this hit is close enough to the next one to be in the same run. Uses scalars for speed."""
+        """Return whether this hit is close enough to the next one to be in the same segment. Uses scalars for speed."""
         point, next_point = self.points.item(hit), self.points.item(hit + 1)
         near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
         return abs(next_point - point) <= max(self.gap_ratio * near, MAX_GAP_M) + ROUNDING_M
 
 
 @fast_dataclass(eq=False)
-class Runs:
-    """Hits divided into runs of neighbors that are close together. Run k contains the hits `first[k]` … `last[k]`."""
+class Segments:
+    """Hits divided into segments of neighbors close together. Segment k contains the hits `first[k]` … `last[k]`."""
 
     hits: Hits
     first: Indices
     last: Indices
 
-    def share_run(self, mask: Mask, count: int) -> bool:
-        """Return whether at least `count` (more than one) of the hits in the mask (m,) are in one run."""
-        runs = self.first.searchsorted(mask.nonzero()[0], side="right")
-        return bool((runs[count - 1 :] == runs[: 1 - count]).any())
+    def share_segment(self, mask: Mask, count: int) -> bool:
+        """Return whether at least `count` (more than one) of the hits in the mask (m,) are in one segment."""
+        numbers = self.first.searchsorted(mask.nonzero()[0], side="right")
+        return bool((numbers[count - 1 :] == numbers[: 1 - count]).any())
 
 
 class Cluster(NamedTuple):
@@ -110,27 +113,27 @@ def find_valid_hits(ranges: Array, points: Points, step: float, min_range: float
     return Hits(beams, ranges[beams], points[beams], MAX_GAP_BEAMS * abs(step))
 
 
-def divide_into_runs(hits: Hits) -> Runs:
-    """Divide hits into runs. The first and the last run of a full circle are not joined."""
+def divide_into_segments(hits: Hits) -> Segments:
+    """Divide hits into segments. The first and the last segment of a full circle are not joined."""
     beams, ranges, points = hits.beams, hits.ranges, hits.points
     gap = np.minimum(ranges[1:], ranges[:-1])
     gap *= hits.gap_ratio
     is_gap = np.abs(points[1:] - points[:-1]) > np.maximum(gap, MAX_GAP_M, out=gap)
     if len(beams) and beams[-1] - beams[0] >= len(beams):
         is_gap |= beams[1:] - beams[:-1] > MAX_MISSED_BEAMS + 1
-    return Runs(hits, *_runs_between(is_gap.nonzero()[0], len(ranges)))
+    return Segments(hits, *_segments_between(is_gap.nonzero()[0], len(ranges)))
 
 
-def find_clusters(hit_runs: Runs, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
-    """Return the clusters with a radius up to `max_radius` in a scan with these runs and ranges.
+def find_clusters(segments: Segments, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
+    """Return the clusters with a radius up to `max_radius` in m, of a scan with these segments and ranges (n,).
 
     The first beam points along `start`; beams are `step` rad apart.
     """
     spacing = abs(step)
-    hits = hit_runs.hits
+    hits = segments.hits
     if len(hits.beams) < MIN_HITS:
         return []
-    first, last = _split_runs(hits.ranges, hit_runs.first, hit_runs.last)
+    first, last = _split_segments(hits.ranges, segments.first, segments.last)
     nearest = np.minimum.reduceat(hits.ranges, first).tolist()
     is_full_circle = abs(len(ranges) * spacing - 2 * math.pi) < spacing
     found: list[Cluster] = []
@@ -159,13 +162,13 @@ def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> 
 
 
 def count_marked_hits(found: list[Cluster], mask: Mask) -> list[tuple[int, int]]:
-    """Return for each cluster how many of its hits are marked in `mask` (m,), and how many it has."""
+    """Return for each cluster how many of its hits are True in `mask` (m,), and how many hits it has."""
     marks = mask.tobytes()
     return [(marks.count(1, first, last + 1), last + 1 - first) for first, last, *_ in found]
 
 
-def _runs_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
-    """Return the first and last indices of the runs of `count` hits that are separated after `breaks` (k,)."""
+def _segments_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
+    """Return the first and last hits of the segments of `count` hits, which end at `breaks` (k,) and at the end."""
     if not count:
         return breaks, breaks
     first, last = np.zeros(len(breaks) + 1, np.int64), np.empty(len(breaks) + 1, np.int64)
@@ -174,15 +177,15 @@ def _runs_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
     return first, last
 
 
-def _split_runs(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
-    """Return the first and last hits of runs, divided where two adjacent obstacles meet.
+def _split_segments(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
+    """Return the first and last hits of clusters: segments, divided where two adjacent obstacles meet.
 
     Along one convex obstacle, the range falls to its closest point and then rises. A local maximum of the range
     therefore separates two obstacles.
     """
-    # All runs are processed at once. An offset that increases from run to run keeps them independent.
+    # All segments are processed at once. An offset that increases from segment to segment keeps them independent.
     count = last - first + 1
-    steps = np.repeat(RUN_SEPARATION_M * np.arange(len(first)), count)
+    steps = np.repeat(SEGMENT_OFFSET_M * np.arange(len(first)), count)
     after = ranges + steps
     after -= np.minimum.accumulate(after[::-1])[::-1]
     before = np.subtract(ranges, steps, out=steps)
@@ -191,12 +194,12 @@ def _split_runs(ranges: Array, first: Indices, last: Indices) -> tuple[list[int]
     begin, end = first.tolist(), last.tolist()
     for number in ((rise > MIN_RISE_M) & (count >= 2 * MIN_HITS)).nonzero()[0].tolist()[::-1]:
         place = slice(number, number + 1)
-        begin[place], end[place] = zip(*_split_run(ranges, begin[number], end[number]), strict=True)
+        begin[place], end[place] = zip(*_split_segment(ranges, begin[number], end[number]), strict=True)
     return begin, end
 
 
-def _split_run(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the parts of one run, in order."""
+def _split_segment(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
+    """Return the parts of one segment, in order."""
     pending = [(begin, end)]
     parts: list[tuple[int, int]] = []
     while pending:

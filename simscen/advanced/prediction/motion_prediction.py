@@ -1,6 +1,6 @@
 """Motion prediction: tracks moving obstacles in the scans of each lidar, and avoids them.
 
-Scans are compared in a frame of dead reckoning with the gyroscope's heading. With the heading of skidding wheels,
+Scans are compared in a frame of wheel odometry with the gyroscope's heading. With the heading of skidding wheels,
 everything would seem to rotate around the robot and to move.
 """
 
@@ -28,8 +28,8 @@ MAX_PENDING = 10_000
 """Maximum number of readings that wait for integration."""
 
 
-class DeadReckoning:
-    """Integrates wheel odometry along the gyroscope's heading, only when a pose is requested."""
+class GyroOdometry:
+    """Integrates wheel odometry along the gyroscope's heading. To save time, only when a pose is requested."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -40,7 +40,7 @@ class DeadReckoning:
         self._poses = deque([(-1, 0.0, 0.0, 0.0)])
         self._now = _pose(self._poses[-1])
         self.add: Callable[[Odometry | Imu], None] = self._pending.append
-        """Append a reading; called so often that it does nothing else."""
+        """Add a reading. It is called so often that it does nothing else."""
 
     @property
     def now(self) -> Pose2:
@@ -49,7 +49,7 @@ class DeadReckoning:
         return self._now
 
     def at(self, tick: int) -> Pose2:
-        """Return the latest pose up to a tick, or the oldest one."""
+        """Return the latest pose up to a tick; if all are later, the oldest pose."""
         self._integrate()
         poses = self._poses
         if poses[-1][0] <= tick:
@@ -98,10 +98,10 @@ usual speed, at which the robot can still stop for obstacles."""
 
 
 class MotionPrediction:
-    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of DeadReckoning.
+    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of GyroOdometry.
 
-    While the robot drives, `steer` changes its commands. While it stands, `stand` lets it step aside and return to its
-    position, unless `hold` was called. `on_drive` ends both.
+    While the robot drives, `steer` changes its commands. While it stands, `stand` lets it step aside and drive back to
+    its position, unless `hold` was called. `on_drive` ends standing.
     """
 
     def __init__(
@@ -115,24 +115,24 @@ class MotionPrediction:
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
         self.is_standing = False
         """Whether the robot has received a command to stand since it last drove."""
-        self._dead_reckoning = DeadReckoning(tick_rate)
+        self._odometry = GyroOdometry(tick_rate)
         self._no_obstacles = no_moving_obstacles(spec.acceleration)
         self._active: list[Tracker] = []  # trackers with moving obstacles
         self._predicted: tuple[int, MovingObstacles] | None = None
         self._transformed: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
         self._plan: Path | None = None
         self._followed: FollowedPath | None = None
-        self.add_reading = self._dead_reckoning.add
+        self.add_reading = self._odometry.add
         """Process an odometry or IMU reading."""
         self.is_idle = not self._trackers
         """Whether no obstacle moves and the warm-up is over, so that no command is changed."""
 
     def on_scan(self, scan: Scan) -> None:
-        """Process a scan."""
+        """Update the tracks of the lidar that took a scan."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None:
             return
-        tracker.on_scan(scan, self._dead_reckoning.at(scan.tick))
+        tracker.on_scan(scan, self._odometry.at(scan.tick))
         self._predicted = None
         if self.is_idle and not tracker.has_moving:
             return
@@ -152,7 +152,7 @@ class MotionPrediction:
         return ScanWithMovingHits(**vars(scan), moving=tracker.moving_hits)
 
     def moving_obstacles(self, tick: int) -> MovingObstacles:
-        """Return the moving obstacles at a tick in the frame of DeadReckoning, from all lidars."""
+        """Return the moving obstacles at a tick in the frame of GyroOdometry, from all lidars."""
         if not self._active:
             return self._no_obstacles
         if self._predicted is None or self._predicted[0] != tick:
@@ -170,7 +170,7 @@ class MotionPrediction:
         moving = self.moving_obstacles(tick)
         if not moving.obstacles:
             return moving
-        now, cached = self._dead_reckoning.now, self._transformed
+        now, cached = self._odometry.now, self._transformed
         if cached is None or cached[0] is not moving or cached[1] is not now or cached[2] is not pose:
             self._transformed = cached = moving, now, pose, moving.in_frame(now.compose(pose.inverse()))
         return cached[3]
@@ -178,7 +178,7 @@ class MotionPrediction:
     def steer(
         self, tick: int, command: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
     ) -> Twist:
-        """Return a safe command instead of `command`; `pose`, `costmap`, and `plan` are in one frame."""
+        """Return a safe command instead of `command`. `pose`, `costmap`, and `plan` are in the same frame."""
         if not self._active:
             return command if self.is_idle else _limit_speed(command)
         if plan is not self._plan:
@@ -197,11 +197,11 @@ class MotionPrediction:
         self._must_stay = self.is_standing = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command for a standing robot: step aside for obstacles, and return afterward."""
+        """Return the command for a standing robot, which steps aside for obstacles and then drives back."""
         self.is_standing = True
         if self._must_stay:
             return STOP
-        home = self._stand_position.home(pose, bool(self._active))
+        home = self._stand_position.remember(pose, bool(self._active))
         if home is None:
             return STOP
         command = self._stand_position.return_command(pose)

@@ -1,4 +1,4 @@
-"""Candidate trajectories of the robot for the next seconds."""
+"""Candidate trajectories of the robot for the next seconds: along its path, or by sequences of two velocities."""
 
 import math
 from bisect import bisect_right
@@ -15,7 +15,7 @@ from simscen.stack.protocols import RobotModel
 STEP_S, HORIZON_S = 0.1, 3.0
 """Time step and horizon in s."""
 FIRST_DURATIONS_S = (0.5, 1.2)
-"""Durations in s of the first velocity."""
+"""Durations in s of the first velocity of a sequence."""
 SPEED_RATIOS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 """First speeds relative to full speed."""
 TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
@@ -28,11 +28,12 @@ RETURN_TIME_S = 0.7
 """Approximate time constant in s with which a controller returns to its path."""
 
 TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * STEP_S
+"""Times in s of the points of a trajectory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories (n, times) of the robot: positions and headings at TIMES, speeds, and first commands (n, 2)."""
+    """Trajectories (n, times): positions, headings, and speeds at TIMES; and their first commands (n, 2) vx, wz."""
 
     x: Array
     y: Array
@@ -42,7 +43,7 @@ class Rollouts:
 
 
 class TrajectorySampler:
-    """All candidate sequences of two velocities, reached with the accelerations of the robot."""
+    """Computes trajectories for all sequences of two velocities, reached with the accelerations of the robot."""
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
@@ -56,8 +57,7 @@ class TrajectorySampler:
                 for duration in FIRST_DURATIONS_S:
                     for then in SECOND_SPEED_RATIOS:
                         for back in (0.0, -1.0) if wz else (0.0,):
-                            after = then * full_speed if then >= 0 else max(then * full_speed, -robot.max_reverse)
-                            rows.append((first, wz, duration, after, back * wz))
+                            rows.append((first, wz, duration, then * full_speed, back * wz))
         sequences = np.array(sorted(set(rows)))
         if robot.turning_radius > 0.0:
             is_possible = (np.abs(sequences[:, 0]) >= np.abs(sequences[:, 1]) * robot.turning_radius) & (
@@ -65,12 +65,12 @@ class TrajectorySampler:
             )
             sequences = sequences[is_possible]
         self.commands: Array = sequences[:, :2]
-        """First command (n, 2) of each trajectory."""
+        """First command (n, 2) vx, wz of each trajectory."""
         self._speeds, self._speed = np.unique(sequences[:, (0, 2, 3)], axis=0, return_inverse=True)
         self._turns, self._turn = np.unique(sequences[:, (1, 2, 4)], axis=0, return_inverse=True)
 
     def sample(self, pose: Pose2, twist: Twist) -> "TrajectoryFan":
-        """Return all trajectories from a pose and velocity."""
+        """Return all trajectories that start at this pose and velocity."""
         robot, speeds, turns = self._robot, self._speeds, self._turns
         first, duration, then = (speeds[:, k : k + 1] for k in range(3))
         vx = _ramp(twist.vx, first, duration, then, robot.linear_acceleration, robot.linear_deceleration)
@@ -115,7 +115,7 @@ class TrajectoryFan:
 
 
 def _ramp(now: float, first: Array, duration: Array, then: Array, acceleration: float, deceleration: float) -> Array:
-    """Return velocities (n, times) that ramp from `now` to `first`, and after `duration` seconds to `then`."""
+    """Return velocities (n, times) that change from `now` to `first` (n, 1), and after `duration` seconds to `then`."""
     up = np.where(np.abs(first) >= abs(now), acceleration, deceleration)
     before = now + np.clip(first - now, -up * np.minimum(TIMES, duration), up * np.minimum(TIMES, duration))
     change = np.where(np.abs(then) >= np.abs(before), acceleration, deceleration) * np.maximum(TIMES - duration, 0.0)
@@ -161,9 +161,9 @@ class FollowedPath:
         robot: RobotModel,
         with_headings: bool,
     ) -> Rollouts:
-        """Return the trajectories of a controller that follows the path from here, at fractions of the commanded speed.
+        """Return the trajectories of a controller that follows the path, at fractions of the commanded speed.
 
-        A robot that first turns in place counts as standing. Headings are 0 unless `with_headings`.
+        A robot that first turns in place counts as standing. Headings are 0 unless `with_headings`, to save time.
         """
         nearest, along = self.nearest(pose), self._along
         scale = np.array(fractions)[:, None]
@@ -183,7 +183,7 @@ class FollowedPath:
     ) -> tuple[Callable[[float], complex], float, float]:
         """Return the position (x + iy) at the commanded speed as a continuous function of the time in s.
 
-        Also return its maximum speed in m/s, and its maximum deviation in m from `rollouts`, which integrates in steps.
+        Also return its maximum speed in m/s, and its maximum distance in m from `rollouts`, which integrates in steps.
         """
         nearest, now, then = self.nearest(pose), twist.vx, command.vx
         rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration
@@ -200,7 +200,7 @@ class FollowedPath:
         return position, max(abs(now), abs(then)) * factor, 0.5 * STEP_S * abs(then - now) * factor
 
     def _at(self, length: float) -> complex:
-        """Return the point at a length along the path."""
+        """Return the point at a length in m along the path."""
         lengths, points = self._lengths, self._points
         after = min(max(bisect_right(lengths, length), 1), len(lengths) - 1)
         before, segment = lengths[after - 1], lengths[after] - lengths[after - 1]

@@ -1,8 +1,8 @@
 """Tracking of moving obstacles in the scans of one lidar.
 
-A cluster that appears in formerly free space starts a track. A later cluster near the predicted position updates it. A
-track with a significant speed over some updates counts as moving. A track without updates ends: soon if its position is
-visible, later if it is hidden.
+A cluster that appears in formerly free space starts a track. Later clusters near the predicted position update the
+track. A track with a significant speed over some updates counts as moving. A track without updates ends: soon if its
+position is visible, later if it is hidden.
 """
 
 import math
@@ -15,9 +15,9 @@ from simscen.advanced.prediction.clusters import (
     Hits,
     Mask,
     Points,
-    Runs,
+    Segments,
     count_marked_hits,
-    divide_into_runs,
+    divide_into_segments,
     find_clusters,
     find_valid_hits,
     fit_circle,
@@ -35,7 +35,7 @@ CENTER_STD_M, CENTER_STD_PER_M, HIDDEN_STD_M = 0.02, 0.004, 0.10
 INITIAL_STD_M = 0.1
 """Additional standard deviation in m of the first measurement of a track."""
 GATE_M, GATE_SIGMAS = 0.25, 3.0
-"""Gate of the association: a distance in m plus a number of standard deviations."""
+"""Maximum distance from a track to a cluster that updates it: a part in m plus a number of standard deviations."""
 MIN_START_RADIUS_M = 0.15
 """Minimum radius in m of a cluster that starts a track without having appeared in free space."""
 MIN_HIDDEN_RADIUS_M = 0.3
@@ -48,7 +48,8 @@ RADIUS_GAIN = 0.3
 class ScanClusters:
     """The clusters of a scan with their hits `points` (m,), measured by a lidar at `lidar` in the odom frame.
 
-    `appeared` marks clusters where earlier scans saw free space, `was_occupied` those where they hit something.
+    For each cluster, `appeared` states whether an earlier scan saw free space there, and `was_occupied` whether it hit
+    something there.
     """
 
     tick: int
@@ -59,12 +60,12 @@ class ScanClusters:
     was_occupied: list[bool]
 
     def is_static(self, index: int) -> bool:
-        """Return whether an obstacle was at the position of a cluster before."""
+        """Return whether an earlier scan saw the same obstacle at the position of a cluster."""
         return self.was_occupied[index] and not self.appeared[index]
 
 
 def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
-    """Update each track with the nearest cluster, nearest pairs first. Return the indices of the clusters used."""
+    """Update each track with a cluster nearby, nearest pairs first. Return the indices of the clusters used."""
     clusters, lidar = current.clusters, current.lidar
     if not tracks or not clusters:
         return set()
@@ -91,7 +92,7 @@ def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
 
 
 def _is_last_cluster(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
-    """Return whether a static cluster is the one that the track was last updated with."""
+    """Return whether a static cluster is where the track was updated last, so that it is the tracked obstacle."""
     return abs(lidar.to_lidar(track.updates[-1].position) - center) <= GATE_M + hidden
 
 
@@ -113,7 +114,7 @@ def _update(assigned: list[tuple[Track, int]], current: ScanClusters) -> None:
 
 
 def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> None:
-    """Start tracks for unused clusters that are in formerly free space."""
+    """Start tracks for clusters not in `used` that are in formerly free space, or large while something moves."""
     # While something moves, it may have hidden the free space in which another obstacle appears.
     min_radius = MIN_START_RADIUS_M if any(track.is_moving for track in tracks) else math.inf
     for number, (_, _, center, radius, edges) in enumerate(current.clusters):
@@ -131,17 +132,17 @@ def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> 
 
 
 CHECKED_BEAMS = 120
-"""Number of beams that are checked while nothing moves; if one of them hits something new, all are."""
+"""Number of beams that are checked while nothing moves; if one of them hits something new, all beams are."""
 MIN_NEW_SHARE, MIN_NEW_HITS = 0.3, 3
 """Minimum share and number of new hits of a cluster that starts a track."""
 STATIC_SHARE = 0.5
-"""Share of hits that an earlier scan also has, above which a cluster is static."""
+"""A cluster is static if an earlier scan also has more than this share of its hits."""
 MIN_RADIUS_M = 0.25
 """Minimum radius in m of a moving obstacle. The lidar may see only the mast of a robot or the leg of a person."""
 
 
 class Tracker:
-    """Tracks of one lidar in the odom frame."""
+    """Tracks moving obstacles in the scans of one lidar, in the odom frame."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         """Take the parameters and the tick rate in Hz."""
@@ -217,7 +218,7 @@ class Tracker:
             self._update_moving(moving, current)
 
     def _compare_clusters(self, current: CurrentScan) -> ScanClusters | None:
-        """Compare the clusters of the scan with an earlier one. Return None if there is no track and none starts."""
+        """Compare the clusters of a scan with an earlier scan; None if there is no track and none can start."""
         scan, earlier, tracks = current.scan, current.earlier, self._tracks
         hits = find_valid_hits(scan.ranges, current.ends, scan.angle_increment, scan.range_min, self._max_range(scan))
         comparison = (
@@ -226,11 +227,11 @@ class Tracker:
         free = None if comparison is None else comparison.was_free()
         if not tracks and (free is None or not self._may_start_track(hits, free)):
             return None
-        hit_runs = divide_into_runs(hits)
+        segments = divide_into_segments(hits)
         new_hits = None if comparison is None or free is None else comparison.has_appeared(free)
-        if not tracks and (new_hits is None or not self._starts_track(hit_runs, new_hits)):
+        if not tracks and (new_hits is None or not self._starts_track(segments, new_hits)):
             return None
-        found = find_clusters(hit_runs, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
+        found = find_clusters(segments, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         appeared = was_occupied = [False] * len(found)
         if comparison is not None and new_hits is not None and found:
             counts = count_marked_hits(found, new_hits)
@@ -244,15 +245,15 @@ class Tracker:
         """Return whether enough hits in formerly free space may belong to one obstacle."""
         indices = free.nonzero()[0].tolist()
         self._had_new_hits = len(indices) > 0
-        return hits.may_share_run(indices, MIN_NEW_HITS)
+        return hits.may_share_segment(indices, MIN_NEW_HITS)
 
-    def _starts_track(self, hit_runs: Runs, new_hits: Mask) -> bool:
-        """Return whether enough hits of a run are new, including one of the checked beams."""
-        checked = hit_runs.hits.beams[new_hits] % self._stride == 0
-        return hit_runs.share_run(new_hits, MIN_NEW_HITS) and bool(checked.any())
+    def _starts_track(self, segments: Segments, new_hits: Mask) -> bool:
+        """Return whether enough hits of a segment are new, including one of the checked beams."""
+        checked = segments.hits.beams[new_hits] % self._stride == 0
+        return segments.share_segment(new_hits, MIN_NEW_HITS) and bool(checked.any())
 
     def _update_moving(self, moving: list[Track], current: CurrentScan) -> None:
-        """Update the moving obstacles, and the beams that hit them."""
+        """Update `moving` and `moving_hits`."""
         scan, ends, lidar = current.scan, current.ends, current.lidar
         obstacles = [
             MovingObstacle(

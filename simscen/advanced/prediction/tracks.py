@@ -1,4 +1,4 @@
-"""Track of a moving obstacle: a Kalman filter with a constant-velocity model.
+"""Tracks of obstacles, each a Kalman filter with a constant-velocity model, and the decision which tracks move or end.
 
 The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). The results are
 those of filterpy's KalmanFilter with Q_discrete_white_noise. Because noise and measurements are isotropic, position and
@@ -45,7 +45,7 @@ class ConstantVelocityFilter:
 
 MAX_UPDATES = 10
 """Number of last updates that a track stores."""
-INITIAL_SPEED_STD = 1.5
+INITIAL_SPEED_STD_M_S = 1.5
 """Standard deviation in m/s of the initial velocity."""
 
 
@@ -67,7 +67,7 @@ class Update(NamedTuple):
 
 @dataclass(slots=True)
 class Track(ConstantVelocityFilter):
-    """State of a track with its `radius` in m, its first position, and its last updates.
+    """Tracked obstacle with its `radius` in m, its first position, and its last updates.
 
     `last_fast_tick` is the last tick at which it was faster than the minimum speed of moving obstacles.
     """
@@ -77,18 +77,18 @@ class Track(ConstantVelocityFilter):
     last_fast_tick: int
     updates: deque[Update] = field(default_factory=lambda: deque(maxlen=MAX_UPDATES))
     is_moving: bool = False
-    """Whether it is moving now."""
+    """Whether the obstacle is moving now."""
     has_moved: bool = False
-    """Whether it has been moving at any time."""
+    """Whether the obstacle has been moving at any time."""
     updates_outside_free_space: int = 0
     """Number of consecutive updates, up to the newest, that were not in formerly free space."""
     static_updates: int = 0
-    """Number of consecutive updates, up to the newest, only at positions where something had been hit before."""
+    """Number of consecutive updates, up to the newest, at positions where an earlier scan hit something as well."""
 
     @classmethod
     def start(cls, tick: int, position: complex, std: float, radius: float) -> "Track":
         """Start a track at a position with a standard deviation in m, and with unknown velocity."""
-        return cls(position, 0j, std * std, 0.0, INITIAL_SPEED_STD**2, radius, position, tick)
+        return cls(position, 0j, std * std, 0.0, INITIAL_SPEED_STD_M_S**2, radius, position, tick)
 
     @property
     def last_update_tick(self) -> int:
@@ -96,7 +96,7 @@ class Track(ConstantVelocityFilter):
         return self.updates[-1].tick
 
     def record_update(self, tick: int, appeared: bool, was_occupied: bool, edges: int, std: float) -> None:
-        """Record an update with the standard deviation in m of the position."""
+        """Record an update at the current position, with its standard deviation in m."""
         self.updates.append(Update(tick, self.position, std, appeared, was_occupied, edges))
         self.updates_outside_free_space = 0 if appeared else self.updates_outside_free_space + 1
         self.static_updates = self.static_updates + 1 if was_occupied and not appeared else 0
@@ -126,7 +126,7 @@ UNSEEN_STANDING_TIMEOUT_S = 0.8
 """Time in s without a hit after which a track ends that is not moving."""
 MAX_POSITION_STD_M = 1.2
 """Standard deviation in m of the position above which a track ends."""
-MAX_SPEED = 4.0
+MAX_SPEED_M_S = 4.0
 """Speed in m/s above which a track is wrong, because it has changed from one obstacle to another."""
 NEARBY_MIN_VISIBLE_UPDATES = 5
 """While another obstacle moves: minimum number of updates with a completely visible cluster before a track moves."""
@@ -153,7 +153,7 @@ MOVED_TIMEOUT_S = 10.0
 
 
 class TrackLifecycle:
-    """Decides about the state of tracks after each scan."""
+    """Decides after each scan which tracks are moving, and which have ended."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         """Take the parameters and the tick rate in Hz."""
@@ -179,7 +179,7 @@ class TrackLifecycle:
     def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
         """Return whether a track has ended; `sees_past(track)` returns whether the lidar sees past its position."""
         unseen_s = (tick - track.last_update_tick) / self._rate
-        if abs(track.velocity) >= MAX_SPEED or track.position_std > MAX_POSITION_STD_M:
+        if abs(track.velocity) >= MAX_SPEED_M_S or track.position_std > MAX_POSITION_STD_M:
             return True
         if track.is_moving:
             return unseen_s > VISIBLE_TIMEOUT_S and (unseen_s > HIDDEN_TIMEOUT_S or sees_past(track))

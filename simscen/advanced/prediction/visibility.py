@@ -2,7 +2,7 @@
 
 If an earlier beam passed through a point where an obstacle is now, the obstacle has moved there since. No beam passed
 through parts of a wall that come into view, or through the edges of hidden obstacles. Therefore static obstacles do not
-seem to move when the robot moves. The drift of odometry within this time is less than the margin.
+seem to move when the robot moves. The drift of odometry between both scans is less than MARGIN_M.
 """
 
 import cmath
@@ -26,13 +26,13 @@ SLIP_RATIOS = (0.05, 0.1, 0.15)
 """Assumed wheel slip between two scans, as shares of the distance. A new obstacle must be new for each of them;
 otherwise, posts next to a fast robot seem to jump to the next post."""
 REMAINING_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
-"""Remaining share of the distance."""
+"""Shares of the measured distance that the robot has really driven, for each of SLIP_RATIOS."""
 PREFERRED_AGE_S, MIN_AGE_S = 0.9, 0.2
 """Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by about the margin in 0.9 s."""
 MIN_INTERVAL_S = 0.19
 """Minimum time in s between two scans that are stored."""
 MIN_BEAMS = 3
-"""Minimum number of beams of a scan."""
+"""Minimum number of beams of a scan that is stored."""
 HEADING_ERROR_RAD = 0.02
 """Angle in rad to both sides of a point within which earlier beams must have passed too, for errors of the heading."""
 SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
@@ -68,18 +68,18 @@ class ScanGeometry:
 
     @cached_property
     def padding(self) -> int:
-        """Number of beams added at each end, so that each direction has a beam."""
+        """Number of beams added at each end, so that there is a beam in each direction."""
         missing = 0 if self.is_full_circle else max(0, math.ceil(math.pi / self.increment - self.count / 2))
         return self.neighbors + 2 + missing
 
     @cached_property
     def center_direction(self) -> float:
-        """Direction in rad of the center."""
+        """Direction in rad of the center of the field of view, in the lidar frame."""
         return self.start + (self.count - 1) / 2 * self.increment
 
     @cached_property
     def center_index(self) -> float:
-        """Index of the center in `free_distances`."""
+        """Index of the center of the field of view in `free_distances`."""
         return self.padding - self.neighbors + (self.count - 1) / 2
 
     def lengths(self, scan: Scan) -> Array:
@@ -93,7 +93,7 @@ class ScanGeometry:
         return lengths
 
     def free_distances(self, lengths: Array) -> Array:
-        """Return the distance in each direction up to which space was surely free.
+        """Return the distance in each direction up to which space was surely free, from `lengths` of a scan.
 
         The array is shorter than `lengths` by `neighbors` at each end.
         """
@@ -141,7 +141,7 @@ class EarlierScan:
         return beam.astype(np.int64), np.abs(points)
 
     def passed_beyond(self, beam: Indices, distance: Array) -> Mask:
-        """Return whether beams (…,) passed beyond a distance."""
+        """Return which beams (…,) passed beyond the distances (…,)."""
         return np.asarray(self.free_distances.take(beam) > distance)
 
 
@@ -164,7 +164,7 @@ class BeamComparison:
         return self.earlier.passed_beyond(self.beam, self.distance)
 
     def has_appeared(self, free: Mask) -> Mask:
-        """Return which of the free points were free for each of the assumed slips."""
+        """Return which of the points, of those in the mask `free` (n,), were free for each of the assumed slips."""
         earlier, indices = self.earlier, free.nonzero()[0]
         has_appeared: Mask = free.copy()
         if len(indices):
@@ -182,7 +182,7 @@ class BeamComparison:
 
 
 class FreeSpaceMemory:
-    """Recent scans of one lidar."""
+    """Recent scans of one lidar, to compare later scans with."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -204,7 +204,7 @@ class FreeSpaceMemory:
         self._scans.append(EarlierScan(scan.tick, lidar, geometry, lengths, geometry.free_distances(lengths)))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
-        """Return the scan that is about PREFERRED_AGE_S old, or None if there is none older than MIN_AGE_S."""
+        """Return the scan that is about PREFERRED_AGE_S old at a tick; None if none is at least MIN_AGE_S old."""
         scans, latest = self._scans, tick - self._preferred_age
         while len(scans) > 1 and scans[1].tick <= latest:
             scans.popleft()
@@ -222,7 +222,7 @@ class LidarPose(NamedTuple):
 
     @classmethod
     def of(cls, pose: Pose2) -> "LidarPose":
-        """Return the lidar pose for a pose of the plane."""
+        """Return the same pose with complex numbers."""
         return cls(complex(pose.x, pose.y), cmath.rect(1.0, pose.yaw))
 
     def to_parent(self, points: PointOrPoints) -> PointOrPoints:

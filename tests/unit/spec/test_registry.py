@@ -28,7 +28,7 @@ def test_shipped_and_installed_types_are_loaded_the_same_way(packages, calm_modu
         assert entry is not None
         assert entry.load().__name__ == wanted
     assert find("criterion", "clam") is None
-    assert [find("criterion", name).shipped for name in ("calm", "speed")] == [False, True]
+    assert [find("criterion", name).is_shipped for name in ("calm", "speed")] == [False, True]
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS.keys() - {"metric"}))  # what simscen measures has no parameters
@@ -79,7 +79,7 @@ def test_name_added_by_two_packages_is_unusable(packages, calm_module) -> None:
 
 def test_packages_cannot_redefine_shipped_names(packages, calm_module) -> None:
     packages("calm", "1.0", {"criterion": {"speed": "calm:Calm"}}, calm=calm_module)
-    assert find("criterion", "speed").shipped
+    assert find("criterion", "speed").is_shipped
     assert [entry.name for entry in entries("criterion")].count("speed") == 1
 
 

@@ -40,7 +40,7 @@ def corrections(
         c, s = np.cos(truth.yaw), np.sin(truth.yaw)
         wrong = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1))) @ off
         x, y, yaw = (np.array(truth) + wrong).tolist()
-        scatter.drive(start.between(truth), MATCHED)
+        scatter.propagate_poses(start.between(truth), MATCHED)
         yield wrong, scatter.estimate(Pose2(x, y, yaw), particles, misfit)
 
 
@@ -69,7 +69,7 @@ def test_common_errors_of_all_poses_are_detected_by_beam_residuals() -> None:
         for k in range(2 * WINDOW_SIZE):
             base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < WINDOW_SIZE
             x = base.x + (0.05 * float(rng.standard_normal()) if learning else 0.1)
-            scatter.drive(base, MATCHED)
+            scatter.propagate_poses(base, MATCHED)
             covariance = scatter.estimate(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
         return float(np.sqrt(covariance[0, 0]))
 
@@ -100,7 +100,7 @@ def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
         )
         for k in range(2 * WINDOW_SIZE):
             base = base.compose(Pose2(0.25 + 0.05 * float(rng.standard_normal()), 0.0, 0.0))
-            scatter.drive(base, doubt)
+            scatter.propagate_poses(base, doubt)
             covariance = scatter.estimate(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
         stds.append(float(np.sqrt(covariance[0, 0])))
     assert stds[1] < stds[0] / 3
@@ -108,7 +108,7 @@ def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
 
 def test_the_first_correction_has_a_covariance_too() -> None:
     scatter = CovarianceEstimator()
-    scatter.drive(Pose2(0.0, 0.0, 0.0), None)
+    scatter.propagate_poses(Pose2(0.0, 0.0, 0.0), None)
     covariance = scatter.estimate(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
 
@@ -121,7 +121,7 @@ def test_covariance_does_not_depend_on_the_scan_frame(turn: float) -> None:
     for from_frame in (Pose2(0.0, 0.0, 0.0), frame):
         scatter, covariance = CovarianceEstimator(), TOO_SURE
         for k, pose in enumerate(poses):
-            scatter.drive(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
+            scatter.propagate_poses(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
             covariance = scatter.estimate(pose, TOO_SURE, AS_MAPPED)
         found.append(covariance)
     assert np.allclose(*found)
@@ -130,8 +130,8 @@ def test_covariance_does_not_depend_on_the_scan_frame(turn: float) -> None:
 def test_covariance_grows_with_the_observed_odometry_error() -> None:
     slipping, holding, turn = CovarianceEstimator(), CovarianceEstimator(), Pose2(0.0, 0.0, 0.3)
     for _ in range(200):
-        slipping.compare(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))
-        holding.compare(Pose2(0.25, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))
+        slipping.learn_odometry_error(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))
+        holding.learn_odometry_error(Pose2(0.25, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))
     step = Pose2(0.25, 0.0, 0.0)
     wrong, right = (scatter.propagate(np.zeros((3, 3)), 0.4, step) for scatter in (slipping, holding))
     assert np.sqrt(np.diag(wrong)) == pytest.approx((0.035, 0.035, 0.02), rel=0.1)

@@ -76,8 +76,8 @@ def test_map_trust_uses_a_sample_of_many_particles(count: int) -> None:
     poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
     beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
     worth, alone = trust().weight(Particles.equal(poses), beams), trust().weight(Particles.equal(asked_ones), beams)
-    assert 0.0 < worth.fitting < 1.0
-    assert (worth.exponent, worth.fitting) == (alone.exponent, alone.fitting)
+    assert 0.0 < worth.fitting_share < 1.0
+    assert (worth.exponent, worth.fitting_share) == (alone.exponent, alone.fitting_share)
 
 
 def test_beam_ends_are_computed_for_the_requested_poses() -> None:

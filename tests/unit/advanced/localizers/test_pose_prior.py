@@ -10,7 +10,7 @@ from simscen.advanced.localizers.pose_prior import (
     ObservedMotion,
     PosePrior,
 )
-from simscen.advanced.localizers.scan_matcher import Step, apply_step
+from simscen.advanced.localizers.scan_matcher import Step, sample_step
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.particles import pose_errors
 
@@ -38,7 +38,7 @@ def test_step_errors_accumulate_as_in_simulation(off: tuple[float, ...]) -> None
     )
     robots = np.tile(np.array(sure.pose), (20_000, 1))
     for _ in range(20):
-        robots, before, base = apply_step(robots, STEP, rng), base, base.compose(STEP.delta)
+        robots, before, base = sample_step(robots, STEP, rng), base, base.compose(STEP.delta)
         sure = sure.after(before, base, 0.3, ObservedMotion(step=STEP))
     off_by = pose_errors(sure.expected(base), robots)
     aside, spread = np.array(off), off_by.T @ off_by / len(robots)
@@ -71,7 +71,7 @@ def test_step_errors_are_correlated_without_scan_matches(
 @pytest.mark.parametrize(
     ("seen", "torn", "led"),
     [(0.25, 0.0, False), (0.16, -0.09, False), (0.05, -0.2, True), (0.5, 0.25, True), (0.0, -0.08, False)],
-    ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly apply_step"],
+    ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly sample_step"],
 )
 def test_scan_difference_beyond_slip_indicates_moving_surroundings(seen: float, torn: float, led: bool) -> None:
     assert (

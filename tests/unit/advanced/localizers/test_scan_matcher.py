@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step, apply_step
+from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step, sample_step
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.testing.synthetic_room import BEAMS, cast, scan
@@ -85,7 +85,7 @@ def test_empty_scan_does_not_indicate_a_kidnapping(ranges: np.ndarray) -> None:
 
 def test_particles_follow_a_step_with_its_covariance() -> None:
     step = Step(STEP, np.diag([0.01, 0.0004, 0.0001]))
-    poses = apply_step(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
+    poses = sample_step(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
     assert poses.mean(axis=0) == pytest.approx((1 - 0.02, 2.3, np.pi / 2 + 0.15), abs=0.003)
     assert poses.std(axis=0) == pytest.approx((0.02, 0.1, 0.01), rel=0.03)
 
@@ -101,7 +101,7 @@ def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
     for _ in range(20):
         root = rng.normal(size=(3, 3)) * 0.05
         covariance, delta = root @ root.T + np.diag((1e-6, 1e-6, 1e-6)), Pose2(0.3, 0.1, -0.2)
-        after = apply_step(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
+        after = sample_step(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
         off = (after - np.array(delta)).T
         assert off @ off.T == pytest.approx(covariance, rel=1e-9, abs=1e-15)
 

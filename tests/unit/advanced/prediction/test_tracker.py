@@ -9,7 +9,7 @@ import pytest
 
 from simscen.advanced.prediction.clusters import (
     CONVERGED_STEP_M,
-    divide_into_runs,
+    divide_into_segments,
     find_clusters,
     find_valid_hits,
     fit_circle,
@@ -246,7 +246,7 @@ def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
 
 def test_last_segment_of_a_scan_has_the_range_of_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    found = divide_into_runs(find_valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
+    found = divide_into_segments(find_valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
     (piece,) = find_clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
@@ -260,8 +260,10 @@ def test_quick_check_never_separates_hits_of_one_segment() -> None:
         ranges[rng.random(72) < 0.1] = np.inf
         hits = find_valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
         which = rng.random(len(hits.beams)) < 0.15
-        told.append((divide_into_runs(hits).share_run(which, 3), hits.may_share_run(which.nonzero()[0].tolist(), 3)))
-        first, last = divide_into_runs(hits).first, divide_into_runs(hits).last
+        told.append(
+            (divide_into_segments(hits).share_segment(which, 3), hits.may_share_segment(which.nonzero()[0].tolist(), 3))
+        )
+        first, last = divide_into_segments(hits).first, divide_into_segments(hits).last
         assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
     assert (True, False) not in told
     assert min(told.count((True, True)), told.count((False, False))) > 50

@@ -34,12 +34,12 @@ def test_around_a_wall_its_length_is_that_of_the_way_around() -> None:
 
 def test_a_narrow_set_has_the_way_and_not_the_rooms_beside_it() -> None:
     informed = InformedSet(ground(WALL), (1.0, 1.0), (9.0, 1.0))
-    informed.narrow(0.05)
+    informed.restrict(0.05)
     assert informed.contains(4.95, 4.5)
     assert informed.contains(3.0, 2.7)
     assert not informed.contains(1.0, 5.5)
     assert not informed.contains(4.5, 0.5)
-    informed.narrow(1.0)
+    informed.restrict(1.0)
     assert informed.contains(1.0, 5.5)
 
 
@@ -60,7 +60,7 @@ def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> No
     way = informed.path(tested.costmap, 9.0)
     assert way[:, 1].max() > 4.2
     assert np.isfinite(tested.at(way)).all()
-    informed.narrow(0.05)
+    informed.restrict(0.05)
     assert informed.contains_points(way).all()
     assert not informed.contains_points(np.array([(4.95, 0.9)])).any()
     assert len(informed.path(tested.costmap, 0.0)) == math.ceil(len(way) / 3)
