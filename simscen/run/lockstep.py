@@ -126,7 +126,7 @@ class RobotUnderTest:
             self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
-        """Deliver pending goals and other orders, read the sensors, apply faults, and let the stack choose a command."""
+        """Deliver orders (such as a new goal), read the sensors, apply faults, and let the stack choose a command."""
         stage, faults = self.stage, self.faults
         if stage.pending_orders:
             stage.deliver_orders(tick)
