@@ -1,4 +1,4 @@
-"""The running world as triggers observe it and actions change it."""
+"""The world during a run as triggers observe it and actions change it; passes events and orders on."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -31,11 +31,10 @@ from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 class LiveStage:
     """The world from the point of view of one robot: implements core.stage.Stage and keeps the robot's events.
 
-    An event of the world is added to the events of all robots.
+    An event of the world, such as a moved door, is added to the events of all robots.
 
-    The lockstep loop runs in beats: ticks at which a sensor, a stack, or a truth sample is due. A beat can be due for
-    some of the robots only. An order is a request of an action to the robot's stack: a new goal, a cancellation, or a
-    change of zones. An order is delivered at once at a beat of this robot, else at the robot's next beat.
+    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. It is
+    delivered at once at a beat of this robot, and otherwise at the robot's next beat.
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class LiveStage:
         streams: Streams,
         stages: "dict[str, LiveStage]",
     ) -> None:
-        """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` the goals that events send.
+        """`goals` are those that events send, and actions draw from `streams`.
 
         The stage adds itself to `stages`, the stages of all robots by name.
         """
@@ -81,7 +80,7 @@ class LiveStage:
     def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
         """Update the robot's pose at a beat, from the truth sample if there is one.
 
-        `is_due` states whether the beat is due for this robot. If it is not, orders wait until a beat that is due.
+        `is_due` states whether the beat is one of this robot, so that orders are delivered at once.
         """
         self._is_due = is_due
         previous = self._pose
@@ -151,12 +150,12 @@ class LiveStage:
 
     @property
     def twist(self) -> Twist:
-        """The true velocity of the robot in its own frame."""
+        """The true velocity of the robot in the base frame."""
         return self._twist
 
     @property
     def travelled(self) -> float:
-        """Distance driven in m; being placed elsewhere does not count."""
+        """Distance driven in m; a teleportation of the robot does not count."""
         return self._travelled
 
     @property
@@ -229,24 +228,24 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that an object follows and the seconds since its start, or None."""
+        """Return the path that an object follows and the seconds since its start; None if it follows no path."""
         pose = self.object(name)
         if pose is not None and self._pedestrians.simulates(name):
             return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0  # the future path of a pedestrian is unknown
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
-        """Return the mass of a movable object in kg."""
+        """Return the mass of a pushable object in kg; 0 for others."""
         return self._simulation.mass(name)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place an object at a pose."""
+        """Teleport an object to a pose."""
         self._pedestrians.remove(name)
         self._simulation.place(name, pose)
         self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def place_robot(self, pose: Pose2) -> None:
-        """Place the robot at a pose."""
+        """Teleport the robot to a pose."""
         self._robot.place(pose)
         self._update_pose()
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
@@ -286,13 +285,13 @@ class LiveStage:
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Switch a zone of a costmap filter; return why it is impossible, or ""."""
+        """Switch a zone of a costmap filter; return why that has no effect, or "" if it has one."""
         if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
             return reason
         for region in self._filters.switch(order):
-            limit = self._filters.limit(region) if order.filter == "speed" else 0.0
+            limit = self._filters.speed_limit(region) if order.filter == "speed" else 0.0
             data: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
             data |= {"speed_limit": limit} if limit and order.enabled else {}
             self.record_event(Event(0, EventKind.ZONE_SWITCHED, region, data))
