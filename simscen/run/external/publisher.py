@@ -1,4 +1,4 @@
-"""Collects sensor readings, maps, and masks as messages for an external stack, in the encoding of the log."""
+"""Encode sensor readings, maps, and masks as ROS messages for an external stack, in the same way as for the log."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ _FIRST_STAMP = (0, 0)
 
 
 class StepPublisher:
-    """Collects the messages to send with the next step."""
+    """Collects the messages to send to a stack with the next frame STEP."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
-        """`sensors` are the reading types and `mounts` the poses in the base frame, both by sensor name."""
+        """`sensors` are the reading types, such as "Scan", and `mounts` the poses in the base frame, by sensor name."""
         self._queue: Messages = []
         self._numbers: dict[str, int] = {}
         self._requested_topics: frozenset[str] = frozenset()
@@ -43,9 +43,10 @@ class StepPublisher:
         self._time = SimTime(tick_rate)
         self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
         self.sensor_topics = self._sensors.declared
+        """Pairs of a sensor name and a topic with readings of that sensor."""
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish `grid` (a map or mask) once, with the first step. Does nothing if it is None."""
+        """Publish `grid` (a map or mask) once, with the first step; None publishes nothing."""
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
@@ -63,7 +64,7 @@ class StepPublisher:
             self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 
     def topic_table(self) -> TopicTable:
-        """Return the table of all topics on which messages can be sent, and of those on which a stack may publish."""
+        """Return the table of all topics to and from the stack. Must be called after all calls of `latch`."""
         sent: list[Topic] = []
         for _, topic in self.sensor_topics:
             sent += [topic, *_exact_topics(topic)]
