@@ -17,8 +17,6 @@ from simscen.core.records.trace import Trace
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
-from simscen.loading.files.discovery import default_root
-from simscen.loading.scenario import load_scenario
 from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSink
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
@@ -27,7 +25,7 @@ from simscen.run.external.stack import ExternalStack, robot_file
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
-from simscen.run.preparation import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
@@ -121,13 +119,6 @@ def _with_stacks(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run
     """Return the run with the descriptions of its external stacks, which are given by robot name."""
     robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
     return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
-
-
-def simulate_file(
-    file: Path, seed: int | None, log: Path | None, root: Path | None, world_path: Sequence[Path] = ()
-) -> Run:
-    """Load, prepare and simulate a scenario file. Raises InvalidInput, and what `simulate` raises."""
-    return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
 
 
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
