@@ -10,7 +10,6 @@ from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian, World
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.messages.navigation import Belief, Goal, Path
 from simscen.core.messages.sensor_data import Readings, Scan
@@ -62,14 +61,18 @@ class LiveStage:
         stages[robot.name] = self
         self._goals = {goal.name: goal for goal in goals}
         self._update_pose()
-        self._belief: Belief | None = None
-        self._clearance: float | None = None
+        self.belief: Belief | None = None
+        """The last belief that the stack published; None before the first."""
+        self.clearance: float | None = None
+        """Distance in m from the robot's hull to the nearest obstacle in the newest truth sample; None before it."""
+        self.travelled = 0.0
+        """Distance driven in m; a teleportation of the robot does not count."""
         self._scan_ticks: dict[str, int] = {}
-        self._travelled = 0.0
         self._is_due = True
         self.pending_orders: list[Callable[[int], None]] = []
         """Orders to deliver to the stack at the robot's next beat; each is called with the current tick."""
-        self._history: tuple[Event, ...] = ()
+        self.events: tuple[Event, ...] = ()
+        """All events so far."""
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
@@ -85,7 +88,7 @@ class LiveStage:
         self._is_due = is_due
         previous = self._pose
         self._update_pose(truth)
-        self._travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
+        self.travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
 
     def deliver_orders(self, tick: int) -> None:
         """Deliver the pending orders to the stack. Called at a beat of this robot."""
@@ -99,18 +102,19 @@ class LiveStage:
             self.deliver_orders(self.tick)
 
     def _update_pose(self, truth: Truth | None = None) -> None:
+        """Update the true pose, the twist in the base frame, and, from a truth sample, the clearance."""
         if truth is not None:
-            self._pose, self._twist, self._clearance = truth.pose, truth.twist, truth.clearance
+            self._pose, self.twist, self.clearance = truth.pose, truth.twist, truth.clearance
         else:
-            self._pose, self._twist = self._robot.base_pose(), self._robot.base_twist()
+            self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
 
     def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
         """Update from the readings that the stack received and from its decision."""
         for reading in readings:
             if isinstance(reading, Scan):
                 self._scan_ticks[reading.sensor] = self.tick
-        self._belief = decision.belief or self._belief
-        self._history += decision.events
+        self.belief = decision.belief or self.belief
+        self.events += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
         """Return the events since the last call, ordered by tick."""
@@ -119,11 +123,6 @@ class LiveStage:
         return events
 
     # Observed by triggers
-
-    @property
-    def clearance(self) -> float | None:
-        """Distance from the robot's hull to the nearest obstacle in m, in the newest truth sample."""
-        return self._clearance
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick at which the stack last received a scan of this lidar, or of any lidar for None."""
@@ -147,26 +146,6 @@ class LiveStage:
     def robot(self) -> Pose2:
         """The true pose of the robot."""
         return self._pose.plane
-
-    @property
-    def twist(self) -> Twist:
-        """The true velocity of the robot in the base frame."""
-        return self._twist
-
-    @property
-    def travelled(self) -> float:
-        """Distance driven in m; a teleportation of the robot does not count."""
-        return self._travelled
-
-    @property
-    def belief(self) -> Belief | None:
-        """The last belief that the stack published."""
-        return self._belief
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """All events so far."""
-        return self._history
 
     @property
     def plan(self) -> Path | None:
@@ -303,7 +282,7 @@ class LiveStage:
         """Add an event of this robot. An event with tick 0 gets the current tick."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
-        self._history += (stamped,)
+        self.events += (stamped,)
 
 
 def path_data(path: MotionPath) -> dict[str, Value]:
