@@ -234,9 +234,8 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
         if loaded_world is None
         else world_from_file(loaded_world, root, world_path)
     )
-    body = (
-        None if loaded_robot is None else robot_from_file(loaded_robot, (root, *criteria.library.sandbox.world_path))[1]
-    )
+    folders = (root, *criteria.library.sandbox.world_path)
+    body = None if loaded_robot is None else robot_from_file(loaded_robot, folders)[1]
     goals = scenario_goals(criteria.spec)
     return Case(
         start=Pose2(0.0, 0.0, 0.0),

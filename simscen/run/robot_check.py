@@ -133,17 +133,10 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
 def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
     """Yield a trapezoidal velocity profile for a leg, then a stop."""
     model = robot_model(body)
-    spans = [
-        (
-            leg.forward,
-            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_linear),
-            min(model.linear_acceleration, model.linear_deceleration),
-        ),
-        (
-            leg.left,
-            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_lateral),
-            min(model.linear_acceleration, model.linear_deceleration),
-        ),
+    linear_acceleration = min(model.linear_acceleration, model.linear_deceleration)
+    spans = [  # distance or angle, largest speed, largest acceleration
+        (leg.forward, min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_linear), linear_acceleration),
+        (leg.left, min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_lateral), linear_acceleration),
         (leg.turn, min(MAX_TURN_RATE_RAD_S, SPEED_FRACTION * model.max_angular), model.angular_acceleration),
     ]
     rate = min(speed / abs(span) for span, speed, _ in spans if span)
@@ -272,7 +265,8 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     yield DriveCheck("at rest: creeps in a second", 1e3 * rest.drift, 1e3 * MAX_REST_DRIFT_M, "mm")
     line = trials["line"]
     yield _deviation_check("line: driven, from commanded", line.truth.driven, line.command.driven, MAX_DISTANCE_ERROR)
-    yield DriveCheck("line: heading at its end", _degrees(line.truth.end.yaw), math.degrees(MAX_HEADING_RAD), "deg")
+    heading = abs(math.degrees(line.truth.end.yaw))
+    yield DriveCheck("line: heading at its end", heading, math.degrees(MAX_HEADING_RAD), "deg")
     advice = _wheel_radius_advice(body.drive, line)
     yield _deviation_check(
         "line: odometry, from true distance", line.odometry.driven, line.truth.driven, MAX_ODOMETRY_ERROR, advice
@@ -300,23 +294,13 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     square = trials["square"]
     gap = square.odometry.end.distance(square.truth.end)
     yield DriveCheck("square: odometry's end from the true", gap, limits.square_end * square.command.driven, "m")
-    max_tilt = max(trial.tilt for trial in trials.values())
-    yield DriveCheck(
-        "driving: leans at most",
-        math.degrees(max_tilt),
-        math.degrees(MAX_DRIVING_TILT_RAD),
-        "deg",
-        "lower its mass, or its limits",
-    )
+    tilt, max_tilt = math.degrees(max(trial.tilt for trial in trials.values())), math.degrees(MAX_DRIVING_TILT_RAD)
+    yield DriveCheck("driving: leans at most", tilt, max_tilt, "deg", "lower its mass, or its limits")
 
 
 def _deviation_check(name: str, value: float, expected: float, limit: float, advice: str = "") -> DriveCheck:
     """Return a check of the deviation from the correct value, in percent of it."""
     return DriveCheck(name, 100 * abs(value - expected) / max(abs(expected), 1e-9), 100 * limit, "%", advice)
-
-
-def _degrees(angle: float) -> float:
-    return abs(math.degrees(angle))
 
 
 def _offset_advice(body: RobotBody) -> str:

@@ -48,7 +48,7 @@ class GoalTracker:
         self._events += self._task.preempt(tick, goal)
 
     def process(self, tick: int, report: dict[str, Any]) -> None:
-        """Process an event with `kind`, `name`, and `data` from the stack. Raises ProtocolViolation if it is invalid."""
+        """Process an event with `kind`, `name`, and `data` from the stack. Raises ProtocolViolation if invalid."""
         kind, name, data = report.get("kind"), report.get("name", ""), report.get("data", {})
         if not isinstance(kind, str) or not isinstance(name, str) or not isinstance(data, dict):
             raise ProtocolViolation(f"an invalid event: {str(report)[:100]}")

@@ -56,8 +56,8 @@ def hello_content(
 ) -> dict[str, Any]:
     """Return the content of HELLO.
 
-    `sensor_topics` has pairs of a sensor name and a topic of that sensor. `zone_masks` says what the values of each zone
-    mask mean (see ZoneMasks.meanings). `answer_limit` is the wall time in s that the stack may take for each answer.
+    `sensor_topics` has pairs of a sensor name and a topic of that sensor. `zone_masks` says what the values of zone
+    masks mean (see ZoneMasks.meanings). `answer_limit` is the wall time in s that the stack may take for each answer.
     """
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}

@@ -1,9 +1,8 @@
 """Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
-Internal program that a worker starts, with the numbers of three file descriptors: CONTROL, a pipe on which it receives
-the command of the stack and later the request to end it; REPORT, a pipe to which it writes how the stack exits; and
-SOCKET, which the stack inherits. When the run is over or the worker has died, it kills the stack and all of its
-descendants.
+Internal program of a worker. It reads the command of the stack, and later the request to end it, from the file
+descriptor CONTROL, starts the stack, which inherits SOCKET, and writes how the stack exits to REPORT. When the run is
+over or the worker has died, it kills the stack and all of its descendants.
 """
 
 import errno

@@ -51,20 +51,13 @@ class StackProcess:
         control, self._control = os.pipe()
         self._report, report_writer = os.pipe()
         self._output, output_writer = os.pipe()
+        descriptors = (control, report_writer, stack_socket.fileno())
         self._launcher = subprocess.Popen(
-            [
-                sys.executable,
-                "-I",
-                "-m",
-                "simscen.run.external.launcher",
-                str(control),
-                str(report_writer),
-                str(stack_socket.fileno()),
-            ],
+            [sys.executable, "-I", "-m", "simscen.run.external.launcher", *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
             stdout=output_writer,
             stderr=output_writer,
-            pass_fds=[control, report_writer, stack_socket.fileno()],
+            pass_fds=descriptors,
             env=clean_environment(),
             start_new_session=True,
         )

@@ -82,10 +82,7 @@ class ZoneMasks:
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """`topic` and `filter` of each mask; for speed limits also how its values are converted, as in Nav2:
-
-        `base`, `multiplier`, and whether the result is in `percent` of the robot's maximum speed instead of in m/s.
-        """
+        """`topic` and `filter` of each mask; for speed limits also Nav2's `base` and `multiplier`, and `percent`."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [
@@ -95,10 +92,7 @@ class ZoneMasks:
 
 
 class _SpeedMask:
-    """Mask of speed limits. `grid` defines its cells, and is None if the robot has no speed limits.
-
-    `scale` says how its values are converted to speeds (see ZoneMasks.meanings).
-    """
+    """Mask of speed limits. `grid` defines its cells; None without any limit. `scale` converts its values to speeds."""
 
     def __init__(
         self,

@@ -15,6 +15,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from simscen.run.process.isolation import (
@@ -31,7 +32,6 @@ from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 
 MAX_MESSAGE_BYTES = 1 << 20
 """Longest valid message of a worker."""
-
 DUMP_TIME_S = 0.5
 """Time for a run that exceeded its wall limit to dump its stack before SIGTERM."""
 TERM_GRACE_S = 2.0
@@ -213,13 +213,9 @@ class ForkServer:
         enlarge_pipe(output_reader)
         child = WorkerHandle(job, pid, report_reader, output_reader, log, self._send)
         self._children[pid] = child
-        self._selector.register(
-            report_reader, selectors.EVENT_READ, lambda: self._read(report_reader, child.read_messages)
-        )
-        self._selector.register(
-            output_reader, selectors.EVENT_READ, lambda: self._read(output_reader, child.read_output)
-        )
-        self._selector.register(child.pidfd, selectors.EVENT_READ, lambda: self._reap(child))
+        for pipe, read in ((report_reader, child.read_messages), (output_reader, child.read_output)):
+            self._selector.register(pipe, selectors.EVENT_READ, partial(self._read, pipe, read))
+        self._selector.register(child.pidfd, selectors.EVENT_READ, partial(self._reap, child))
 
     def _close_inherited_descriptors(self) -> None:
         """Close the file descriptors of the fork server and of other workers. Called in the worker."""

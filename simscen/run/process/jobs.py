@@ -98,10 +98,7 @@ def pack_job(job: Job) -> bytes:
 
 
 def receive_job(pipe: int) -> Job | None:
-    """Read one job from a file descriptor; return None at the end of the stream.
-
-    Reads no bytes of the next job, so that `select` reports it.
-    """
+    """Read one job; return None at the end of the pipe. Reads nothing of the next one, so that `select` reports it."""
     head = _read_exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None

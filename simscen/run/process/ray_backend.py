@@ -37,13 +37,10 @@ from simscen.spec.registry import Entry
 
 MAX_ATTEMPTS = 2
 """Largest number of attempts at a job whose runner or node is lost, for example by a crash of the machine."""
-
 QUEUED_JOBS_PER_WORKER = 2
 """Number of jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
-
 NODE_SEARCH_PERIOD_S = 5.0
 """Time between two searches for nodes that have joined the cluster."""
-
 CONNECT_TIMEOUT_S = 5.0
 START_TIMEOUT_S = 120.0
 """Time to wait until the first runner has started."""
