@@ -29,6 +29,7 @@ from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
 
 TIME_LIMIT = "time limit"
+"""Name of the event that ends a run at its time limit."""
 
 
 class EndCondition:
@@ -68,10 +69,7 @@ class EndCondition:
 
 
 def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
-    """Return the event that ends the run at this tick, or None if any robot continues.
-
-    The run ends with the time limit if any robot does.
-    """
+    """Return the event that ends the run at this tick (the time limit if it ends any robot), or None if one goes on."""
     run_end: Event | None = None
     for condition in conditions:
         end = condition.end_event(tick)
@@ -160,7 +158,7 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
-    """Start the events and faults whose triggers fire."""
+    """Each starts the events and faults whose triggers fire."""
     truth_period: int
     """Ticks between two samples of the true state."""
 

@@ -44,13 +44,13 @@ MAX_CACHE_BYTES = 256_000_000
 """Size limit of the cache on disk. The least recently used entries are deleted first."""
 MAX_ENTRY_BYTES = 32_000_000
 """Size limit of one entry; larger ones are not stored."""
-_DIGEST = hashlib.sha256().digest_size
+_DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def cache_folder(environment: Mapping[str, str]) -> Path | None:
     """Return the folder for entries in $SIMSCEN_CACHE_DIR, or else in simscen in $XDG_CACHE_HOME or ~/.cache.
 
-    Returns None, so that nothing is cached, if $SIMSCEN_CACHE_DIR is `off` or not absolute, or there is no home folder.
+    Returns None, to disable the disk cache, if $SIMSCEN_CACHE_DIR is `off` or not absolute, or without a home folder.
     """
     if (configured := environment.get(CACHE_DIR_VARIABLE)) is not None:
         return Path(configured) / CACHE_FORMAT if configured != CACHE_OFF and Path(configured).is_absolute() else None
@@ -89,8 +89,8 @@ class DiskCache:
                 os.utime(descriptor)
         except OSError:  # missing or unreadable: the caller computes it again
             return None
-        content = data[_DIGEST:]
-        return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST] else None
+        content = data[_DIGEST_BYTES:]
+        return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST_BYTES] else None
 
     def put(self, key: str, content: bytes) -> None:
         """Store an entry, unless it is too large or the folder does not belong to this user alone."""
@@ -157,7 +157,8 @@ def _files(folder: Path) -> list[tuple[int, int, str]]:
 
 
 _LEGS = TypeAdapter(list[Leg])
-_MAP = struct.Struct("<II4d")
+_MAP_HEADER = struct.Struct("<II4d")
+"""Rows, columns, resolution (m), and origin (x, y, yaw) of a map, before its cells."""
 _CODE_PARTS = ("core", "grid_graph.py", "worlds")
 """Packages and modules of simscen whose code affects the cached results."""
 
@@ -237,16 +238,16 @@ def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
 
 
 def _map_to_bytes(grid: OccupancyGrid) -> bytes:
-    return _MAP.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
+    return _MAP_HEADER.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
 
 
 def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:
-    if data is None or len(data) < _MAP.size:
+    if data is None or len(data) < _MAP_HEADER.size:
         return None
-    rows, columns, resolution, x, y, yaw = _MAP.unpack_from(data)
-    if not rows * columns or len(data) != _MAP.size + rows * columns:
+    rows, columns, resolution, x, y, yaw = _MAP_HEADER.unpack_from(data)
+    if not rows * columns or len(data) != _MAP_HEADER.size + rows * columns:
         return None
-    cells = np.frombuffer(data, np.int8, offset=_MAP.size).reshape(rows, columns).copy()
+    cells = np.frombuffer(data, np.int8, offset=_MAP_HEADER.size).reshape(rows, columns).copy()
     return OccupancyGrid(cells, resolution, Pose2(x, y, yaw))
 
 

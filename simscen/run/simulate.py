@@ -173,7 +173,7 @@ GC_THRESHOLD = 20_000
 """Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time."""
 
 WriteExtras = Callable[[PreparedScenario, Run, Path], None]
-"""Writes further files of a run, for example a picture."""
+"""Function that writes further files of a run to a folder, for example a picture."""
 
 
 def execute_run(

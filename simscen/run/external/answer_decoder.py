@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 MAX_PARTICLES = 1_000_000
 _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
-"""Indices of the covariance over x, y, yaw in the 36 numbers of a message."""
+"""Indices of the covariance over x, y, yaw in the 36 numbers of a ROS covariance."""
 _PLANAR_DIAGONAL = (0, 7, 35)
-"""Indices of the variances of x, y, yaw in the 36 numbers of a message."""
+"""Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Numbers per reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), and pose covariance (9)."""
+"""Numbers per exact reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]

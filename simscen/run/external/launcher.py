@@ -1,8 +1,8 @@
 """Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
-Internal program of a worker. It reads the command of the stack, and later the request to end it, from the file
-descriptor CONTROL, starts the stack, which inherits SOCKET, and writes how the stack exits to REPORT. When the run is
-over or the worker has died, it kills the stack and all of its descendants.
+A worker starts this internal program with three file descriptors. It reads the command of the stack from CONTROL,
+starts the stack, which inherits SOCKET, and writes to REPORT how the stack exits. When it reads a byte from CONTROL, or
+when the worker dies, it kills the stack and all of its descendants.
 """
 
 import errno

@@ -150,7 +150,7 @@ class ExternalStack:
         return not {KEEPOUT_ZONES.name, SPEED_ZONES.name}.isdisjoint(self._welcome.topics)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Send the masks that change with the next step."""
+        """Send the masks that the enabled `zones` change, together with the next step."""
         for topic, mask in self._zone_masks.changed_masks(zones):
             self._publisher.publish_grid(tick, mask, topic)
 
@@ -161,7 +161,7 @@ class ExternalStack:
 
     @property
     def goal(self) -> Goal | None:
-        """The current goal as reported by the stack."""
+        """The current goal as reported by the stack; None without one, and after `cancel`."""
         return None if self._canceling else self._goals.goal
 
     @property

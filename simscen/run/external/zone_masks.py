@@ -82,7 +82,7 @@ class ZoneMasks:
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """`topic` and `filter` of each mask; for speed limits also Nav2's `base` and `multiplier`, and `percent`."""
+        """`topic` and `filter` of each mask; for speed limits also `percent`, `base`, and `multiplier`, as in Nav2."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [

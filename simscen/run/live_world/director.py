@@ -15,6 +15,7 @@ from simscen.triggers.base import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 
 _AT_ONCE = Trigger(time=Time(0.0))
+"""Trigger of events and faults without `when`."""
 
 
 class Director:

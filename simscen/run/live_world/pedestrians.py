@@ -71,7 +71,7 @@ EVENT_KINDS = {
 
 
 class PedestrianSimulation:
-    """Steps all pedestrians of a run and passes their events to `listeners`. Set up when the first one appears."""
+    """Steps all pedestrians of a run and passes their events to `listeners`. The crowd is built for the first one."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._map, self._simulation = PedestrianMap(built), simulation

@@ -1,4 +1,4 @@
-"""The world during a run as triggers observe it and actions change it; passes events and orders on."""
+"""The world during a run, as triggers observe it and actions change it, with the events and orders of each robot."""
 
 import math
 from collections.abc import Callable, Iterable

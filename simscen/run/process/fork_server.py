@@ -40,7 +40,7 @@ TERM_GRACE_S = 2.0
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
 _TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
-"""Signals that end a run at its wall limit, and the seconds until the next one: dump the stack, terminate, kill."""
+"""Signals that end a run at its wall limit, each with the seconds until the next: dump the stack, terminate, kill."""
 
 SendMessage = Callable[[dict[str, Any]], None]
 """Function that sends a message to the supervisor."""

@@ -80,6 +80,7 @@ class CappedLog:
 
 
 TAIL_LINES = 20
+"""Number of lines of output that an error message quotes."""
 _DUMP_HEADER = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
 _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
 

@@ -17,7 +17,7 @@ RUNS_FOLDER = "runs"
 
 
 def create_output_folder(out: Path | None) -> Path:
-    """Create the folder `out`, or simscen-out/<UTC time>-<4 hex digits> and the link simscen-out/latest to it.
+    """Create the folder `out`; if None, simscen-out/<UTC time>-<4 hex digits> and the link simscen-out/latest to it.
 
     Raises UsageError if `out` is not empty, or if the folder cannot be created or written to.
     """

@@ -40,7 +40,7 @@ class Search(Protocol):
 
 
 def make_search(method: SearchMethod, choices: Sequence[int], seed: int) -> Search:
-    """Return a search with a random seed. AUTO is TPE if Optuna is installed, else SOBOL.
+    """Return a search whose random choices depend on `seed`. AUTO is TPE if Optuna is installed, else SOBOL.
 
     `choices` has one number for each parameter: how many values its list has, or 0 for a continuous parameter. Raises
     UsageError for TPE without Optuna.
