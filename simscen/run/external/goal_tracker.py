@@ -43,7 +43,7 @@ class GoalTracker:
         return self._task.goal
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by another one."""
+        """Replace the current goal by another one, which the stack must accept next."""
         self._drop()
         self._events += self._task.preempt(tick, goal)
 

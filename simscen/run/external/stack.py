@@ -135,12 +135,12 @@ class ExternalStack:
         self._goals.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by this one."""
+        """Replace the current goal by this one; the stack answers at the next call of `decide`."""
         self._goals.preempt(tick, goal)
         self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
 
     def cancel(self, tick: int) -> None:
-        """Cancel the current goal and all goals after it."""
+        """Cancel the current goal and all goals after it; the stack answers at the next call of `decide`."""
         self._canceling = True
         self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
 
@@ -265,7 +265,7 @@ class ExternalStack:
         )
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
-        """Send a request that the stack answers in this beat."""
+        """Send a request that makes the next call of `decide` ask the stack."""
         self._interrupted, self._plan = True, None
         self._send(kind, content)
 
