@@ -41,7 +41,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = None) -> RunSetup:
     """Build everything that one run needs. The stacks are not started yet.
 
-    `stack_log` is the file that receives the output of an external stack.
+    `stack_log` is the file for the output of an external stack, before the name of the robot is added.
     """
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
@@ -69,22 +69,17 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
     directors = tuple(director for director in _directors(prepared, streams, agents) if director.has_disturbances)
     for stage in stages.values():
         stage.is_observed = bool(directors)
-    return RunSetup(
-        simulation,
-        tuple(agents.values()),
-        directors,
-        clock.period(spec.physics.truth_rate),
-    )
+    return RunSetup(simulation, tuple(agents.values()), directors, clock.period(spec.physics.truth_rate))
 
 
 def _directors(
     prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Yield the directors of a run. A director starts events and faults; a stage is its view of the world and a robot.
+    """Yield the directors of a run, which start its events and faults.
 
-    A scenario with one robot has one director. With several robots, the first director is for all events, and one for
-    each robot follows for its faults. The director of the events uses the stage of the first robot, because each event
-    that is for a certain robot names it, and other events have the same effect on every stage.
+    A single robot has one director. With several robots, the first director is for all events, and one for the faults
+    of each robot follows. The events use the stage of the first robot: an event for another robot names it, and all
+    other events have the same effect on every stage.
     """
     spec = prepared.spec
     first, *_ = agents.values()
@@ -187,7 +182,7 @@ def _build_stack(
 
 
 class TruthSensor:
-    """Sensor for the `ground_truth` localizer: the true pose in the map frame as an odometry message."""
+    """Sensor for the `ground_truth` localizer: true pose (map frame) and velocity as an odometry message."""
 
     name = "ground_truth"
 
@@ -195,6 +190,6 @@ class TruthSensor:
         self._robot, self.period = robot, period
 
     def read(self, tick: int) -> Odometry:
-        """Return the true pose."""
+        """Return the true pose and velocity."""
         truth = self._robot.truth()
         return Odometry(self.name, tick, truth.pose.plane, truth.twist)

@@ -1,7 +1,7 @@
 """The lockstep loop: physics, sensors, stack, and recording take turns on one clock.
 
-A beat is a tick at which a sensor, a stack, or a truth sample of any robot is due; the docs call it a cycle.
-One pass of the loop is one beat:
+A beat is a tick at which a sensor, a stack, or a truth sample of any robot is due (a control cycle in the docs).
+Each pass of the loop processes one beat:
 
 1. observe: update where each robot is and which collisions happened
 2. direct: start the events and faults of the scenario whose triggers fire
@@ -29,26 +29,26 @@ from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
 
 TIME_LIMIT = "time limit"
+"""Name of the event that ends a run at its time limit."""
 
 
 class EndCondition:
-    """Condition that ends a robot's part of a run: `linger` seconds after its navigation task, or at the time limit.
+    """Condition under which one robot is done: `linger` seconds after its navigation task, or at the time limit.
 
-    A goal that an event sends during these `linger` seconds cancels the end. A run ends at a regular sample of the
-    truth, or exactly at the time limit, where an additional sample is taken.
+    A goal that an event sends during these `linger` seconds cancels the end. The run ends when all robots are done, at
+    a regular sample of the truth or exactly at the time limit, where an additional sample is taken.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
         """`time_limit` and `linger` in seconds. An `idle` robot has no task at first and does not delay the end."""
-        self.limit = clock.ticks(time_limit)
-        """Tick of the time limit."""
+        self.time_limit_tick = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
         self._end_tick: int | None = 0 if idle else None
         self.earliest_tick = self._earliest()
-        """Earliest tick at which the robot's part can end."""
+        """Earliest tick at which the robot can be done."""
 
     def update(self, decision: Decision) -> None:
-        """Update with a decision. Must be called for each decision that has events."""
+        """Update from the robot's decision. Must be called for each decision that has events."""
         for event in decision.events:
             if event.kind == EventKind.NAVIGATION_ENDED:
                 self._end_tick = event.tick + self._linger
@@ -57,34 +57,34 @@ class EndCondition:
         self.earliest_tick = self._earliest()
 
     def _earliest(self) -> int:
-        return self.limit if self._end_tick is None else min(self._end_tick, self.limit)
+        return self.time_limit_tick if self._end_tick is None else min(self._end_tick, self.time_limit_tick)
 
-    def reached(self, tick: int) -> Event | None:
-        """Return the event that ends the robot's part at this tick, or None. The tick must have a truth sample."""
+    def end_event(self, tick: int) -> Event | None:
+        """Return the event with which the robot is done at this tick, or None. The tick must have a truth sample."""
         if self._end_tick is not None and tick >= self._end_tick:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
-        if tick >= self.limit:
+        if tick >= self.time_limit_tick:
             return Event(tick, EventKind.RUN_ENDED, TIME_LIMIT)
         return None
 
 
-def run_end(tick: int, endings: Iterable[EndCondition]) -> Event | None:
-    """Return the event that ends the run at this tick, or None while any robot continues."""
-    last: Event | None = None
-    for ending in endings:
-        end = ending.reached(tick)
+def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
+    """Return the event that ends the run at this tick (the time limit if it ends any robot), or None if one goes on."""
+    run_end: Event | None = None
+    for condition in conditions:
+        end = condition.end_event(tick)
         if end is None:
             return None
-        last = end if last is None or end.name == TIME_LIMIT else last
-    return last
+        run_end = end if run_end is None or end.name == TIME_LIMIT else run_end
+    return run_end
 
 
 @dataclass(eq=False)
 class RobotUnderTest:
     """A robot with its sensors, its stack, its faults, and its logs.
 
-    The methods are called in the order observe, decide, record, drive; all but `observe` only at beats of this robot,
-    where `is_due` holds.
+    `observe` must be called at each beat. If the beat is one of this robot, so that `is_due` becomes true, `decide`,
+    `record`, and `drive` follow.
     """
 
     robot: Robot
@@ -92,18 +92,19 @@ class RobotUnderTest:
     stack: Stack
     faults: FaultInjector
     stage: LiveStage
-    """Interface through which triggers observe this robot's run, and actions change it."""
+    """The world as triggers observe it and actions change it, from the point of view of this robot."""
     end_condition: EndCondition
     schedule: TickSchedule
+    """The ticks of this robot's beats."""
     truth_period: int
     """Ticks between two samples of the true state."""
     logs: tuple[MomentSink, ...] = ()
     is_due: bool = field(default=True, init=False)
     """Whether the current tick is a beat of this robot."""
     next_tick: int = field(default=0, init=False)
-    """The tick of the robot's next beat."""
+    """Tick of the robot's next beat."""
     moment: Moment = field(init=False)
-    """The record of the robot's last beat."""
+    """Record of the robot's last beat."""
     _truth: Truth | DeferredTruth | None = field(default=None, init=False)
 
     def observe(self, tick: int) -> None:
@@ -111,9 +112,9 @@ class RobotUnderTest:
         self.is_due = tick == self.next_tick
         if self.is_due:
             self.next_tick = tick + self.schedule.until_next(tick)
-            if tick < self.end_condition.limit < self.next_tick:
-                self.next_tick = self.end_condition.limit
-        is_sampled = tick % self.truth_period == 0 or tick == self.end_condition.limit
+            if tick < self.end_condition.time_limit_tick < self.next_tick:
+                self.next_tick = self.end_condition.time_limit_tick
+        is_sampled = tick % self.truth_period == 0 or tick == self.end_condition.time_limit_tick
         if self.stage.is_observed:
             self._truth = truth = self.robot.truth() if is_sampled else None
             self.stage.begin_beat(truth, self.is_due)
@@ -123,7 +124,7 @@ class RobotUnderTest:
             self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
-        """Read the sensors, apply the active faults to the readings, and let the stack choose a command."""
+        """Deliver orders (such as a new goal), read the sensors, apply faults, and let the stack choose a command."""
         stage, faults = self.stage, self.faults
         if stage.pending_orders:
             stage.deliver_orders(tick)
@@ -157,15 +158,15 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
-    """Start the events and faults whose triggers fire."""
+    """Each starts the events and faults whose triggers fire."""
     truth_period: int
     """Ticks between two samples of the true state."""
 
 
 def run_lockstep(setup: RunSetup) -> Event:
-    """Simulate a run to its end and return the event that ended it; each beat goes to the logs of its robot."""
+    """Simulate and log a run until it ends; return the event that ended it."""
     simulation, robots, directors = setup.simulation, setup.robots, setup.directors
-    time_limit = robots[0].end_condition.limit
+    time_limit_tick = robots[0].end_condition.time_limit_tick
     while True:
         tick = simulation.tick
         for robot in robots:
@@ -173,13 +174,13 @@ def run_lockstep(setup: RunSetup) -> Event:
         for director in directors:
             director.process_beat()
 
-        may_end = tick % setup.truth_period == 0 or tick == time_limit
+        may_end = tick % setup.truth_period == 0 or tick == time_limit_tick
         for robot in robots:
             if robot.is_due:
                 robot.decide(tick)
             if tick < robot.end_condition.earliest_tick:
                 may_end = False
-        end = run_end(tick, [robot.end_condition for robot in robots]) if may_end else None
+        end = run_end_event(tick, [robot.end_condition for robot in robots]) if may_end else None
         for robot in robots:
             if robot.is_due:
                 robot.record(end)

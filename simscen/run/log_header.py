@@ -1,4 +1,4 @@
-"""Header of a log, built once for all runs of a scenario."""
+"""Build the header of a run's log from the prepared scenario, once for all of its runs."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,8 +20,14 @@ from simscen.core.geometry.meshes import drivable_solids, face_normals, upward_f
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.loading.plugins import log_header_key, requirement_of
 from simscen.loading.scenario_text import resolved_text
-from simscen.record.log_header import SCENERY_FILE as SCENERY
-from simscen.record.log_header import STACK_FACT, STACK_NAME_FACT, VARIATION_FACT, LogHeader, scenery_to_json
+from simscen.record.log_header import (
+    SCENERY_FILE,
+    STACK_FACT,
+    STACK_NAME_FACT,
+    VARIATION_FACT,
+    LogHeader,
+    scenery_to_json,
+)
 from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
@@ -41,7 +47,9 @@ def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
 
 def _build_header(prepared: PreparedScenario) -> LogHeader:
     robots = {name: _robot_header(part) for name, part in prepared.robots.items()}
-    return replace(_robot_header(prepared), files={SCENERY: scenery_to_json(world_scenery(prepared))}, robots=robots)
+    return replace(
+        _robot_header(prepared), files={SCENERY_FILE: scenery_to_json(world_scenery(prepared))}, robots=robots
+    )
 
 
 def _robot_header(prepared: PreparedScenario) -> LogHeader:
@@ -59,18 +67,18 @@ def _robot_header(prepared: PreparedScenario) -> LogHeader:
 
 
 def _key_facts(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the stack chosen on the command line, and the names of stack and variation."""
+    """Return the stack chosen on the command line and the names of stack and variation, if they are given."""
     loaded = prepared.loaded
     facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
     return {name: value for name, value in facts.items() if value}
 
 
 DECIMALS = 3
-"""Decimals of coordinates in m."""
+"""Decimals of coordinates in m in the scenery."""
 
 
 def world_scenery(prepared: PreparedScenario) -> Scenery:
-    """Return objects, ground, regions, and the zones of all robots."""
+    """Return the visible parts of the world and the zones of all robots."""
     world, each = prepared.built.world, prepared.each
     diameter = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
     same = all(part.map is prepared.built.map for part in each.values())

@@ -48,11 +48,14 @@ from simscen.worlds.routes.shortest_paths import Leg, legs_between
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
+"""Height at which the world is mapped for a robot without a lidar."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedScenario:
     """A scenario with its world, map, and robots built: everything about a run except the seed.
+
+    `map` (None without one), `masks`, and the initial `estimate` are what the stack gets; `start` is the true pose.
 
     With several robots, `robots` holds a PreparedScenario for each by name, and the fields about a robot are those of
     the first.
@@ -88,21 +91,20 @@ class PreparedScenario:
 
 
 BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
-"""Returns the built world of a scenario; its map is drawn as a lidar at this height in m sees the world."""
-
+"""Function that returns the built world of a scenario, with the map that a lidar at this height in m would see."""
 
 FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
-"""Returns the shortest path from each pose to its goal, for a disc with this radius in m."""
+"""Function that returns the shortest path from each pose to its goal, for a disc with this radius in m."""
 
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
-    """Build the world of a scenario without a cache."""
+    """Build the world of a scenario, with the map that a lidar at `height` m would see; uses no cache."""
     world = with_stops_in_bounds(load_world(loaded), loaded)
     return build_world_and_map(world, height, map_resolution(loaded, world))
 
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
-    """Return the resolution in m of the world's map: coarser in a large world if no robot drives with this map."""
+    """Return the resolution in m of the world's map: coarser in a large world if no robot uses this map."""
     is_used = any(view.map is None for view in loaded.robot_views.values())
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
@@ -110,7 +112,10 @@ def map_resolution(loaded: LoadedScenario, world: World) -> float:
 def prepare(
     loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
-    """Build what the runs of this scenario share. Raises InvalidInput for unusable files."""
+    """Build what the runs of this scenario share; `build` and `find_legs` can be functions that use a cache.
+
+    Raises InvalidInput for unusable files.
+    """
     if not loaded.robots:
         return _prepare_robot(loaded, build, find_legs)
     parts: dict[str, PreparedScenario] = {}
@@ -170,9 +175,9 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
 
 
 def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
-    """Return the case with the shortest paths to its goals and the passages along them.
+    """Return the case with the shortest paths to its goals and the narrow passages along them.
 
-    If the robot is expected to fail at a goal, the path to the next goal starts where the path to this one did.
+    The path to a goal starts at the last goal before it that the robot is expected to reach, or else at `start`.
     """
     ends, pose = [], case.start
     for goal in case.goals:
@@ -201,7 +206,7 @@ def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | Non
 
 
 def lidar_height(robot: RobotSpec) -> float:
-    """Return the height in m at which the world is mapped: that of the first lidar."""
+    """Return the height in m of the robot's first lidar, at which the world is mapped."""
     heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
 
@@ -218,7 +223,10 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
 
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
-    """Return the case of a criteria file; without a robot it has no footprint. Raises InvalidInput."""
+    """Return the case with which a criteria file judges a recorded log. Raises InvalidInput.
+
+    If the file names no robot, the case has no footprint.
+    """
     loaded_world, loaded_robot = criteria.load_world_and_robot()
     root = criteria.library.sandbox.root
     world = (
@@ -226,9 +234,8 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
         if loaded_world is None
         else world_from_file(loaded_world, root, world_path)
     )
-    body = (
-        None if loaded_robot is None else robot_from_file(loaded_robot, (root, *criteria.library.sandbox.world_path))[1]
-    )
+    folders = (root, *criteria.library.sandbox.world_path)
+    body = None if loaded_robot is None else robot_from_file(loaded_robot, folders)[1]
     goals = scenario_goals(criteria.spec)
     return Case(
         start=Pose2(0.0, 0.0, 0.0),
@@ -243,7 +250,7 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
 
 
 def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
-    """Load the filter masks of the file's criteria. Raises InvalidInput."""
+    """Load the filter masks that the criteria of a criteria file name, by path as written. Raises InvalidInput."""
 
     def sourced(problem: Problem) -> Problem:
         return criteria.library.with_source([problem])[0]

@@ -1,4 +1,4 @@
-"""Digest of everything that the result of a run depends on: files, software, plug-ins, and processor features."""
+"""Compute digests of everything on which the result of a run depends: files, software, plug-ins, and processor."""
 
 import hashlib
 import importlib
@@ -24,9 +24,9 @@ PACKAGES = (
     *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
     *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
 )
-"""Packages that affect results or the bytes of a log."""
+"""Python packages that affect results or the bytes of a log."""
 _RELEVANT_CPU_FLAGS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
-"""Instruction sets that affect the last bits of a result."""
+"""Instruction sets that affect the last bits of results."""
 
 
 def software_versions() -> dict[str, str]:
@@ -35,7 +35,7 @@ def software_versions() -> dict[str, str]:
 
 
 def cpu_flags() -> list[str]:
-    """Return the relevant instruction sets of this machine; empty if /proc/cpuinfo cannot be read."""
+    """Return the instruction sets of this machine that affect results; empty if /proc/cpuinfo cannot be read."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -46,7 +46,7 @@ def cpu_flags() -> list[str]:
 
 @cache
 def arithmetic_fingerprints() -> dict[str, str]:
-    """Return fingerprints of results of OpenBLAS, the C math library and NumPy; equal ones mean equal last bits.
+    """Return a fingerprint of the last bits of computed results by library: OpenBLAS, C math library, and NumPy.
 
     These libraries choose instructions at run time, so the processor flags alone are not sufficient.
     """
@@ -88,7 +88,7 @@ def _numpy_features() -> dict[str, bool]:
 def source_digest(*parts: str) -> str:
     """Return the SHA-256 of simscen's source files, because a working copy changes without a new version.
 
-    If `parts` are given, only these subpackages and modules (`name.py`) count.
+    Only the subpackages and modules (`name.py`) in `parts` count, if there are any.
     """
     sha, folder = hashlib.sha256(), PACKAGE
     roots = [folder / part for part in parts or (".",)]
@@ -106,7 +106,7 @@ def _version(package: str) -> str:
 
 
 def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
-    """Return version and used entry points by package, for run.json."""
+    """Return `version` and `used` entry points of each package with plug-ins, by package name, for run.json."""
     found: dict[str, dict[str, object]] = {}
     for entry in plugins:
         package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
@@ -117,7 +117,7 @@ def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
 
 
 def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
-    """Return version, class, and digest of all files by plug-in."""
+    """Return package, version, class, and digest of all files of each plug-in, by group and name."""
     return {
         f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
         for entry in plugins
@@ -125,7 +125,7 @@ def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
 
 
 def _files_digest(value: str) -> str:
-    """Return the SHA-256 of the top-level package that contains the class, or of its module."""
+    """Return the SHA-256 of all files of the top-level package that contains the class `value`, or of its module."""
     stats = ((name, file, file.stat()) for name, file in _files(value))
     return _digest_of_files(tuple((name, file, stat.st_mtime_ns, stat.st_size) for name, file, stat in stats))
 
@@ -135,8 +135,7 @@ def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
     """Return the SHA-256 of files; modification time and size are arguments so that changed files are read again."""
     sha = hashlib.sha256()
     for name, file, _, _ in files:
-        data = file.read_bytes()
-        sha.update(f"{name}\0{len(data)}\0".encode() + data)
+        _hash_file(sha, name, file.read_bytes())
     return sha.hexdigest()
 
 
@@ -164,10 +163,11 @@ def _files(value: str) -> Iterator[tuple[str, Path]]:
 class ScenarioDigests(NamedTuple):
     """SHA-256 digests of a scenario.
 
-    run:         of all files, options, versions, and processor features that affect a run, so that results are reused
-                 only if nothing has changed
-    definition:  of the scenario without the parameters of stacks, and of its world, robots, maps, and meshes, so that
-                 results of two versions of a stack or of simscen can be compared if it is the same
+    Attributes:
+        run: Digest of all files, options, versions, and processor features that affect a run. An old result is reused
+            only if this digest is equal.
+        definition: Digest of the scenario without the parameters of its stacks, and of its world, robots, maps, and
+            meshes. Results of two versions of a stack or of simscen are compared only if this digest is equal.
     """
 
     run: str
@@ -175,12 +175,12 @@ class ScenarioDigests(NamedTuple):
 
 
 def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
-    """Return the digests of a scenario. Raises OSError.
+    """Return the digests of a scenario. Raises OSError if a file cannot be read.
 
     The files are the scenario with `extends`, `defaults.yaml`, world, map, and robot, and all files that these refer
-    to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. Moving a file changes the
-    digest of the run, and so does a change of an installed package that the scenario uses. The definition does not
-    depend on where files are, nor on comments in the scenario.
+    to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. `run` changes if a file moves or
+    if an installed plug-in that the scenario uses changes. `definition` depends neither on the folders of files nor on
+    comments in the scenario.
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
     files = {
@@ -190,7 +190,7 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
     for name, data in (*texts.items(), *files.items()):
         _hash_file(run, name, data)
-    defining = {name: data for name, data in texts.items() if name.endswith(WORLD_AND_ROBOT_FILES)} | files
+    defining = {name: data for name, data in texts.items() if name.endswith(DEFINING_SUFFIXES)} | files
     # Only the names of files, because the shipped robots are installed elsewhere on another machine.
     contents = sorted((PurePath(name).name, hashlib.sha256(data).hexdigest()) for name, data in defining.items())
     definition = json.dumps([_definition(loaded), contents], sort_keys=True, default=str)
@@ -215,12 +215,12 @@ def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {**{key: value for key, value in entry.items() if key not in ("stack", "extends")}, "stack": common}
 
 
-WORLD_AND_ROBOT_FILES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
-"""Endings of the files, besides those that they refer to, that define a scenario."""
+DEFINING_SUFFIXES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
+"""Suffixes of the text files of worlds and robots, whose content is part of the digest `definition`."""
 
 
 def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
-    """Return everything besides files that affects a run. The seed is not included: it is part of the run's key."""
+    """Return everything besides files and the seed that affects a run."""
     return {
         "versions": software_versions(),
         "code": source_digest(),
@@ -235,7 +235,7 @@ def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def _stacks(loaded: LoadedScenario) -> dict[str, object]:
-    """Return stacks that were chosen on the command line or in the user's configuration."""
+    """Return the stack that was chosen on the command line or in the user's configuration, for each robot."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.external_command is None else {"runs": loaded.external_command.digest}),

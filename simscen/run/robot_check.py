@@ -1,8 +1,9 @@
-"""Check a robot in trial drives in an empty world: does it follow its commands, and is its odometry correct?"""
+"""Drive a robot in an empty world, and check that it follows its commands and that its odometry is correct."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
@@ -15,18 +16,18 @@ from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 TICK_RATE_HZ = 240
-COMMAND_PERIOD = TICK_RATE_HZ // FIRMWARE_RATE_HZ
+COMMAND_PERIOD_TICKS = TICK_RATE_HZ // FIRMWARE_RATE_HZ
 """Ticks between two commands; the robot reaches each velocity before the next command."""
 REST_TICKS, SETTLING_TICKS = 240, 60
 """Ticks at rest before the first trial and after each leg."""
 LINE_LENGTH_M, SQUARE_SIDE_M = 2.0, 1.0
 """Lengths of the straight line and of a side of the square."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.5, 1.0
-"""Largest speeds in m/s and rad/s; at most SPEED_FRACTION of the robot's limits."""
+"""Largest speeds of the trials."""
 SPEED_FRACTION, ACCELERATION_FRACTION = 0.8, 0.5
-"""Fractions of the robot's limits of speed and of acceleration."""
+"""Largest fractions of the robot's own limits of speed and acceleration that the trials use."""
 CIRCLE_RADIUS_FACTOR = 1.05
-"""Radius of a car's circle relative to its smallest one, so that the steering can still correct."""
+"""Radius of the circle of a robot with Ackermann steering, relative to its smallest one; leaves room to correct."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial: the motion as commanded, by noise-free odometry, and in truth.
+    """One trial drive: the motion that was commanded, the one that noise-free odometry reports, and the true one.
 
     `tilt` is the largest angle in rad between the base and its orientation at rest.
     """
@@ -59,7 +60,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class RestingState:
-    """State after a second at rest: `tilt` in rad, `height` of the base frame and `drift` in m."""
+    """State after a second at rest: `tilt` in rad; `height` of the base frame above the ground and `drift` in m."""
 
     tilt: float
     height: float
@@ -76,7 +77,7 @@ class _Leg:
 
 
 def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
-    """Drive a line, a full turn (a car: a circle), a square, and sideways if the base is holonomic.
+    """Drive a line, a turn in place (with Ackermann steering: a circle), a square, and, if holonomic, sideways.
 
     Raises RunError if the simulation becomes unstable.
     """
@@ -116,7 +117,7 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
     commanded, odometry, truth = _MotionRecorder(), _MotionRecorder(), _MotionRecorder()
     for twist in (twist for leg in legs for twist in _commands(leg, body)):
         simulation.drive(twist)
-        simulation.step(COMMAND_PERIOD)
+        simulation.step(COMMAND_PERIOD_TICKS)
         commanded.append(commanded.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE_HZ for part in twist)))))
         new_encoders = simulation.encoders()
         step = motion(tuple(b - a for a, b in zip(encoders, new_encoders, strict=True)))
@@ -132,17 +133,10 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
 def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
     """Yield a trapezoidal velocity profile for a leg, then a stop."""
     model = robot_model(body)
-    spans = [
-        (
-            leg.forward,
-            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_linear),
-            min(model.linear_acceleration, model.linear_deceleration),
-        ),
-        (
-            leg.left,
-            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_lateral),
-            min(model.linear_acceleration, model.linear_deceleration),
-        ),
+    linear_acceleration = min(model.linear_acceleration, model.linear_deceleration)
+    spans = [  # distance or angle, largest speed, largest acceleration
+        (leg.forward, min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_linear), linear_acceleration),
+        (leg.left, min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_lateral), linear_acceleration),
         (leg.turn, min(MAX_TURN_RATE_RAD_S, SPEED_FRACTION * model.max_angular), model.angular_acceleration),
     ]
     rate = min(speed / abs(span) for span, speed, _ in spans if span)
@@ -157,11 +151,11 @@ def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
     cruising = math.ceil(remaining * FIRMWARE_RATE_HZ / rate)
     rates = [*ramp, *[remaining * FIRMWARE_RATE_HZ / max(1, cruising)] * cruising, *reversed(ramp)]
     yield from (Twist(leg.forward * r, leg.left * r, leg.turn * r) for r in rates)
-    yield from [STOP] * (SETTLING_TICKS // COMMAND_PERIOD)
+    yield from [STOP] * (SETTLING_TICKS // COMMAND_PERIOD_TICKS)
 
 
 class _MotionRecorder:
-    """Recorder of a motion."""
+    """Sum of the motion along a sequence of poses that starts at the origin."""
 
     def __init__(self) -> None:
         self._path, self._driven, self._turned = [Pose2(0.0, 0.0, 0.0)], 0.0, 0.0
@@ -192,19 +186,35 @@ def _lean(pose: Pose3) -> tuple[float, float]:
 
 
 MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.002, 0.001
-"""At rest: tilt, height of the wheels above or below the ground, and drift in a second."""
+"""Largest values at rest: tilt, distance of the wheels from the ground, and drift in a second."""
 MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
 """Largest relative errors of the distance driven on a line: from the commanded distance, and from odometry."""
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
 """Largest heading at the end of the line, and largest tilt of the base at any time."""
 NEGLIGIBLE_CORRECTION = 0.005
 """Relative deviation of a dimension that needs no correction."""
-ROLLING_LIMITS = (0.02, 0.02, 0.02, 0.05)
-SKID_STEER_LIMITS = (0.10, 0.03, 0.04, 0.50)
-"""Largest relative errors: turned angle from commanded; turned angle by odometry from true; end of the square by
-odometry from true, relative to its length; offset while turning in place, relative to the circumscribed radius.
-Skid-steer robots turn as if their track were wider, by a ratio that changes with load and speed, so that no track fits
-every turn (Mandow et al., Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
+
+
+class TurnLimits(NamedTuple):
+    """Largest relative errors in trials with turns.
+
+    Attributes:
+        angle: True angle of the turn, compared with the commanded one.
+        odometry: Angle of the turn by odometry, compared with the true one.
+        square_end: Distance from the true end of the square to its end by odometry, relative to its length.
+        offset: Distance from the start while turning in place, relative to the circumscribed radius.
+    """
+
+    angle: float
+    odometry: float
+    square_end: float
+    offset: float
+
+
+ROLLING_LIMITS = TurnLimits(angle=0.02, odometry=0.02, square_end=0.02, offset=0.05)
+SKID_STEER_LIMITS = TurnLimits(angle=0.10, odometry=0.03, square_end=0.04, offset=0.50)
+"""Larger, because skid-steer robots turn as if their track were wider, by a ratio that changes with load and speed
+(Mandow et al., Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
 
 
 @dataclass(frozen=True)
@@ -233,13 +243,13 @@ class RobotCheckResult:
     climb: ClimbLimits
 
     @property
-    def failed(self) -> int:
+    def failed_count(self) -> int:
         """Number of failed checks."""
         return sum(not check.passed for check in self.checks)
 
 
 def check_robot(body: RobotBody) -> RobotCheckResult:
-    """Drive a robot and check it. Raises RunError if the simulation becomes unstable."""
+    """Run all trials of a robot and check them. Raises RunError if the simulation becomes unstable."""
     rest, trials = run_trials(body)
     return RobotCheckResult(
         rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})), compute_climb_limits(body)
@@ -247,9 +257,7 @@ def check_robot(body: RobotBody) -> RobotCheckResult:
 
 
 def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> Iterator[DriveCheck]:
-    turn_limit, odometry_limit, end_limit, max_offset = (
-        SKID_STEER_LIMITS if isinstance(body.drive, SkidSteer) else ROLLING_LIMITS
-    )
+    limits = SKID_STEER_LIMITS if isinstance(body.drive, SkidSteer) else ROLLING_LIMITS
     yield DriveCheck(
         "at rest: leans", math.degrees(rest.tilt), math.degrees(MAX_REST_TILT_RAD), "deg", "its wheels do not carry it"
     )
@@ -257,7 +265,8 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     yield DriveCheck("at rest: creeps in a second", 1e3 * rest.drift, 1e3 * MAX_REST_DRIFT_M, "mm")
     line = trials["line"]
     yield _deviation_check("line: driven, from commanded", line.truth.driven, line.command.driven, MAX_DISTANCE_ERROR)
-    yield DriveCheck("line: heading at its end", _degrees(line.truth.end.yaw), math.degrees(MAX_HEADING_RAD), "deg")
+    heading = abs(math.degrees(line.truth.end.yaw))
+    yield DriveCheck("line: heading at its end", heading, math.degrees(MAX_HEADING_RAD), "deg")
     advice = _wheel_radius_advice(body.drive, line)
     yield _deviation_check(
         "line: odometry, from true distance", line.odometry.driven, line.truth.driven, MAX_ODOMETRY_ERROR, advice
@@ -265,15 +274,15 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     turn = trials.get("turn") or trials["circle"]
     advice = _track_width_advice(body.drive, turn, line) or advice
     yield _deviation_check(
-        f"{turn.name}: turned, from commanded", turn.truth.turned, turn.command.turned, turn_limit, advice
+        f"{turn.name}: turned, from commanded", turn.truth.turned, turn.command.turned, limits.angle, advice
     )
     yield _deviation_check(
-        f"{turn.name}: odometry, from true angle", turn.odometry.turned, turn.truth.turned, odometry_limit, advice
+        f"{turn.name}: odometry, from true angle", turn.odometry.turned, turn.truth.turned, limits.odometry, advice
     )
     if turn.name == "turn":
         offset = max(math.hypot(pose.x, pose.y) for pose in turn.truth.path)
         yield DriveCheck(
-            "turn: off the spot", offset, max_offset * body.circumscribed_radius, "m", _offset_advice(body)
+            "turn: off the spot", offset, limits.offset * body.circumscribed_radius, "m", _offset_advice(body)
         )
     if sideways := trials.get("sideways"):
         yield _deviation_check(
@@ -284,24 +293,14 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
         )
     square = trials["square"]
     gap = square.odometry.end.distance(square.truth.end)
-    yield DriveCheck("square: odometry's end from the true", gap, end_limit * square.command.driven, "m")
-    max_tilt = max(trial.tilt for trial in trials.values())
-    yield DriveCheck(
-        "driving: leans at most",
-        math.degrees(max_tilt),
-        math.degrees(MAX_DRIVING_TILT_RAD),
-        "deg",
-        "lower its mass, or its limits",
-    )
+    yield DriveCheck("square: odometry's end from the true", gap, limits.square_end * square.command.driven, "m")
+    tilt, max_tilt = math.degrees(max(trial.tilt for trial in trials.values())), math.degrees(MAX_DRIVING_TILT_RAD)
+    yield DriveCheck("driving: leans at most", tilt, max_tilt, "deg", "lower its mass, or its limits")
 
 
 def _deviation_check(name: str, value: float, expected: float, limit: float, advice: str = "") -> DriveCheck:
     """Return a check of the deviation from the correct value, in percent of it."""
     return DriveCheck(name, 100 * abs(value - expected) / max(abs(expected), 1e-9), 100 * limit, "%", advice)
-
-
-def _degrees(angle: float) -> float:
-    return abs(math.degrees(angle))
 
 
 def _offset_advice(body: RobotBody) -> str:
@@ -325,13 +324,13 @@ def _track_width_advice(drive: Drive, turn: Trial, line: Trial) -> str:
     separation = getattr(drive, "wheel_separation", None)
     if separation is None or turn.truth.turned * turn.odometry.turned <= 0 or line.odometry.driven <= 0:
         return ""
-    share = turn.odometry.turned / turn.truth.turned * line.truth.driven / line.odometry.driven
-    if abs(share - 1) <= NEGLIGIBLE_CORRECTION:
+    ratio = turn.odometry.turned / turn.truth.turned * line.truth.driven / line.odometry.driven
+    if abs(ratio - 1) <= NEGLIGIBLE_CORRECTION:
         return ""
     if isinstance(drive, Mecanum):
         lever = drive.wheels.lever
-        return f"half track + half base x cot(roller_angle) {lever:.4g} m: {lever * share:.4g} m fits"
+        return f"half track + half base x cot(roller_angle) {lever:.4g} m: {lever * ratio:.4g} m fits"
     if isinstance(drive, SkidSteer):
-        track = separation * drive.turning_scale * share
-        return f"turning_scale {drive.turning_scale:.4g}: {drive.turning_scale * share:.4g} fits (track {track:.4g} m)"
-    return f"wheel_separation {separation:g} m: {separation * share:.4g} m fits"
+        track = separation * drive.turning_scale * ratio
+        return f"turning_scale {drive.turning_scale:.4g}: {drive.turning_scale * ratio:.4g} fits (track {track:.4g} m)"
+    return f"wheel_separation {separation:g} m: {separation * ratio:.4g} m fits"

@@ -1,4 +1,4 @@
-"""Properties of a robot that stacks and logs need: its model, its sensors, and its latencies."""
+"""Connection of a robot with its stack: robot model, sensors, latencies, and the ticks at which something is due."""
 
 import math
 from collections import deque
@@ -38,13 +38,13 @@ def robot_model(body: RobotBody) -> RobotModel:
 
 
 def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the type of readings of each sensor by name, in the order in which they are read."""
+    """Return the class name of the readings of each sensor, such as "Scan", by sensor name in reading order."""
     truth = {TRUTH: Odometry.__name__} if prepared.stack.gets_ground_truth else {}
     return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | truth
 
 
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
-    """Return the mount pose of each sensor that has one, relative to the base."""
+    """Return the mount pose in the base frame of each sensor that has one, by sensor name."""
     mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
     return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}
 
@@ -53,7 +53,7 @@ StackT = TypeVar("StackT", bound=StackBase)
 
 
 def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
-    """Return the stack with `latency: robot` replaced by the latencies in the robot's file."""
+    """Return the stack with the latencies of the robot's file if it has `latency: robot`, else the same stack."""
     if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(
@@ -73,7 +73,7 @@ def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, i
 
 
 def command_latencies(prepared: PreparedScenario, clock: Clock) -> Iterator[int]:
-    """Yield the delays in ticks from a control step to the resulting commands."""
+    """Yield the delays in ticks after which commands of a control step take effect; none without latencies."""
     stack = with_robot_latency(prepared.stack, prepared.robot)
     if isinstance(stack, StackSpec) and isinstance(stack.latency, Latency):
         yield clock.ticks(stack.latency.controller)
@@ -124,22 +124,18 @@ class SensorSuite:
 
 
 class TickSchedule:
-    """Schedule of all ticks that are a multiple of a period, or a fixed number of ticks later.
+    """Ticks at which something is due: multiples of periods, and ticks at fixed delays after such multiples.
 
-    Computes each tick on demand, because the least common multiple of the periods can be large.
+    Each tick is computed on demand, because a table up to the least common multiple of the periods could be large.
     """
 
     def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
-        """`delayed`: pairs of a period and the delay after each multiple of it, in ticks."""
+        """All in ticks. `delayed` has pairs of a period and the delay after each of its multiples."""
         offsets = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
         first, *others = sorted(
             offset for offset in offsets if not any(_is_covered_by(offset, other) for other in offsets)
         )
         (self._period, self._offset), self._others = first, others
-
-    def due(self, tick: int) -> bool:
-        """Return whether anything is due at a tick."""
-        return self.until_next(tick - 1) == 1
 
     def until_next(self, tick: int) -> int:
         """Return the number of ticks from `tick` to the next due tick; at least 1."""

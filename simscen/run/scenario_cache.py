@@ -1,7 +1,7 @@
 """Cache prepared scenarios in memory, and maps and shortest paths of worlds on disk.
 
-Maps and shortest paths take most of the time to prepare a scenario. Fusing solids and reading meshes is faster than
-looking them up, so these are not cached.
+Maps and shortest paths take most of the time to prepare a scenario. Meshes are not cached, because reading and merging
+them is faster than looking them up.
 """
 
 import contextlib
@@ -37,18 +37,20 @@ from simscen.worlds.maps.occupancy_map import draw_map
 from simscen.worlds.routes.shortest_paths import Leg, legs_between
 
 CACHE_DIR_VARIABLE, CACHE_OFF = "SIMSCEN_CACHE_DIR", "off"
+"""Environment variable with the absolute path of the cache folder, and its value that disables the disk cache."""
 CACHE_FORMAT = "worlds-1"
-"""Name of the cache folder; changes with the format."""
+"""Name of the subfolder for entries; must change with their format."""
 MAX_CACHE_BYTES = 256_000_000
-"""Size limit of the cache. The least recently used entries are deleted first."""
+"""Size limit of the cache on disk. The least recently used entries are deleted first."""
 MAX_ENTRY_BYTES = 32_000_000
-_DIGEST = hashlib.sha256().digest_size
+"""Size limit of one entry; larger ones are not stored."""
+_DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def cache_folder(environment: Mapping[str, str]) -> Path | None:
-    """Return $SIMSCEN_CACHE_DIR, or simscen in $XDG_CACHE_HOME or ~/.cache (XDG Base Directory).
+    """Return the folder for entries in $SIMSCEN_CACHE_DIR, or else in simscen in $XDG_CACHE_HOME or ~/.cache.
 
-    Returns None for $SIMSCEN_CACHE_DIR=off and if there is no home folder.
+    Returns None, to disable the disk cache, if $SIMSCEN_CACHE_DIR is `off` or not absolute, or without a home folder.
     """
     if (configured := environment.get(CACHE_DIR_VARIABLE)) is not None:
         return Path(configured) / CACHE_FORMAT if configured != CACHE_OFF and Path(configured).is_absolute() else None
@@ -59,9 +61,9 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """Cache with one file per key, a hexadecimal number. Concurrent sessions can share the folder.
+    """Cache with one file per entry, whose name is the key of the entry. Concurrent sessions can share the folder.
 
-    Without a `folder`, the cache is disabled. `max_bytes` limits the size of all entries together.
+    Without a `folder`, the cache is disabled. `max_bytes` limits the total size of all entries.
     """
 
     def __init__(self, folder: Path | None, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -74,7 +76,7 @@ class DiskCache:
         return self._folder is not None
 
     def get(self, key: str) -> bytes | None:
-        """Return the entry of a key, or None if it is missing or damaged."""
+        """Return the entry of a key and mark it as used, or return None if the entry is missing or damaged."""
         if self._folder is None or not is_private_folder(self._folder):
             return None
         try:
@@ -87,8 +89,8 @@ class DiskCache:
                 os.utime(descriptor)
         except OSError:  # missing or unreadable: the caller computes it again
             return None
-        content = data[_DIGEST:]
-        return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST] else None
+        content = data[_DIGEST_BYTES:]
+        return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST_BYTES] else None
 
     def put(self, key: str, content: bytes) -> None:
         """Store an entry, unless it is too large or the folder does not belong to this user alone."""
@@ -116,7 +118,7 @@ class DiskCache:
 
 
 def is_private_folder(folder: Path) -> bool:
-    """Return whether a folder belongs to this user and no other user can write to it."""
+    """Return whether a folder exists, belongs to this user, and no other user can write to it."""
     try:
         status = folder.lstat()
     except OSError:
@@ -155,47 +157,51 @@ def _files(folder: Path) -> list[tuple[int, int, str]]:
 
 
 _LEGS = TypeAdapter(list[Leg])
-_MAP = struct.Struct("<II4d")
-_PACKAGES = ("core", "grid_graph.py", "worlds")
-"""Packages whose code affects the cached results."""
+_MAP_HEADER = struct.Struct("<II4d")
+"""Rows, columns, resolution (m), and origin (x, y, yaw) of a map, before its cells."""
+_CODE_PARTS = ("core", "grid_graph.py", "worlds")
+"""Packages and modules of simscen whose code affects the cached results."""
 
 
 class CachedWorldBuilder:
-    """Builds maps and shortest paths, or reads them from the disk cache. Results are identical to the last bit."""
+    """Reads maps and shortest paths from the disk cache, or computes them. Both give the same bits."""
 
-    def __init__(self, files: DiskCache) -> None:
-        self._files = files
+    def __init__(self, cache: DiskCache) -> None:
+        self._cache = cache
 
     def build(self, world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
-        """Return the world with its surface and the map at the height of the lidar in m."""
-        if not self._files.is_enabled:
+        """Return the world with its mesh, and its map (cells of `resolution` m) at the height of the lidar in m."""
+        if not self._cache.is_enabled:
             return build_world_and_map(world, lidar_height, resolution)
         mesh = merge_solids(world.solids)
         places = [tuple(pose) for pose in world.places.values()]
         grid = world.grid and (world.grid.cells, world.grid.resolution, world.grid.origin)
         key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, resolution)
-        cached = _map_from_bytes(self._files.get(key))
+        cached = _map_from_bytes(self._cache.get(key))
         if cached is None:
             cached = draw_map(world, mesh, lidar_height, resolution)
-            self._files.put(key, _map_to_bytes(cached))
+            self._cache.put(key, _map_to_bytes(cached))
         return BuiltWorld(world, mesh, cached)
 
     def legs(self, built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
         """Return the shortest path of a disc of `radius` m from each pose to its goal."""
-        if not self._files.is_enabled or not ends:
+        if not self._cache.is_enabled or not ends:
             return legs_between(built, ends, radius)
         goals = [(start, goal.name, goal.pose) for start, goal in ends]
         map_frame = built.world.bounds, built.map.shape, built.map.resolution, built.map.origin
         key = cache_key("legs", _surface(built.mesh), built.mesh.owners, built.mesh.names, map_frame, goals, radius)
-        cached = _legs_from_bytes(self._files.get(key), len(ends))
+        cached = _legs_from_bytes(self._cache.get(key), len(ends))
         if cached is None:
             cached = legs_between(built, ends, radius)
-            self._files.put(key, to_json(cached, inf_nan_mode="strings"))
+            self._cache.put(key, to_json(cached, inf_nan_mode="strings"))
         return cached
 
 
 def cache_key(*parts: object) -> str:
-    """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of them."""
+    """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of such values.
+
+    The key, a SHA-256, also depends on the versions of simscen and other software, and on the processor.
+    """
     sha = hashlib.sha256(_environment_key())
     _update_hash(sha, parts)
     return sha.hexdigest()
@@ -203,8 +209,8 @@ def cache_key(*parts: object) -> str:
 
 @cache
 def _environment_key() -> bytes:
-    """Return the versions, code, and arithmetic that affect the last bit of a result."""
-    return repr((software_versions(), source_digest(*_PACKAGES), arithmetic_fingerprints())).encode()
+    """Return the versions, code, and arithmetic that affect the last bits of results."""
+    return repr((software_versions(), source_digest(*_CODE_PARTS), arithmetic_fingerprints())).encode()
 
 
 def _update_hash(sha: "hashlib._Hash", part: object) -> None:
@@ -232,35 +238,34 @@ def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
 
 
 def _map_to_bytes(grid: OccupancyGrid) -> bytes:
-    return _MAP.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
+    return _MAP_HEADER.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
 
 
 def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:
-    if data is None or len(data) < _MAP.size:
+    if data is None or len(data) < _MAP_HEADER.size:
         return None
-    rows, columns, resolution, x, y, yaw = _MAP.unpack_from(data)
-    if not rows * columns or len(data) != _MAP.size + rows * columns:
+    rows, columns, resolution, x, y, yaw = _MAP_HEADER.unpack_from(data)
+    if not rows * columns or len(data) != _MAP_HEADER.size + rows * columns:
         return None
-    cells = np.frombuffer(data, np.int8, offset=_MAP.size).reshape(rows, columns).copy()
+    cells = np.frombuffer(data, np.int8, offset=_MAP_HEADER.size).reshape(rows, columns).copy()
     return OccupancyGrid(cells, resolution, Pose2(x, y, yaw))
 
 
 MAX_SCENARIOS = 100
-"""Number of scenarios in the cache; a file can have a thousand variations."""
+"""Largest number of prepared scenarios in memory; a file can have a thousand variations."""
 
 
 class ScenarioCache:
-    """Prepares each scenario and builds each world once. Workers inherit its content from the fork server."""
+    """Prepared scenarios and built worlds in the memory of the fork server, which all workers inherit from it."""
 
     def __init__(self, builder: CachedWorldBuilder) -> None:
-        """`builder` uses the disk cache of earlier sessions."""
         self._builder = builder
         self._worlds: dict[str, World] = {}
         self._built: dict[tuple[str, float, float], BuiltWorld] = {}
         self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
 
-    def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
-        """Return the prepared scenario. Raises InvalidInput."""
+    def get_or_prepare(self, loaded: LoadedScenario) -> PreparedScenario:
+        """Return the prepared scenario, and keep it. Raises InvalidInput for unusable files."""
         name = loaded.id, loaded.variation, loaded.stack_name
         cached = self._scenarios.get(name)
         if cached is None or cached.loaded != loaded:

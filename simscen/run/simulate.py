@@ -1,4 +1,4 @@
-"""Simulate a prepared scenario: assemble, run in lockstep, record, and judge."""
+"""Simulate a prepared scenario in lockstep, record the run, and judge it; in a worker, also write its files."""
 
 import gc
 import hashlib
@@ -17,8 +17,6 @@ from simscen.core.records.trace import Trace
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
-from simscen.loading.files.discovery import default_root
-from simscen.loading.scenario import load_scenario
 from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSink
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
@@ -27,11 +25,11 @@ from simscen.run.external.stack import ExternalStack, robot_file
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
-from simscen.run.preparation import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
-"""Receives the setup and the logs of its first robot before the first beat; returns additional logs for that robot."""
+"""Function that receives the setup and the logs of the first robot; returns additional logs for this robot."""
 
 
 def simulate(
@@ -44,9 +42,8 @@ def simulate(
 ) -> Run:
     """Run a prepared scenario with a seed (default: the scenario's own) and judge the run.
 
-    `log` is the MCAP file to write; None writes no log.
-
-    `stack_log` is the file for the output of an external stack; with several robots, each name is added to it.
+    `log` is the MCAP file to write; None writes no log. `attach` is called before the first beat. `stack_log` is the
+    file for the output of an external stack; with several robots, the name of the robot is added to the file name.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, regardless of earlier runs in
     this process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
@@ -102,7 +99,7 @@ def _run_and_judge(
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
-    """End all external stacks concurrently."""
+    """End the processes of external stacks: all at the same time, so that their grace periods do not add up."""
     for stack in stacks:
         stack.release()
     for stack in stacks:
@@ -119,20 +116,13 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
 
 
 def _with_stacks(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
-    """Return the run with the descriptions of the external stacks by robot."""
+    """Return the run with the descriptions of its external stacks, which are given by robot name."""
     robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
     return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
 
 
-def simulate_file(
-    file: Path, seed: int | None, log: Path | None, root: Path | None, world_path: Sequence[Path] = ()
-) -> Run:
-    """Load, prepare and simulate a scenario file. Raises InvalidInput, and what `simulate` raises."""
-    return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
-
-
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
-    """Judge the traces of all robots."""
+    """Judge the traces of all robots, given by robot name. `log` is the MCAP file that the run names."""
     if not prepared.robots:
         return _judge_robot(prepared, seed, traces[ROBOT_NAME], log)
     runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.robots.items()}
@@ -160,7 +150,7 @@ def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path 
 
 
 def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
-    """Return a RunError that names the plug-in whose code raised the exception, or None."""
+    """Return a RunError that names the plug-in whose code raised the exception; None if no plug-in did."""
     packages = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__", ""))
@@ -180,22 +170,21 @@ def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
 
 
 GC_THRESHOLD = 20_000
-"""Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time.
-"""
+"""Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time."""
 
 WriteExtras = Callable[[PreparedScenario, Run, Path], None]
-"""Writes further files of a run, for example a picture."""
+"""Function that writes further files of a run to a folder, for example a picture."""
 
 
 def execute_run(
-    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[MomentSink, ...], finish: WriteExtras
+    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[MomentSink, ...], write_extras: WriteExtras
 ) -> dict[str, Any]:
-    """Execute a run and write run.mcap, result.json, scenario.yaml, and the files of `finish` to `folder`.
+    """Execute a run in a worker and write run.mcap, result.json, scenario.yaml, and extra files to `folder`.
 
     The output of an external stack goes to stack.log and its description to stack.json; with several robots, to
-    stack.ROBOT.log and stack.ROBOT.json.
+    stack.ROBOT.log and stack.ROBOT.json. `logs` also receive the moments of the first robot.
 
-    Returns the end record for the supervisor: the outcome and the SHA-256 of the log.
+    Returns the end record for the supervisor: the `outcome`, and `sha256` of the log.
     """
     if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)
@@ -207,5 +196,5 @@ def execute_run(
         if one.stack:
             file = robot_file(folder / "stack.json", name)
             file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")
-    finish(prepared, run, folder)
+    write_extras(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

@@ -1,4 +1,4 @@
-"""Names of the random streams of events and faults, independent of their order in the scenario."""
+"""Name the random stream of each event and fault so that a change of one entry does not affect the others."""
 
 import json
 from collections import Counter
@@ -13,11 +13,10 @@ from simscen.spec.choice import Choice
 
 
 def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
-    """Return a random stream name for each entry that does not depend on other entries or on their order.
+    """Return the name of the random stream of each entry; it does not depend on other entries or on the order.
 
-    An entry with a name uses the stream of its name, even if the entry is edited. An entry without a name uses the
-    stream of its content, so that editing it changes only its own draws. The k-th of several equal entries uses the
-    k-th stream of this content.
+    The stream of an entry with a `name` has this name, and stays the same if the entry is edited. The stream of another
+    entry is named after its content. Entries with equal names or contents are numbered.
     """
     contents = [f"/{entry.name}" if entry.name is not None else f"={_content_key(entry)}" for entry in entries]
     counts: Counter[str] = Counter()

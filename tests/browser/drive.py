@@ -37,10 +37,12 @@ pass:
 
 def drive(folder: Path, seed: int = 1) -> Path:
     """Run it; the log."""
-    from simscen.run.simulate import simulate_file
+    from simscen.loading.scenario import load_scenario
+    from simscen.run.preparation import prepare
+    from simscen.run.simulate import simulate
 
     folder.mkdir(parents=True, exist_ok=True)
     file, log = folder / "everything.scenario.yaml", folder / "run.mcap"
     file.write_text(SCENARIO)
-    simulate_file(file, seed, log, folder)
+    simulate(prepare(load_scenario(file, folder)), seed, log=log)
     return log

@@ -17,9 +17,11 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from simscen.judge.result_json import from_json
+from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import read_run
 from simscen.report.replay import write_replay
-from simscen.run.simulate import simulate_file
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
 IMAGES = ROOT / "docs" / "images"
@@ -70,7 +72,7 @@ def _runs(folder: Path) -> tuple[Path, Path]:
     file.write_text(text)
     for seed in SEEDS:
         log = folder / f"{seed}.mcap"
-        found.setdefault(simulate_file(file, seed, log, folder).passed, log)
+        found.setdefault(simulate(prepare(load_scenario(file, folder)), seed, log=log).passed, log)
         if len(found) == 2:
             return found[False], found[True]
     sys.exit(f"seeds {SEEDS} all ended alike")

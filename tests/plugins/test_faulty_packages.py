@@ -6,7 +6,9 @@ import pytest
 
 from simscen.core.errors import RunError
 from simscen.core.records.run_result import Outcome
-from simscen.run.simulate import simulate_file
+from simscen.loading.scenario import load_scenario
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
 
 ROBOT = """\
 simscen: 1
@@ -77,7 +79,7 @@ def run(packages, tmp_path):
         if sensor == "map":
             scenario = scenario.replace(", when: {time: 0.5}", "")
         (tmp_path / "s.scenario.yaml").write_text((SCENARIO % scenario).replace("sensor: lidar", f"sensor: {sensor}"))
-        return simulate_file(tmp_path / "s.scenario.yaml", None, None, tmp_path).result
+        return simulate(prepare(load_scenario(tmp_path / "s.scenario.yaml", tmp_path))).result
 
     return driven
 

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from simscen.core.records.events import EventKind
+from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import Log, read_run
 from simscen.report.viewer_layouts import foxglove_layout, rviz_config
-from simscen.run.simulate import simulate_file
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
 
 SCENARIO = """\
 simscen: 1
@@ -50,7 +52,7 @@ def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     home = tmp_path_factory.mktemp(request.param)
     file, log = home / "seen.scenario.yaml", home / "run.mcap"
     file.write_text(SCENARIO + (ONE if request.param == "one" else SEVERAL))
-    simulate_file(file, None, log, None)
+    simulate(prepare(load_scenario(file, home)), log=log)
     return log
 
 

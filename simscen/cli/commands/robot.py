@@ -83,7 +83,7 @@ def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_js
         panels = [(t.name, t.command.path, t.odometry.path, t.truth.path) for t in checked.trials]
         image = draw_drives(body.name, panels, body.footprint)
         save(picture, lambda path: image.save(path, format="PNG"), [file.robot.path])
-    return checked.failed
+    return checked.failed_count
 
 
 def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
@@ -101,8 +101,8 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
     yield from map(_line, checked.checks)
     yield ""
     yield (
-        f"{checked.failed} of {len(checked.checks)} checks failed"
-        if checked.failed
+        f"{checked.failed_count} of {len(checked.checks)} checks failed"
+        if checked.failed_count
         else f"all {len(checked.checks)} checks passed"
     )
 
@@ -128,7 +128,7 @@ def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
     return {
         "robot": body.name,
         "drive": body.drive.type,
-        "passed": not checked.failed,
+        "passed": not checked.failed_count,
         "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
         "rest": asdict(checked.rest),
         "trials": [_trial(trial) for trial in checked.trials],

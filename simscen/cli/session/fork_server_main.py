@@ -118,7 +118,7 @@ def _warm_up(job: Job) -> None:
     """
     if _used_memory() > MAX_MEMORY_BYTES / 2:
         _SCENARIOS.clear()
-    prepared = _SCENARIOS.prepared(job.scenario)
+    prepared = _SCENARIOS.get_or_prepare(job.scenario)
     import_components(prepared)
     precompute(prepared)
     log_header(prepared, job.key.seed)
@@ -131,7 +131,7 @@ def _used_memory() -> int:
 
 
 def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, Any]:
-    prepared = _SCENARIOS.prepared(job.scenario)
+    prepared = _SCENARIOS.get_or_prepare(job.scenario)
     progress = ProgressReporter(prepared.spec.physics.tick_rate, report_progress)
     return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, replay=job.replay))
 

@@ -1,1 +1,1 @@
-"""External stacks: navigation stacks in processes of their own that use the stack protocol."""
+"""Run navigation stacks in processes of their own, with which simscen exchanges frames of the stack protocol."""

@@ -1,11 +1,11 @@
-"""Decode and validate the answer of an external stack."""
+"""Decode and validate the ROS messages in an answer of an external stack."""
 
 from __future__ import annotations
 
 import math
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 MAX_PARTICLES = 1_000_000
 _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
-"""Indices of the covariance over x, y, yaw in the 36 numbers of a message."""
+"""Indices of the covariance over x, y, yaw in the 36 numbers of a ROS covariance."""
 _PLANAR_DIAGONAL = (0, 7, 35)
-"""Indices of the variances of x, y, yaw in the 36 numbers of a message."""
+"""Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Numbers per reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), and pose covariance (9)."""
+"""Numbers per exact reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
-"""Messages of an answer by topic, in order."""
+"""Encoded messages of an answer by topic name, in order."""
 T = TypeVar("T")
 
 MAX_QUATERNION_COMPONENT = 1.01
@@ -49,9 +49,9 @@ MAX_QUATERNION_COMPONENT = 1.01
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A decoded answer; None for missing messages. A path without poses means that no plan is followed.
+    """A decoded answer. A field is None or empty if the answer has no such message.
 
-    `correction` is the pose of the odom frame in the map frame.
+    A `plan` without poses means that the stack follows none. `correction` is the pose of the odom frame in the map.
     """
 
     command: Twist | None = None
@@ -60,13 +60,16 @@ class Answer:
     belief: Belief | None = None
     correction: Pose2 | None = None
     events: tuple[dict[str, Any], ...] = ()
-    lines: tuple[LogLine, ...] = field(default=())
+    lines: tuple[LogLine, ...] = ()
     costmaps: tuple[CostGrid, ...] = ()
     odometry: tuple[Odometry, ...] = ()
 
 
 def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesByTopic:
-    """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown topic."""
+    """Return the messages of an answer by topic; `topic_names` has the name of each topic number.
+
+    Raises ProtocolViolation for an unknown number.
+    """
     found: MessagesByTopic = {}
     for number, data in messages:
         if number not in topic_names:
@@ -78,11 +81,11 @@ def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesB
 def decode_answer(
     messages: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
 ) -> Answer:
-    """Decode the answer at `tick`.
+    """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
-    `correction` is the last received pose of the odom frame in the map frame. If the stack never sent one, it is
-    computed from the belief and the pose of its filtered odometry, or else from `dead_reckoned`, the pose of the wheel
-    odometry. Raises ProtocolViolation.
+    `correction` is the last received pose of the odom frame in the map frame. If it is None, because the stack never
+    sent one, it is computed from the belief and the pose of the stack's filtered odometry, or else of wheel odometry,
+    which is `dead_reckoned`.
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")

@@ -1,7 +1,7 @@
-"""Track the goals of an external stack from the events that it reports.
+"""Track the goals of an external stack from the events that the stack reports.
 
-The stack reports only the outcome of a goal. The tracker knows which goal is current, and derives preemption and the
-end of the task, so that the events of a log are always consistent.
+A stack reports only which goal it accepts and how each goal ends. The tracker checks these reports, and adds the events
+of preemption and of the end of the task, so that the events of a log are always consistent.
 """
 
 from typing import Any
@@ -13,7 +13,9 @@ from simscen.run.external.protocol import ProtocolViolation
 from simscen.stack.tasks import Task
 
 MAX_ERROR_CODE = 65_535
+"""Nav2's error codes are uint16."""
 MAX_TEXT_LENGTH = 4096
+"""Number of characters to which names and messages are cut."""
 _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
     EventKind.ROBOT_HELD.value,
     EventKind.ROBOT_RELEASED.value,
@@ -22,7 +24,7 @@ _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")
 
 
 class GoalTracker:
-    """The goals of a run and their state as reported by the stack."""
+    """Goals of a robot and their state as reported by its stack; collects the events of the log."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
         """If `stop_on_failure` is true, a failed goal ends the task. `mode` is the action by which goals are sent."""
@@ -32,21 +34,21 @@ class GoalTracker:
         self._dropped: set[str] = set()
 
     def start(self, goals: tuple[Goal, ...]) -> None:
-        """Start a new task."""
+        """Start the task with these goals, none of which is accepted yet."""
         self._task.start(goals)
 
     @property
     def goal(self) -> Goal | None:
-        """The current goal."""
+        """The current goal; None before the first is accepted and between two goals."""
         return self._task.goal
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by another one."""
+        """Replace the current goal by another one, which the stack must accept next."""
         self._drop()
         self._events += self._task.preempt(tick, goal)
 
     def process(self, tick: int, report: dict[str, Any]) -> None:
-        """Process an event that the stack reports. Raises ProtocolViolation."""
+        """Process an event with `kind`, `name`, and `data` from the stack. Raises ProtocolViolation if invalid."""
         kind, name, data = report.get("kind"), report.get("name", ""), report.get("data", {})
         if not isinstance(kind, str) or not isinstance(name, str) or not isinstance(data, dict):
             raise ProtocolViolation(f"an invalid event: {str(report)[:100]}")
@@ -75,11 +77,11 @@ class GoalTracker:
                 raise ProtocolViolation(f"an event `{kind[:60]}`, which a stack may not report")
 
     def advance(self, tick: int) -> None:
-        """Advance to a tick, which can end a wait at a goal and the task."""
+        """Advance to a tick; the wait at a goal, and with it the task, can end there."""
         self._events += self._task.end_wait(tick)
 
     def fail_if_timed_out(self, tick: int) -> bool:
-        """Fail the current goal if its timeout has passed; return whether it has."""
+        """Fail the current goal if its timeout has passed; return whether that is so."""
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False

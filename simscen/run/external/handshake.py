@@ -1,4 +1,4 @@
-"""Handshake with an external stack: the content of HELLO and GOAL, and the parsed WELCOME.
+"""Handshake with an external stack: build the content of HELLO and GOAL, and parse WELCOME.
 
 docs/reference/stack-protocol.md defines these frames.
 """
@@ -28,7 +28,8 @@ class RunParameters:
         mounts: Pose in the base frame by sensor name; sensors without a mount are missing.
         rates: Readings per second by sensor name; sensors without a known rate are missing.
         robot_description: URDF of the robot.
-        stop_on_failure: Whether the stack must stop after a failed goal instead of going on to the next one.
+        stop_on_failure: Whether the stack must stop after a failed goal instead of driving to the next one.
+        mode: Action by which goals are sent.
         robot_name: Name of the robot; "" for a single robot.
         switchable_zones: Zones that events can switch.
     """
@@ -55,9 +56,8 @@ def hello_content(
 ) -> dict[str, Any]:
     """Return the content of HELLO.
 
-    `topic_table` numbers the topics of the run. `sensor_topics` are pairs of a sensor name and a topic of that sensor.
-    `zone_masks` says what the values of each mask of zones mean.
-    `answer_limit` is the wall time in s that the stack may take for each answer.
+    `sensor_topics` has pairs of a sensor name and a topic of that sensor. `zone_masks` says what the values of zone
+    masks mean (see ZoneMasks.meanings). `answer_limit` is the wall time in s that the stack may take for each answer.
     """
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
@@ -94,7 +94,7 @@ def hello_content(
 
 
 def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunParameters) -> dict[str, Any]:
-    """Return the content of GOAL: the initial estimate of the pose, all goals, and how to drive to them."""
+    """Return the content of GOAL: initial estimate of the pose, all goals, and what to do after a failed one."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
@@ -161,12 +161,14 @@ def _polygon(corners: Any) -> list[list[float]]:
 
 MAX_NAME_LENGTH = 200
 MAX_ABOUT_LENGTH = 1 << 20
+"""Largest numbers of characters of `name` and `version`, and of `about`."""
 MAX_FIRST_ANSWER_S = 3700
+"""Largest value of `first_answer_limit` and `first_answer_until`."""
 
 
 @dataclass(frozen=True)
 class Welcome:
-    """WELCOME of an external stack: who it is, and what it requests.
+    """Content of WELCOME, the first frame of a stack: its name and version, and what it requests.
 
     Attributes:
         name: Name of the stack.
@@ -174,8 +176,8 @@ class Welcome:
         topics: Names of the topics to send to the stack.
         every_beat: Whether the stack requests a step at each beat with messages, not only when a command is due.
         about: Further information that the stack gives about itself, for the log.
-        first_answer_limit: Wall time in s for the first answer; it counts only if it is longer than `answer_limit`.
-        first_answer_until: Simulated time in s until which this limit applies to all answers.
+        first_answer_limit: Wall time in s for the first answer, if that is longer than `answer_limit`.
+        first_answer_until: Simulated time in s up to which `first_answer_limit` applies to all answers.
     """
 
     name: str = ""

@@ -1,10 +1,10 @@
 """Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
-Internal program. It starts the stack and reports how it exits. When the run is over or its process has ended, it kills
-the stack and all of its descendants.
+A worker starts this internal program with three file descriptors. It reads the command of the stack from CONTROL,
+starts the stack, which inherits SOCKET, and writes to REPORT how the stack exits. When it reads a byte from CONTROL, or
+when the worker dies, it kills the stack and all of its descendants.
 """
 
-import ctypes
 import errno
 import json
 import os
@@ -16,17 +16,18 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from simscen.run.process.isolation import adopt_orphans, kill_children_except
+from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except
 
 EXIT_GRACE_S = 0.5
 """Time in which a stack can exit by itself after the run, so that its last output is not lost."""
 TERM_GRACE_S = 0.5
 """Time between SIGTERM and SIGKILL."""
 MAX_OPEN_FILES = 1024
-_PR_SET_PDEATHSIG = 1
+"""Soft limit for the stack, the usual default of Linux; that of the worker is lower."""
 
 
 def main() -> None:
@@ -45,7 +46,7 @@ def main() -> None:
             stdin=subprocess.DEVNULL,
             pass_fds=[stream],
             start_new_session=True,
-            preexec_fn=_die_with_launcher,  # noqa: PLW1509 - this program has one thread
+            preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - this program has one thread
         )
     except (OSError, ValueError) as error:
         _send_report(report, {"failed": _start_failure(error)})
@@ -85,7 +86,7 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> boo
 
 
 def _end(process: "subprocess.Popen[bytes]", grace: float) -> None:
-    """Give the stack `grace` seconds to exit, or terminate its process group; then kill all of its descendants."""
+    """Terminate the process group of the stack if it does not exit within `grace` s; then kill all descendants."""
     _wait(process, grace)
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGTERM)
@@ -107,10 +108,6 @@ def _restore_user_limits() -> None:
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     soft = MAX_OPEN_FILES if hard == resource.RLIM_INFINITY else min(MAX_OPEN_FILES, hard)
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def _die_with_launcher() -> None:
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
 def _send_report(report: int, message: dict[str, Any]) -> None:

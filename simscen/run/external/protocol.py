@@ -1,7 +1,7 @@
-"""Topics and error kinds of the stack protocol.
+"""Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
 ROS messages lose precision: headings become quaternions, ranges become float32. A topic `NAME/exact` carries the values
-of `NAME` in full precision. It has no stamp: in one frame, its n-th message belongs to the n-th message on `NAME`.
+of `NAME` in full precision. Its messages have no stamp: in one frame, its n-th message belongs to the n-th on `NAME`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,10 +17,10 @@ EXACT_SUFFIX = "/exact"
 INITIAL_POSE = Topic("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", latched=True)
 KEEPOUT_MASK = Topic("/keepout_filter_mask", topics.MAP.type, latched=True)
 SPEED_MASK = Topic("/speed_filter_mask", topics.MAP.type, latched=True)
-"""The masks of the stack as in their files."""
+"""The masks of the stack as in their files, without the zones of the scenario."""
 KEEPOUT_ZONES = Topic("/keepout_zones", topics.MAP.type, latched=True)
 SPEED_ZONES = Topic("/speed_zones", topics.MAP.type, latched=True)
-"""Masks with the zones that are enabled; sent again when an event switches one."""
+"""The masks of the stack with the enabled zones of the scenario; sent again when an event switches a zone."""
 
 STACK_TOPICS = (
     *(topics.COMMAND, topics.PLAN, topics.LOCAL_PLAN, topics.BELIEF, topics.PARTICLES, topics.TF),
@@ -38,24 +38,24 @@ STACK_TOPICS = (
 
 @dataclass(frozen=True)
 class TopicTable:
-    """Topics of one run by name, numbered from 1 in order: `sent` to the stack, and `accepted` from it."""
+    """Topics of one run by name: `sent` to the stack, and `accepted` from it, each numbered from 1 in order."""
 
     sent: Mapping[str, Topic]
     accepted: Mapping[str, Topic]
 
     @classmethod
     def build(cls, sent: Iterable[Topic]) -> "TopicTable":
-        """Build the table of these topics to the stack, and STACK_TOPICS from it."""
+        """Build the table with these topics to the stack and STACK_TOPICS from it."""
         return cls({topic.name: topic for topic in sent}, {topic.name: topic for topic in STACK_TOPICS})
 
     @property
     def numbers(self) -> dict[str, int]:
-        """The topic number for the name of each topic that is sent to the stack."""
+        """The number of each topic that is sent to the stack, by name."""
         return {name: number for number, name in enumerate(self.sent, start=1)}
 
     @property
     def accepted_by_number(self) -> dict[int, str]:
-        """The name of the topic for each topic number in an answer of the stack."""
+        """The name of each topic that is accepted from the stack, by number."""
         return dict(enumerate(self.accepted, start=1))
 
 

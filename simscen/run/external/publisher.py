@@ -1,9 +1,9 @@
-"""Collects sensor readings, maps, and masks as messages for an external stack, in the encoding of the log."""
+"""Encode sensor readings, maps, and masks as ROS messages for an external stack, in the same way as for the log."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
@@ -31,10 +31,10 @@ _FIRST_STAMP = (0, 0)
 
 
 class StepPublisher:
-    """Collects the messages to send with the next step."""
+    """Collects the messages to send to a stack with the next frame STEP."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
-        """`sensors` are the reading types and `mounts` the poses in the base frame, both by sensor name."""
+        """`sensors` are the reading types, such as "Scan", and `mounts` the poses in the base frame, by sensor name."""
         self._queue: Messages = []
         self._numbers: dict[str, int] = {}
         self._requested_topics: frozenset[str] = frozenset()
@@ -43,9 +43,10 @@ class StepPublisher:
         self._time = SimTime(tick_rate)
         self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
         self.sensor_topics = self._sensors.declared
+        """Pairs of a sensor name and a topic with readings of that sensor."""
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish `grid` (a map or mask) once, with the first step. Does nothing if it is None."""
+        """Publish `grid` (a map or mask) once, with the first step; None publishes nothing."""
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
@@ -63,7 +64,7 @@ class StepPublisher:
             self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 
     def topic_table(self) -> TopicTable:
-        """Return the table of all topics on which messages can be sent, and of those on which a stack may publish."""
+        """Return the table of all topics to and from the stack. Must be called after all calls of `latch`."""
         sent: list[Topic] = []
         for _, topic in self.sensor_topics:
             sent += [topic, *_exact_topics(topic)]
@@ -92,8 +93,7 @@ class StepPublisher:
             if reading.sensor not in self._requested_sensors:
                 continue
             self._sensors.write(now, (reading,))
-            for name, data in self._exact_messages(reading):
-                self._enqueue(name, data)
+            self._publish_exact(reading)
 
     @property
     def has_messages(self) -> bool:
@@ -123,19 +123,13 @@ class StepPublisher:
         if name in self._requested_topics:
             self._queue.append((self._numbers[name], data))
 
-    def _exact_messages(self, reading: Reading) -> Iterator[tuple[str, bytes]]:
-        """Yield topic name and content of the message with the reading in full precision, if it is requested."""
-        match reading:
-            case Scan():
-                name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
-                if name in self._requested_topics:
-                    yield name, messages.float64_array(array("d", _scan(reading).tobytes()))
-            case Odometry():
-                name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
-                if name in self._requested_topics:
-                    yield name, messages.pose2d(*reading.pose)
-            case _:
-                pass
+    def _publish_exact(self, reading: Reading) -> None:
+        """Publish a scan or odometry in full precision, if that is requested."""
+        if not isinstance(reading, Scan | Odometry):
+            return
+        name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
+        if name in self._requested_topics:
+            self._enqueue(name, _exact_scan(reading) if isinstance(reading, Scan) else messages.pose2d(*reading.pose))
 
 
 def _exact_topics(topic: Topic) -> list[Topic]:
@@ -144,7 +138,7 @@ def _exact_topics(topic: Topic) -> list[Topic]:
     return [Topic(topic.name + EXACT_SUFFIX, kinds[topic.type])] if topic.type in kinds else []
 
 
-def _scan(scan: Scan) -> Array:
-    """Return first angle, angle increment, minimum and maximum range, the lidar's x, y, yaw, and the ranges."""
+def _exact_scan(scan: Scan) -> bytes:
+    """Encode first angle, angle increment, minimum and maximum range, the lidar's x, y, yaw, and the ranges."""
     head = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max, *scan.mount)
-    return np.concatenate((np.array(head, dtype=np.float64), scan.ranges))
+    return messages.float64_array(array("d", np.concatenate((head, scan.ranges)).tobytes()))

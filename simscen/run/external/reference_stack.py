@@ -1,7 +1,7 @@
 """The reference stack as an external process: `python -m simscen.run.external.reference_stack STACK`.
 
-STACK is a `stack:` section as JSON (default: empty). Tests use it to verify the protocol: the log of a run is identical
-to the log with the stack inside the worker. `simscen bench` uses it to measure the cost of a beat.
+STACK is a `stack:` section as JSON (default: empty). Tests use this program to verify the protocol: the log of a run is
+identical to the log with the stack inside the worker. `simscen bench` uses it to measure the cost of a beat.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _EMPTY_IMAGE = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.f
 
 
 class ReferenceStackPeer(Peer):
-    """Peer that passes readings to the reference stack and sends its decisions."""
+    """Client of the stack protocol that passes readings to the reference stack and sends the stack's decisions."""
 
     def __init__(self, spec: StackSpec) -> None:
         self._spec = spec

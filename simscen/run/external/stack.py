@@ -1,4 +1,4 @@
-"""External stack: implements the Stack protocol by exchanging frames with another process."""
+"""Implement the Stack protocol by exchanging frames with a stack in another process."""
 
 import sys
 from collections.abc import Callable
@@ -44,7 +44,7 @@ from simscen.sim.urdf.writer import to_urdf
 from simscen.stack.protocols import Surroundings
 
 END_GRACE_S = 2.0
-"""Wall time that a stack may take to exit after the last step."""
+"""Wall time that a stack may take to exit after the frame END."""
 T = TypeVar("T")
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
@@ -71,7 +71,7 @@ class ExternalStack:
     ) -> None:
         """`name` is the stack's name in error messages, and `command` its program, whose output goes to `log_file`.
 
-        HELLO describes `surroundings` and `parameters` to the stack.
+        `surroundings` and `parameters` are what the stack receives in HELLO.
         """
         self._name, self._command, self._log_file = name, command, log_file
         self._surroundings, self._parameters = surroundings, parameters
@@ -93,7 +93,7 @@ class ExternalStack:
         )
 
     def begin(self, estimate: Estimate) -> None:
-        """Start the process and send HELLO."""
+        """Start the process and send HELLO; `estimate` is the initial pose to publish."""
         surroundings, publisher = self._surroundings, self._publisher
         publisher.latch(surroundings.map, topics.MAP)
         publisher.latch(surroundings.masks.keepout, KEEPOUT_MASK)
@@ -117,7 +117,7 @@ class ExternalStack:
         self._process.send(wire.json_frame(wire.HELLO, hello))
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Call `begin` if necessary, receive WELCOME, and send the goals."""
+        """Call `begin` if that was not done, receive WELCOME, and send GOAL with all goals."""
         if self._process is None:
             self.begin(estimate)
         assert self._process is not None
@@ -135,33 +135,33 @@ class ExternalStack:
         self._goals.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by this one."""
+        """Replace the current goal by this one; the stack answers at the next call of `decide`."""
         self._goals.preempt(tick, goal)
         self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
 
     def cancel(self, tick: int) -> None:
-        """Cancel the current goal and all after it."""
+        """Cancel the current goal and all goals after it; the stack answers at the next call of `decide`."""
         self._canceling = True
         self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
 
     @property
     def can_switch_zones(self) -> bool:
-        """Whether the stack subscribed to the masks of zones."""
+        """Whether the stack subscribed to masks of zones, through which it learns of switched zones."""
         return not {KEEPOUT_ZONES.name, SPEED_ZONES.name}.isdisjoint(self._welcome.topics)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Send the masks that change with the next step."""
+        """Send the masks that the enabled `zones` change, together with the next step."""
         for topic, mask in self._zone_masks.changed_masks(zones):
             self._publisher.publish_grid(tick, mask, topic)
 
     @property
     def plan(self) -> Path | None:
-        """The plan that the stack follows, as it reports."""
+        """The last plan that the stack sent; None if it follows no plan."""
         return self._plan
 
     @property
     def goal(self) -> Goal | None:
-        """The current goal as reported by the stack."""
+        """The current goal as reported by the stack; None without one, and after `cancel`."""
         return None if self._canceling else self._goals.goal
 
     @property
@@ -175,7 +175,11 @@ class ExternalStack:
         return {**self.facts, "about": self._welcome.about}
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Send the readings of this beat and return the decision."""
+        """Send the readings of this beat and return the stack's decision.
+
+        The stack is asked only if a command is due, after `preempt` or `cancel`, or if it requested every beat with
+        messages. Otherwise, the readings wait for the next step, and the last command is returned.
+        """
         self._publisher.publish_readings(tick, readings)
         self._odometry = next(
             (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheel_odometry), self._odometry
@@ -193,7 +197,7 @@ class ExternalStack:
             self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
-        """Wait until the stack exits after END."""
+        """Wait until the stack exits after END, for at most END_GRACE_S."""
         if self._process is not None:
             self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
 
@@ -261,7 +265,7 @@ class ExternalStack:
         )
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
-        """Send a request that the stack answers in this beat."""
+        """Send a request that makes the next call of `decide` ask the stack."""
         self._interrupted, self._plan = True, None
         self._send(kind, content)
 

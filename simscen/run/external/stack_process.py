@@ -1,4 +1,4 @@
-"""Process of an external stack and the socket to it."""
+"""Start the process of an external stack, exchange frames with it over a socket, and end it."""
 
 import json
 import os
@@ -18,14 +18,14 @@ from simscen.core.errors import RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.peer import wire
 from simscen.run.external import protocol
-from simscen.run.process.isolation import CappedLog, clean_environment, output_tail
+from simscen.run.process.isolation import READ_BYTES, TAIL_BYTES, CappedLog, clean_environment, output_tail
 
-READ_BYTES = 1 << 20
-TAIL_BYTES = 16_384
 EXIT_TIMEOUT_S = 2.0
 """Time in which a process is expected to exit after it closed its socket."""
 CLEANUP_TIMEOUT_S = 5.0
+"""Time in which the launcher is expected to end the stack with all of its descendants."""
 MAX_MESSAGE_LENGTH = 2000
+"""Number of characters to which error messages of a stack are cut."""
 PEER_PATH_VARIABLE = "SIMSCEN_PEER_PATH"
 """The environment variable with the folder of `simscen_peer`."""
 ROBOT_VARIABLE = "SIMSCEN_ROBOT"
@@ -33,13 +33,14 @@ ROBOT_VARIABLE = "SIMSCEN_ROBOT"
 
 
 class StackProcess:
-    """A running stack. Its output goes to `log_file`; error messages contain the end of the output.
+    """A running stack. Its output goes to `log_file`; error messages contain the last lines of the output.
 
-    All waits have a time limit. Frames, answers, and output are transferred concurrently, so that none blocks another.
+    All waits have a time limit in wall time. Frames in both directions and output are transferred concurrently, so that
+    none blocks another.
     """
 
     def __init__(self, name: str, command: ExternalCommand, log_file: Path | None, robot: str = "") -> None:
-        """Start the command of a stack, for `robot` if there are several."""
+        """Start the command of the stack with this name; `robot` is the robot's name if there are several."""
         self._name = f"{name} of robot `{robot}`" if robot else name
         self._send_buffer, self._receive_buffer, self._report_buffer = bytearray(), bytearray(), bytearray()
         self._exit_message = ""
@@ -50,20 +51,13 @@ class StackProcess:
         control, self._control = os.pipe()
         self._report, report_writer = os.pipe()
         self._output, output_writer = os.pipe()
+        descriptors = (control, report_writer, stack_socket.fileno())
         self._launcher = subprocess.Popen(
-            [
-                sys.executable,
-                "-I",
-                "-m",
-                "simscen.run.external.launcher",
-                str(control),
-                str(report_writer),
-                str(stack_socket.fileno()),
-            ],
+            [sys.executable, "-I", "-m", "simscen.run.external.launcher", *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
             stdout=output_writer,
             stderr=output_writer,
-            pass_fds=[control, report_writer, stack_socket.fileno()],
+            pass_fds=descriptors,
             env=clean_environment(),
             start_new_session=True,
         )
@@ -93,7 +87,7 @@ class StackProcess:
     def exchange(self, frame: bytes, limit_s: float, what: str) -> tuple[int, bytes]:
         """Send a frame and return kind and body of the next one; `what` names the expected answer in errors.
 
-        Raises RunError of a kind in simscen.run.external.protocol.
+        Raises RunError of a kind in simscen.run.external.protocol, e.g. if there is no answer within `limit_s` seconds.
         """
         self.send(frame)
         self._pump(lambda: self._disconnected or self._has_frame(), limit_s)
@@ -112,7 +106,7 @@ class StackProcess:
         self._flush()
 
     def send_end(self, frame: bytes) -> None:
-        """Send END and start the grace period."""
+        """Send the frame END; the grace period of `receive_bye` starts now."""
         self.send(frame)
         self._end_sent_at = time.monotonic()
 
@@ -126,7 +120,7 @@ class StackProcess:
         return b"{}"
 
     def error(self, kind: str, message: str) -> RunError:
-        """Return an error of this stack, with the end of its output."""
+        """Return an error of this stack, with the last lines of its output."""
         self._pump(lambda: False, 0.0)
         output = self._log.tail(TAIL_BYTES).decode(errors="replace")
         return RunError(kind, f"stack {self._name}: {message}", output_tail(output), by_stack=True)

@@ -1,7 +1,7 @@
-"""Masks of Nav2's costmap filters with the zones of a scenario, for stacks that know no polygons.
+"""Draw the zones of a scenario into masks of Nav2's costmap filters, for stacks that do not support polygons.
 
-The zones and the mask file of a stack are drawn into one mask for each filter. A zone that an event switches changes
-the mask.
+The zones and the mask file of a stack are drawn into one mask for each filter. A mask changes when an event switches a
+zone.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     Cells = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 CELL_M = 0.05
-"""Size of the cells of masks for robots without a map."""
+"""Cell size of masks for robots without a map."""
 SPEED_STEP_M_S = 0.01
-"""Finest difference in m/s between two speed limits of a mask."""
+"""Smallest difference between two speed limits in a mask."""
 
 
 def switchable_zones(prepared: PreparedScenario) -> Zones:
-    """Return the zones that events can switch, and their limits."""
+    """Return the zones that events can switch during the run, with their speed limits."""
     keepout: list[Polygon] = []
     speed: list[tuple[Polygon, float]] = []
     for step in prepared.spec.steps:
@@ -50,7 +50,7 @@ def switchable_zones(prepared: PreparedScenario) -> Zones:
 
 
 class ZoneMasks:
-    """Draws zones into masks, which cover the map of the robot or, without a map, all zones."""
+    """Masks with the enabled zones of one robot. They cover its map or, without a map, all zones."""
 
     def __init__(self, surroundings: Surroundings, switchable: Zones) -> None:
         """`surroundings` contains the zones at the start of the run, and `switchable` those that events can switch."""
@@ -64,7 +64,7 @@ class ZoneMasks:
         self._drawn: dict[Topic, OccupancyGrid] = {}
 
     def changed_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
-        """Yield the masks that differ from those of the last call; at the first call, all masks."""
+        """Draw `zones`, the enabled ones, and yield the masks that changed since the last call (at first all masks)."""
         for topic, grid in self._masks(zones):
             before = self._drawn.get(topic)
             if before is None or not np.array_equal(before.cells, grid.cells):
@@ -82,7 +82,7 @@ class ZoneMasks:
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """Topic and filter of each mask; for speed limits also `percent`, `base`, and `multiplier` of its values."""
+        """`topic` and `filter` of each mask; for speed limits also `percent`, `base`, and `multiplier`, as in Nav2."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [
@@ -92,7 +92,7 @@ class ZoneMasks:
 
 
 class _SpeedMask:
-    """Mask of speed limits. `scale` converts its values to speeds; `grid` has its cells, None without any limit."""
+    """Mask of speed limits. `grid` defines its cells; None without any limit. `scale` converts its values to speeds."""
 
     def __init__(
         self,

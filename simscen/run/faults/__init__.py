@@ -1,1 +1,1 @@
-"""Application of a scenario's faults to the readings, commands, beliefs, and map of a run."""
+"""Apply the faults of a scenario to the readings, commands, beliefs, and map of a run."""

@@ -1,7 +1,7 @@
-"""Inject the faults of a robot into its readings, its localizer, and its commands.
+"""Inject the faults of a robot into its readings, beliefs, and commands while the run goes on.
 
-Several faults of one instance form a chain in the order of the scenario: each receives the output of the one before. A
-reading that a fault delays continues along the rest of the chain when it arrives.
+Several faults of one sensor or actuator form a chain in the order of the scenario: each receives the output of the one
+before. A reading that a fault delays continues along the rest of the chain when it arrives.
 """
 
 import math
@@ -25,13 +25,16 @@ from simscen.run.faults.interfaces import CommandLink
 from simscen.run.stream_names import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
-ROUNDING = 1e-9
-"""Largest difference of a number that is attributed to rounding and not to the fault."""
+MAX_ROUNDING_ERROR = 1e-9
+"""Largest change of a number that counts as rounding and not as an effect of the fault."""
 
 
 @dataclass
-class _Active:
-    """An active fault; `changed_count` is how many messages and commands it has changed or withheld so far."""
+class _ActiveFault:
+    """A fault that disturbs messages now, or that has ended but still holds delayed ones.
+
+    `changed_count` is the number of messages and commands that it has changed or withheld so far.
+    """
 
     index: int
     sensor: str
@@ -48,7 +51,7 @@ class _Active:
 
 
 class FaultInjector:
-    """Applies the active faults to readings, commands, and beliefs, in the order of the scenario."""
+    """Applies the active faults of one robot to its readings, commands, and beliefs."""
 
     def __init__(
         self,
@@ -61,9 +64,9 @@ class FaultInjector:
     ) -> None:
         """Prepare the `faults` of a scenario; none is active until `begin`.
 
-        `setting` returns what a fault knows of its target. Commands reach the base through `link`. `emit` receives a
-        `fault.took_effect` event when a fault changes its first message or command. `map_faults` are the indices of the
-        faults that changed the map before the run.
+        `setting` returns what a fault knows of its target. Commands reach the base through `link`. `emit` receives an
+        event when a fault changes its first message or command. `map_faults` are the indices in `faults` of those that
+        changed the map before the run.
         """
         self._map_faults = set(map_faults)
         self._faults, self._streams, self._setting, self._link, self._emit = faults, streams, setting, link, emit
@@ -72,7 +75,7 @@ class FaultInjector:
         """Whether the robot has any fault."""
         self._activations: Counter[int] = Counter()
         # By index of the fault and count of its activations, because an ended activation can still hold delayed data.
-        self.active: dict[tuple[int, int], _Active] = {}
+        self.active: dict[tuple[int, int], _ActiveFault] = {}
         self._affects_commands = False
         self._last_belief: tuple[int, Belief, Belief] | None = None
 
@@ -88,7 +91,7 @@ class FaultInjector:
         effect: object = entry.fault.begin(rng, setting)
         if not isinstance(effect, FaultEffect):
             self._raise_invalid(index, f"returned {effect!r} from `begin`, which is not a FaultEffect")
-        self.active[index, self._activations[index]] = _Active(index, entry.sensor, setting.kind, effect)
+        self.active[index, self._activations[index]] = _ActiveFault(index, entry.sensor, setting.kind, effect)
         self._affects_commands = self._affects_commands or setting.kind == COMMAND
         return setting.kind
 
@@ -97,11 +100,11 @@ class FaultInjector:
         key = index, self._activations[index]
         active = self.active.pop(key)
         if remaining := active.effect.end():
-            self.active[key] = _Active(index, active.sensor, active.kind, remaining, has_ended=True)
+            self.active[key] = _ActiveFault(index, active.sensor, active.kind, remaining, has_ended=True)
         return active.changed_count
 
     def disturb(self, readings: Readings) -> Readings:
-        """Return the readings as the stack receives them."""
+        """Return the readings that the stack receives, including delayed ones that arrive now."""
         if not self.active:
             return readings
         for active in self._in_order():
@@ -116,8 +119,11 @@ class FaultInjector:
         return readings
 
     def command(self, tick: int, command: Twist) -> Twist:
-        """Return the command as the wheels receive it: after faults of cmd_vel, then faults of the wheels."""
-        is_sent = self._link.sends_message(tick, command)
+        """Return the command that the wheels receive, after faults of cmd_vel and then faults of the wheels.
+
+        Must be called exactly once at each beat of the robot.
+        """
+        is_sent = self._link.send(tick, command)
         if not self._affects_commands and not self.active:
             if is_sent:
                 self._link.receive(tick, command)
@@ -133,7 +139,7 @@ class FaultInjector:
         return command
 
     def belief(self, tick: int, belief: Belief) -> Belief:
-        """Return the belief that the navigator receives."""
+        """Return the belief that the navigator receives, after faults of the localizer."""
         if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._last_belief is None or self._last_belief[:2] != (tick, belief):
@@ -144,12 +150,12 @@ class FaultInjector:
             self._last_belief = tick, belief, disturbed
         return self._last_belief[2]
 
-    def _in_order(self) -> list[_Active]:
+    def _in_order(self) -> list[_ActiveFault]:
         if not self.active:
             return []
         return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
 
-    def _delayed_readings(self, active: _Active) -> Sequence[Reading]:
+    def _delayed_readings(self, active: _ActiveFault) -> Sequence[Reading]:
         arriving: object = active.effect.arriving_readings()
         if not isinstance(arriving, list | tuple):
             self._raise_invalid(
@@ -163,7 +169,7 @@ class FaultInjector:
             )
         return arriving
 
-    def _disturb_reading(self, active: _Active, reading: Reading) -> Reading | None:
+    def _disturb_reading(self, active: _ActiveFault, reading: Reading) -> Reading | None:
         disturbed = active.effect.reading(_read_only(reading))
         if disturbed is not None and _type_and_sensor(disturbed) != _type_and_sensor(reading):
             problem = f"returned an object of type {type(disturbed).__name__} for a {type(reading).__name__} reading"
@@ -173,7 +179,7 @@ class FaultInjector:
         return disturbed
 
     def _transmit_command(self, tick: int, command: Twist | None) -> None:
-        """Pass the new command and delayed ones through the chain of faults; what remains reaches the base."""
+        """Pass the new command, if any, and delayed ones through the faults; send the result, if any, to the base."""
         for active in self._in_order():
             if active.kind == COMMAND:
                 late = active.effect.arriving_command()
@@ -184,29 +190,29 @@ class FaultInjector:
         if command is not None:
             self._link.receive(tick, command)
 
-    def _disturb_command(self, active: _Active, command: Twist) -> Twist | None:
+    def _disturb_command(self, active: _ActiveFault, command: Twist) -> Twist | None:
         disturbed = active.effect.command(command)
         if disturbed is None and active.kind == COMMAND:
             self._count(active)
             return None
         disturbed = self._require_finite_command(active, disturbed)
-        if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
+        if not np.allclose(disturbed, command, rtol=0.0, atol=MAX_ROUNDING_ERROR):
             self._count(active)
         return disturbed
 
-    def _require_finite_command(self, active: _Active, command: object) -> Twist:
+    def _require_finite_command(self, active: _ActiveFault, command: object) -> Twist:
         if not isinstance(command, Twist) or not all(map(math.isfinite, command)):
             self._raise_invalid(active.index, f"returned {command!r} for a command, which is not a finite Twist")
         return command
 
-    def _disturb_belief(self, active: _Active, belief: Belief) -> Belief:
+    def _disturb_belief(self, active: _ActiveFault, belief: Belief) -> Belief:
         disturbed: object = active.effect.belief(belief)
         if not isinstance(disturbed, Belief) or not all(
             map(math.isfinite, (*disturbed.pose, *disturbed.map_from_odom))
         ):
             self._raise_invalid(active.index, f"returned {disturbed!r} for a belief, which is not a finite Belief")
         if not np.allclose(
-            (*disturbed.pose, *disturbed.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, ROUNDING
+            (*disturbed.pose, *disturbed.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, MAX_ROUNDING_ERROR
         ):
             self._count(active)
         return disturbed
@@ -215,7 +221,7 @@ class FaultInjector:
         entry = self._faults[index]
         raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.added_by}")
 
-    def _count(self, active: _Active) -> None:
+    def _count(self, active: _ActiveFault) -> None:
         if active.has_ended:
             return
         if not active.changed_count:
@@ -248,4 +254,4 @@ def _equal(one: Reading, other: Reading) -> bool:
 
 
 def _is_close(a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
-    return np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True)
+    return np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=MAX_ROUNDING_ERROR, equal_nan=True)

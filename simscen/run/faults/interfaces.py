@@ -1,4 +1,4 @@
-"""Connections between faults and a robot: what a fault knows of its target, and the channels it can disturb."""
+"""Connect faults with a robot: what a fault knows of its target, and how it changes commands and beliefs."""
 
 from collections.abc import Callable, Collection
 from functools import cache
@@ -21,12 +21,11 @@ from simscen.sensors.sensor import SensorView
 from simscen.stack.protocols import Localizer
 
 CreateRayCaster = Callable[[TriangleMesh, frozenset[str]], RayCaster]
-"""Function that creates a ray caster for a static mesh and all moving objects, except moving objects with these names.
-"""
+"""Function that creates a ray caster for a static mesh and all moving objects except those with these names."""
 
 
 class FaultSettingFactory:
-    """Creates the FaultSetting, i.e. what a fault knows of its target, for the faults of one robot."""
+    """Creates the FaultSetting of each fault of one robot, that is, what the fault knows of its target."""
 
     def __init__(
         self,
@@ -37,7 +36,7 @@ class FaultSettingFactory:
         mesh: TriangleMesh,
         create_ray_caster: CreateRayCaster,
     ) -> None:
-        """`now` returns the current tick, `view` is the robot as its sensors see it, `mesh` the static world."""
+        """`now` returns the current tick, `view` gives true poses and pictures, and `mesh` is the static world."""
         self._robot, self._clock, self._now, self._view = robot, clock, now, view
         self._ray_caster_without = cache(lambda names: create_ray_caster(_without(mesh, names), names))
 
@@ -64,11 +63,11 @@ def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
 
 
 CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
-"""Function that creates a ray caster for the world without the objects with these names, static or moving."""
+"""Function that returns a ray caster for the world without the objects with these names, static or moving."""
 
 
 class HypotheticalSensor:
-    """Readings that a lidar or camera would produce otherwise, as in faults.base.SensorSimulator."""
+    """Computes what a lidar or camera would see from another pose or without some objects (faults.base.SensorSimulator)."""
 
     def __init__(
         self,
@@ -78,14 +77,14 @@ class HypotheticalSensor:
         now: Callable[[], int],
         name: str,
     ) -> None:
-        """`spec` and `name` are those of the sensor, and `now` returns the current tick."""
+        """`spec` and `name` are those of the sensor, `view` gives the robot's true pose, and `now` the current tick."""
         self._spec, self._view, self._now, self._name = spec, view, now, name
         self._ray_caster_without = ray_caster_without
         mount = getattr(spec, "mount", None)
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges (n,) in m if the pose of the lidar differs from its nominal pose by `error`.
+        """Return the ranges (n,) in m that `scan` would have if the lidar's pose differed from the nominal by `error`.
 
         Beams pass through the objects named in `without`.
         """
@@ -100,7 +99,7 @@ class HypotheticalSensor:
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
-        """Return the picture if the pose of the camera differs from its nominal pose by `error`."""
+        """Return the picture that the camera would take now if its pose differed from the nominal by `error`."""
         spec = self._spec
         assert isinstance(spec, Camera)
         captured = self._view.image(
@@ -114,9 +113,9 @@ class HypotheticalSensor:
 
 
 class CommandLink:
-    """The cmd_vel connection between stack and base, in which commands can be late or lost.
+    """The cmd_vel connection between stack and base, in which faults can delay or drop messages.
 
-    At each beat, call `sends_message`, and call `receive` for each message that arrives at the base.
+    At each beat, call `send` once, and call `receive` for each message that arrives at the base.
 
     The stack sends one message each `period` ticks, and another one whenever the command changes. The base stops if no
     message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). A timeout shorter than one
@@ -124,12 +123,13 @@ class CommandLink:
     """
 
     def __init__(self, period: int, timeout: int) -> None:
+        """Both in ticks."""
         self._period, self._timeout = period, max(period, timeout)
         self._sent: Twist | None = None
         self._received, self._received_at = STOP, 0
 
-    def sends_message(self, tick: int, command: Twist) -> bool:
-        """Return whether the stack sends a message at this beat; call it once per beat."""
+    def send(self, tick: int, command: Twist) -> bool:
+        """Take the stack's command at this beat; return whether the stack sends a message with it."""
         sent = tick % self._period == 0 or command != self._sent
         self._sent = command
         return sent
@@ -144,7 +144,7 @@ class CommandLink:
 
 
 class LocalizerWithFaults:
-    """A localizer whose published belief is changed by faults; its internal state is not affected."""
+    """Localizer whose published belief is changed by faults. The internal state of the `inner` one is not affected."""
 
     def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
         self._inner, self._disturb = inner, disturb

@@ -1,1 +1,1 @@
-"""The running world: what triggers observe and what events and actions change."""
+"""The world during a run: what triggers observe, and what events and actions change."""

@@ -1,4 +1,4 @@
-"""State of the costmap filters of a stack: which zones are enabled."""
+"""Track which zones of a stack's costmap filters are enabled, because events can switch them during a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,19 +10,19 @@ from simscen.model.stack_base import StackBase
 
 @dataclass
 class _Filter:
-    """State of one filter; `zones` maps each region to its speed limit in m/s (0 for none) and "is enabled"."""
+    """State of one filter. `zones` has the speed limit in m/s (0 for none) and "is enabled" of each zone by region."""
 
     zones: dict[str, tuple[float, bool]]
     has_mask: bool
     enabled: bool = True
 
     def is_enabled(self, region: str) -> bool:
-        """Return whether the zone is enabled."""
+        """Return whether the filter and its zone in this region are enabled."""
         return self.enabled and self.zones.get(region, (0.0, False))[1]
 
 
 class CostmapFilters:
-    """Tracks which zones are enabled; `zones` is the state to send to the stack."""
+    """Zones and masks of the filters of one stack; `zones` is the current state to send to it."""
 
     def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
         """`stack` names the zones at the start of the run, and `regions` has the polygons of all regions by name."""
@@ -35,7 +35,7 @@ class CostmapFilters:
         }
 
     def rejection_reason(self, order: ZoneSwitch) -> str:
-        """Return why an order has no effect, or ""."""
+        """Return why an order would have no effect; "" if it would have one. Changes nothing."""
         target, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
             if not target.zones and not target.has_mask:
@@ -50,7 +50,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Carry out an order, and return the names of the regions that it switched; "" stands for the mask."""
+        """Carry out an order that has an effect; return the names of the switched regions, and "" for the mask."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled
@@ -59,7 +59,7 @@ class CostmapFilters:
         target.zones[order.region] = (order.speed_limit or limit, order.enabled)
         return (order.region,)
 
-    def limit(self, region: str) -> float:
+    def speed_limit(self, region: str) -> float:
         """Return the speed limit of a zone in m/s; 0 for none."""
         return self._filters["speed"].zones.get(region, (0.0, False))[0]
 

@@ -15,10 +15,11 @@ from simscen.triggers.base import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 
 _AT_ONCE = Trigger(time=Time(0.0))
+"""Trigger of events and faults without `when`."""
 
 
 class Director:
-    """Evaluates all triggers at each beat: first of events, then of faults, each in the order of the scenario."""
+    """Evaluates all triggers at each beat: first those of events, then of faults, both in the order of the scenario."""
 
     def __init__(
         self,
@@ -28,7 +29,10 @@ class Director:
         stage: LiveStage,
         injector: FaultInjector,
     ) -> None:
-        """Triggers observe `stage`, and the actions of `steps` change it; `injector` starts and ends the `faults`."""
+        """Triggers observe `stage`, and the actions of `steps` change it; `injector` starts and ends the `faults`.
+
+        Triggers with a probability draw from `streams`.
+        """
         self._stage, self._injector, self._faults = stage, injector, faults
         self._steps = [
             (step, TriggerState(step.when or _AT_ONCE, streams.generator(f"event{stream}")))
@@ -105,7 +109,7 @@ class TriggerState:
         self._scheduled: list[int] = []
 
     def count_firings(self, now: Situation) -> int:
-        """Return how often the trigger fires at this beat, in which the run has the state `now`."""
+        """Evaluate the trigger in the state `now` and return how often it fires; call it once at each beat."""
         if self._remaining and self._has_edge(now) and self._passes_probability():
             self._remaining -= 1
             self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
@@ -127,9 +131,9 @@ class TriggerState:
 
 
 class ConditionState:
-    """Tracks how long a condition and each of its parts have held, as the key `for` requires.
+    """Tracks for how long a condition and each of its parts have held, because their key `for` can require a duration.
 
-    It must be evaluated at every beat.
+    `holds` must be called at each beat.
     """
 
     def __init__(self, test: AnyCondition) -> None:
@@ -139,7 +143,7 @@ class ConditionState:
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition has held for long enough."""
+        """Update with the state `now`; return whether the condition has held for as long as required."""
         if not self._is_true(now):
             self._since = None
             return False
@@ -159,10 +163,10 @@ class ConditionState:
 
 
 class RelativeSituation:
-    """View of the run for a step of a sequence: time, distance, and events count from the end of the previous step."""
+    """View of the run for a step of a sequence, in which time, distance, and events start at the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Start counting at the state `now`. `others` are the views for the other robots; None creates them."""
+        """Start the view at the state `now`. `others` are the views of the other robots by name; None creates them."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
@@ -190,11 +194,11 @@ class RelativeSituation:
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick of the last scan that the stack received, relative to the start of the view.
 
-        It is negative before the start of the view. If there was no scan, the tick of the start of the run is returned.
+        The tick is negative if the scan was before the view. Without a scan, it is that of the start of the run.
         """
         last = self._now.last_scan_tick(sensor)
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
-        """Return everything else from the state of the run."""
+        """Return any other attribute of the state, such as the robot's pose, which is the same in this view."""
         return getattr(self._now, name)

@@ -22,15 +22,15 @@ from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_i
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
 """Heights at which walls block pedestrians; walls at the last height also block their view."""
 BODY_HEIGHT_RANGE_M = (0.05, 1.7)
-"""Range of heights above the ground in which an object blocks a pedestrian."""
+"""Range of heights above the ground in which movable objects block pedestrians."""
 PATH_CELL_M = 0.1
 """Cell size of the grid for path planning."""
 PREFERRED_CLEARANCE_M = 0.2
-"""Clearance that planned paths keep where there is enough space."""
+"""Clearance between pedestrian and walls that planned paths keep where there is enough space."""
 
 
 class PedestrianMap:
-    """Walls and paths of pedestrians in a built world. Both are computed when they are first needed."""
+    """Walls that block pedestrians in a world, and paths around them. Both are computed when first needed."""
 
     def __init__(self, built: BuiltWorld) -> None:
         self._built = built
@@ -45,7 +45,10 @@ class PedestrianMap:
         return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
 
     def plan_path(self, start: Point, goal: Point, radius: float) -> list[Point]:
-        """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""
+        """Return the corners of a path around walls, without `start`; only `goal` if there is no path. All in m.
+
+        The path keeps PREFERRED_CLEARANCE_M from walls if possible.
+        """
         for clearance in (radius + PREFERRED_CLEARANCE_M, radius):
             if clearance not in self._planners:
                 self._planners[clearance] = shortest_paths_in(
@@ -58,16 +61,17 @@ class PedestrianMap:
 
 
 MAX_STEP_S = 0.05
-"""Longest step of the pedestrian model."""
+"""Longest time step of the pedestrian model."""
 EVENT_KINDS = {
     "reached": EventKind.PEDESTRIAN_REACHED,
     "reacted": EventKind.PEDESTRIAN_REACTED,
     "calmed": EventKind.PEDESTRIAN_CALMED,
 }
+"""Kind of event for each `PedestrianAction.what`."""
 
 
 class PedestrianSimulation:
-    """Steps all pedestrians of a run and passes their events to `listeners`. Set up when the first one appears."""
+    """Steps all pedestrians of a run and passes their events to `listeners`. The crowd is built for the first one."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._map, self._simulation = PedestrianMap(built), simulation
@@ -95,7 +99,7 @@ class PedestrianSimulation:
         return body
 
     def simulates(self, name: str) -> bool:
-        """Return whether a pedestrian with this name is simulated."""
+        """Return whether a body with this name is a pedestrian."""
         return name in self._behaviors
 
     def remove(self, name: str) -> None:
@@ -103,14 +107,14 @@ class PedestrianSimulation:
         if self._behaviors.pop(name, None) is not None:
             self._crowd.remove(name)
 
-    def has_room(self, place: Point, radius: float, walls_only: bool) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a place; `walls_only` ignores all but walls."""
-        if walls_only or self._map.walls.distance(place) < radius:
-            return self._map.walls.distance(place) >= radius
+    def has_room(self, center: Point, radius: float, walls_only: bool) -> bool:
+        """Return whether a pedestrian with this radius in m fits at a position; `walls_only` ignores all but walls."""
+        if walls_only or self._map.walls.distance(center) < radius:
+            return self._map.walls.distance(center) >= radius
         surroundings = self._surroundings()
         outlines = [outline for observed in surroundings.objects for outline in observed.outlines]
         outlines += [robot.pose.apply(robot.outline) for robot in surroundings.robots]
-        position = Pose2(*place, 0.0)
+        position = Pose2(*center, 0.0)
         if any(distance_to_polygon(position, outline.tolist()) < radius for outline in outlines):
             return False
         others = [(pose, self._crowd.radius(name)) for name, pose in self._crowd.poses().items()]

@@ -17,7 +17,7 @@ REFRESH_DISTANCE_M = 4.0
 
 
 class LiveRayCaster(RayCaster):
-    """Casts rays of a robot against the static world and all objects that move, at their current poses."""
+    """Casts the rays of a robot's sensors against the static world and all moving objects at their current poses."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
         """Cast rays for a robot, ignoring the moving objects named in `without`."""
@@ -34,12 +34,12 @@ class LiveRayCaster(RayCaster):
         return self._scene.cast(origins, directions, reach)
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """Return the distances (n,) in m of a fan with its frame at `pose`; values beyond `reach` mean no hit."""
+        """Return the distances (n,) in m along the rays of a fan at `pose`; values beyond `reach` m mean no hit."""
         self._update_scene(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)
 
     def _update_scene(self, origin: Vector, reach: float) -> None:
-        """Update the poses of the moving objects that rays from a place can reach."""
+        """Update the poses of the moving objects that rays from `origin` can reach."""
         robot, state = self._robot, self._state
         if robot.bodies is not self._bodies:  # the same object until a body is added or removed
             self._meshes, self._bodies = self._build_meshes(robot.bodies), robot.bodies
@@ -77,7 +77,7 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """Moving objects that rays from a place can reach, as long as the scripted paths stay as `predicted`."""
+    """Names of the moving objects that rays of `reach` m from `origin` can hit, if paths stay as `predicted`."""
 
     predicted: PredictedPoses
     origin: Vector
@@ -85,7 +85,7 @@ class ReachableObjects(NamedTuple):
     names: list[str]
 
     def is_valid_for(self, predicted: PredictedPoses, origin: Vector, reach: float) -> bool:
-        """Return whether the list is valid for rays from another place."""
+        """Return whether the names include all objects that these rays, perhaps from another origin, can hit."""
         return predicted is self.predicted and math.dist(origin, self.origin) + reach <= self.reach
 
 

@@ -1,4 +1,4 @@
-"""The running world as triggers observe it and actions change it."""
+"""The world during a run, as triggers observe it and actions change it, with the events and orders of each robot."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -10,7 +10,6 @@ from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian, World
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.messages.navigation import Belief, Goal, Path
 from simscen.core.messages.sensor_data import Readings, Scan
@@ -31,11 +30,10 @@ from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 class LiveStage:
     """The world from the point of view of one robot: implements core.stage.Stage and keeps the robot's events.
 
-    An event of the world is added to the events of all robots.
+    An event of the world, such as a moved door, is added to the events of all robots.
 
-    The lockstep loop runs in beats: ticks at which a sensor, a stack, or a truth sample is due. A beat can be due for
-    some of the robots only. An order is a request of an action to the robot's stack: a new goal, a cancellation, or a
-    change of zones. An order is delivered at once at a beat of this robot, else at the robot's next beat.
+    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. It is
+    delivered at once at a beat of this robot, and otherwise at the robot's next beat.
     """
 
     def __init__(
@@ -51,7 +49,7 @@ class LiveStage:
         streams: Streams,
         stages: "dict[str, LiveStage]",
     ) -> None:
-        """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` the goals that events send.
+        """`goals` are those that events send, and actions draw from `streams`.
 
         The stage adds itself to `stages`, the stages of all robots by name.
         """
@@ -63,14 +61,18 @@ class LiveStage:
         stages[robot.name] = self
         self._goals = {goal.name: goal for goal in goals}
         self._update_pose()
-        self._belief: Belief | None = None
-        self._clearance: float | None = None
+        self.belief: Belief | None = None
+        """The last belief that the stack published; None before the first."""
+        self.clearance: float | None = None
+        """Distance in m from the robot's hull to the nearest obstacle in the newest truth sample; None before it."""
+        self.travelled = 0.0
+        """Distance driven in m; a teleportation of the robot does not count."""
         self._scan_ticks: dict[str, int] = {}
-        self._travelled = 0.0
         self._is_due = True
         self.pending_orders: list[Callable[[int], None]] = []
         """Orders to deliver to the stack at the robot's next beat; each is called with the current tick."""
-        self._history: tuple[Event, ...] = ()
+        self.events: tuple[Event, ...] = ()
+        """All events so far."""
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
@@ -81,12 +83,12 @@ class LiveStage:
     def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
         """Update the robot's pose at a beat, from the truth sample if there is one.
 
-        `is_due` states whether the beat is due for this robot. If it is not, orders wait until a beat that is due.
+        `is_due` states whether the beat is one of this robot, so that orders are delivered at once.
         """
         self._is_due = is_due
         previous = self._pose
         self._update_pose(truth)
-        self._travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
+        self.travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
 
     def deliver_orders(self, tick: int) -> None:
         """Deliver the pending orders to the stack. Called at a beat of this robot."""
@@ -100,18 +102,19 @@ class LiveStage:
             self.deliver_orders(self.tick)
 
     def _update_pose(self, truth: Truth | None = None) -> None:
+        """Update the true pose, the twist in the base frame, and, from a truth sample, the clearance."""
         if truth is not None:
-            self._pose, self._twist, self._clearance = truth.pose, truth.twist, truth.clearance
+            self._pose, self.twist, self.clearance = truth.pose, truth.twist, truth.clearance
         else:
-            self._pose, self._twist = self._robot.base_pose(), self._robot.base_twist()
+            self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
 
     def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
         """Update from the readings that the stack received and from its decision."""
         for reading in readings:
             if isinstance(reading, Scan):
                 self._scan_ticks[reading.sensor] = self.tick
-        self._belief = decision.belief or self._belief
-        self._history += decision.events
+        self.belief = decision.belief or self.belief
+        self.events += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
         """Return the events since the last call, ordered by tick."""
@@ -120,11 +123,6 @@ class LiveStage:
         return events
 
     # Observed by triggers
-
-    @property
-    def clearance(self) -> float | None:
-        """Distance from the robot's hull to the nearest obstacle in m, in the newest truth sample."""
-        return self._clearance
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick at which the stack last received a scan of this lidar, or of any lidar for None."""
@@ -148,26 +146,6 @@ class LiveStage:
     def robot(self) -> Pose2:
         """The true pose of the robot."""
         return self._pose.plane
-
-    @property
-    def twist(self) -> Twist:
-        """The true velocity of the robot in its own frame."""
-        return self._twist
-
-    @property
-    def travelled(self) -> float:
-        """Distance driven in m; being placed elsewhere does not count."""
-        return self._travelled
-
-    @property
-    def belief(self) -> Belief | None:
-        """The last belief that the stack published."""
-        return self._belief
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """All events so far."""
-        return self._history
 
     @property
     def plan(self) -> Path | None:
@@ -229,24 +207,24 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that an object follows and the seconds since its start, or None."""
+        """Return the path that an object follows and the seconds since its start; None if it follows no path."""
         pose = self.object(name)
         if pose is not None and self._pedestrians.simulates(name):
             return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0  # the future path of a pedestrian is unknown
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
-        """Return the mass of a movable object in kg."""
+        """Return the mass of a pushable object in kg; 0 for others."""
         return self._simulation.mass(name)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place an object at a pose."""
+        """Teleport an object to a pose."""
         self._pedestrians.remove(name)
         self._simulation.place(name, pose)
         self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def place_robot(self, pose: Pose2) -> None:
-        """Place the robot at a pose."""
+        """Teleport the robot to a pose."""
         self._robot.place(pose)
         self._update_pose()
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
@@ -286,13 +264,13 @@ class LiveStage:
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Switch a zone of a costmap filter; return why it is impossible, or ""."""
+        """Switch a zone of a costmap filter; return why that has no effect, or "" if it has one."""
         if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
             return reason
         for region in self._filters.switch(order):
-            limit = self._filters.limit(region) if order.filter == "speed" else 0.0
+            limit = self._filters.speed_limit(region) if order.filter == "speed" else 0.0
             data: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
             data |= {"speed_limit": limit} if limit and order.enabled else {}
             self.record_event(Event(0, EventKind.ZONE_SWITCHED, region, data))
@@ -304,7 +282,7 @@ class LiveStage:
         """Add an event of this robot. An event with tick 0 gets the current tick."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
-        self._history += (stamped,)
+        self.events += (stamped,)
 
 
 def path_data(path: MotionPath) -> dict[str, Value]:

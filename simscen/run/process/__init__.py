@@ -1,1 +1,1 @@
-"""One process for each run: supervisor, fork server, and worker processes."""
+"""Execute each run in a process of its own: supervisor, fork server, and workers."""

@@ -1,7 +1,7 @@
 """Fork server: imports the engines and builds worlds once, then forks a worker process for each run.
 
-It never creates an OMPL object and never steps a Bullet client, so that every worker starts from the same state. It
-receives pickled jobs from the supervisor over one pipe and sends one line of JSON per message over another.
+The fork server never creates an OMPL object and never steps a Bullet client, so that every worker starts from the same
+state. It receives pickled jobs from the supervisor over one pipe and sends one line of JSON per message over another.
 """
 
 import contextlib
@@ -15,10 +15,12 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from simscen.run.process.isolation import (
     READ_BYTES,
+    TAIL_BYTES,
     CappedLog,
     adopt_orphans,
     die_with_parent,
@@ -30,28 +32,25 @@ from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 
 MAX_MESSAGE_BYTES = 1 << 20
 """Longest valid message of a worker."""
-
 DUMP_TIME_S = 0.5
 """Time for a run that exceeded its wall limit to dump its stack before SIGTERM."""
 TERM_GRACE_S = 2.0
 """Time between SIGTERM and SIGKILL for a run that exceeded its wall limit."""
 
-TAIL_BYTES = 16_384
-"""Number of bytes at the end of the output of a worker that its exit message contains."""
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
 _TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
-"""Signals that end a run at its wall limit, and the seconds until the next one: dump the stack, terminate, kill."""
+"""Signals that end a run at its wall limit, each with the seconds until the next: dump the stack, terminate, kill."""
 
 SendMessage = Callable[[dict[str, Any]], None]
+"""Function that sends a message to the supervisor."""
 
 
 class WorkerHandle:
-    """A worker process, as the fork server supervises it.
+    """A running worker process, its pipes, and its deadline, as the fork server sees them.
 
     `report` is the pipe for messages of the worker, `output` the pipe for its standard output and error, which are
-    copied to `log`. `send_message` forwards the progress messages to the supervisor; the final message is kept for
-    `exit_message`.
+    copied to `log`. Progress messages are forwarded by `send_message`. The end record is kept for `exit_message`.
     """
 
     def __init__(self, job: Job, pid: int, report: int, output: int, log: CappedLog, send_message: SendMessage) -> None:
@@ -96,7 +95,7 @@ class WorkerHandle:
                 self._send_message({"job": self.job.number, "seconds": seconds})
 
     def escalate(self) -> None:
-        """Take the next step to end a worker that exceeded its deadline."""
+        """Take the next step to end a worker that exceeded its deadline: dump its stack, SIGTERM, or SIGKILL."""
         signal_number, timeout = next(self._steps, _TERMINATION_STEPS[-1])
         self._killed_for, self.deadline = "timeout", time.monotonic() + timeout
         if signal_number is signal.SIGUSR1:
@@ -118,9 +117,10 @@ class WorkerHandle:
             os.close(descriptor)
 
     def exit_message(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Close the pipes and return the exit message for the supervisor. Call this after the worker was reaped.
+        """Close the pipes and return the message for the supervisor. Must be called after the worker was reaped.
 
-        `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory.
+        `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory. The
+        message has the fields of jobs.ProcessEnd, with `exit` instead of `number`.
         """
         for read in (self.read_messages, self.read_output):
             try:
@@ -151,11 +151,11 @@ def enlarge_pipe(pipe: int) -> None:
 
 
 HEARTBEAT_S = 1.0
-"""Time between two heartbeats while the fork server is not preparing a scenario."""
+"""Longest time between two messages to the supervisor while the fork server is not preparing a scenario."""
 
 
 class ForkServer:
-    """Runs jobs until its input ends, then kills all workers."""
+    """Prepares jobs and forks a worker for each, until the supervisor closes the pipe; then kills all workers."""
 
     def __init__(self, jobs: int, replies: int, warm_up: Callable[[Job], object], execute: ExecuteJob) -> None:
         """`jobs` and `replies` are file descriptors of pipes from and to the supervisor.
@@ -167,7 +167,7 @@ class ForkServer:
         self._children: dict[int, WorkerHandle] = {}
 
     def serve(self) -> None:
-        """Run jobs and supervise workers until the supervisor closes the pipe."""
+        """Run jobs and watch their workers until the supervisor closes the pipe."""
         die_with_parent(os.getppid())
         faulthandler.enable()
         limit_memory()
@@ -213,13 +213,9 @@ class ForkServer:
         enlarge_pipe(output_reader)
         child = WorkerHandle(job, pid, report_reader, output_reader, log, self._send)
         self._children[pid] = child
-        self._selector.register(
-            report_reader, selectors.EVENT_READ, lambda: self._read(report_reader, child.read_messages)
-        )
-        self._selector.register(
-            output_reader, selectors.EVENT_READ, lambda: self._read(output_reader, child.read_output)
-        )
-        self._selector.register(child.pidfd, selectors.EVENT_READ, lambda: self._reap(child))
+        for pipe, read in ((report_reader, child.read_messages), (output_reader, child.read_output)):
+            self._selector.register(pipe, selectors.EVENT_READ, partial(self._read, pipe, read))
+        self._selector.register(child.pidfd, selectors.EVENT_READ, partial(self._reap, child))
 
     def _close_inherited_descriptors(self) -> None:
         """Close the file descriptors of the fork server and of other workers. Called in the worker."""
@@ -237,7 +233,8 @@ class ForkServer:
     def _reap(self, child: WorkerHandle) -> bool:
         """Reap a worker that has exited, and report its end.
 
-        Its group is killed before it is reaped, because its id could be reused afterwards."""
+        Its process group is killed before, because another process could get its id afterwards.
+        """
         for descriptor in (child.pidfd, child.report, child.output):
             if descriptor in self._selector.get_map():
                 self._selector.unregister(descriptor)
@@ -269,7 +266,7 @@ class ForkServer:
 
 
 def _take_own_output() -> bytes:
-    """Return and remove the output of this process since the last call; it is redirected to a file.
+    """Remove and return the output of this process since the last call, from the file to which it is redirected.
 
     Output during the preparation of a scenario belongs to the log of its run.
     """

@@ -1,4 +1,4 @@
-"""Isolation of processes: resource limits, environment, captured output, and cleanup of descendants."""
+"""Isolate the processes of runs: resource limits, environment, captured output, and cleanup of descendants."""
 
 import ctypes
 import json
@@ -17,13 +17,17 @@ from simscen.spec.registry import Entry, search_path
 
 MAX_HEAD_BYTES = 1 << 20
 MAX_TAIL_BYTES = 1 << 18
+"""Sizes of the first and the last part of a process's output that its log keeps."""
 READ_BYTES = 1 << 20
+"""Largest number of bytes that are read from a pipe at once."""
+TAIL_BYTES = 16_384
+"""Number of bytes at the end of a process's output that messages about its end contain."""
 
 
 class CappedLog:
     """Log file with the first MAX_HEAD_BYTES and the last MAX_TAIL_BYTES of the output of a process.
 
-    Without a writable file, `tail` still returns the end of the output.
+    If `path` is None or cannot be written, `tail` still returns the last part of the output.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -76,6 +80,7 @@ class CappedLog:
 
 
 TAIL_LINES = 20
+"""Number of lines of output that an error message quotes."""
 _DUMP_HEADER = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
 _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
 
@@ -88,7 +93,7 @@ def innermost_frame(output: str) -> str:
 
 
 def output_tail(output: str) -> str:
-    """Return the last lines of the output, or the first lines of a dumped stack."""
+    """Return the last TAIL_LINES lines of the output, or the first lines of the stack if one was dumped."""
     heads = list(_DUMP_HEADER.finditer(output))
     if heads:
         before = output[: heads[-1].start()].splitlines()[-3:]
@@ -99,6 +104,7 @@ def output_tail(output: str) -> str:
 MAX_MEMORY_BYTES = 4 << 30
 MAX_FILE_BYTES = 2 << 30
 MAX_OPEN_FILES = 256
+"""Resource limits of a worker, so that one run cannot exhaust the machine."""
 _PR_SET_PDEATHSIG = 1
 _INHERITED_VARIABLES = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
 _ARITHMETIC_VARIABLES = {
@@ -119,10 +125,17 @@ def die_with_parent(parent: int) -> None:
 
 
 def limit_memory() -> None:
-    """Limit the memory of this process and its children, and disable core dumps."""
-    for limit, maximum in ((resource.RLIMIT_AS, MAX_MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
-        hard = resource.getrlimit(limit)[1]
-        resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
+    """Limit the memory of this process and its future children, and disable core dumps.
+
+    The hard limits stay, so that an external stack can have its original limits restored.
+    """
+    _set_soft_limit(resource.RLIMIT_AS, MAX_MEMORY_BYTES)
+    _set_soft_limit(resource.RLIMIT_CORE, 0)
+
+
+def _set_soft_limit(limit: int, maximum: int) -> None:
+    hard = resource.getrlimit(limit)[1]
+    resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
 
 
 def prefer_for_oom_kill() -> None:
@@ -132,19 +145,10 @@ def prefer_for_oom_kill() -> None:
 
 
 def limit_resources() -> None:
-    """Limit memory, file size, and open files of this process, and disable core dumps.
-
-    The hard limits stay, so that an external stack can have its original limits restored.
-    """
-    for limit, maximum in (
-        (resource.RLIMIT_AS, MAX_MEMORY_BYTES),
-        (resource.RLIMIT_FSIZE, MAX_FILE_BYTES),
-        (resource.RLIMIT_NOFILE, MAX_OPEN_FILES),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(limit)[1]
-        bound = maximum if hard == resource.RLIM_INFINITY else min(maximum, hard)
-        resource.setrlimit(limit, (bound, hard))
+    """Limit memory as `limit_memory` does, and also the file size and the number of open files of this process."""
+    limit_memory()
+    _set_soft_limit(resource.RLIMIT_FSIZE, MAX_FILE_BYTES)
+    _set_soft_limit(resource.RLIMIT_NOFILE, MAX_OPEN_FILES)
 
 
 def clean_environment() -> dict[str, str]:
@@ -162,12 +166,13 @@ _PR_SET_CHILD_SUBREAPER = 36
 def adopt_orphans() -> None:
     """Become the parent of descendants whose own parent exits (PR_SET_CHILD_SUBREAPER).
 
-    A descendant can leave its process group or session, but not its subreaper. Children do not inherit the setting."""
+    A descendant can leave its process group or session, but not its subreaper. Children do not inherit the setting.
+    """
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def has_descendants() -> bool:
-    """Return whether a child or adopted process still runs. Reaps those that have exited."""
+    """Return whether a child or adopted process still runs, after reaping all that have exited."""
     while True:
         try:
             ended, _ = os.waitpid(-1, os.WNOHANG)
@@ -177,18 +182,16 @@ def has_descendants() -> bool:
             return True
 
 
-def kill_children_except(known: Iterable[int]) -> bool:
-    """Kill and reap all children that are not `known`, and their descendants.
+def kill_children_except(kept: Iterable[int]) -> None:
+    """Kill and reap all children of this process but those with the process ids `kept`, and their descendants.
 
-    Returns whether there were any.
+    Repeats until none is left, because `adopt_orphans` turns the descendants of a killed child into new children.
     """
-    found, excluded = False, set(known)
-    while unknown := _children_except(excluded):
-        found = True
-        for pid in unknown:
+    excluded = set(kept)
+    while children := _children_except(excluded):
+        for pid in children:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
-    return found
 
 
 def _children_except(excluded: Collection[int]) -> list[int]:
@@ -215,7 +218,7 @@ def _parent(pid: int) -> int:
 
 
 def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
-    """Return the arguments with which the fork server finds these plug-ins; empty if there are none."""
+    """Return the arguments with which a fork server finds these plug-ins (see apply_plugin_path); empty without any."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     if not used:
         return ()
@@ -228,10 +231,10 @@ def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
 
 
 def apply_plugin_path(argument: str) -> None:
-    """Extend sys.path in the fork server, so that it finds the same plug-ins as its parent.
+    """Extend sys.path in the fork server by the folders in `argument`, so that it finds the plug-ins of its parent.
 
-    New folders come last, so that the engine does not change. A folder comes first only if another version of a used
-    package would be found otherwise.
+    New folders come last, so that simscen and its dependencies stay the same. A folder comes first only if another
+    version of a used package would be found otherwise.
     """
     configuration = json.loads(argument)
     for folder in configuration["path"]:

@@ -1,4 +1,4 @@
-"""Jobs of a session, the backends that execute them, and messages between the supervisor and the fork server."""
+"""Jobs (runs to execute), the protocol of the backends that execute them, and the updates and ends of jobs."""
 
 import json
 import os
@@ -38,7 +38,7 @@ class ReplayMode(str, Enum):
 
 @dataclass(frozen=True)
 class Job:
-    """One run of a session: scenario, key with seed, output folder, wall limit in s, and replay mode."""
+    """One run to execute: its number in the session, scenario, key with seed, output folder, and wall limit in s."""
 
     number: int
     scenario: LoadedScenario
@@ -57,12 +57,12 @@ class ProcessEnd:
         code: Exit code; None if a signal ended the process.
         signal: Number of the signal that ended the process, or None.
         killed_for: "timeout" if the process was killed at its wall limit, else None.
-        final_message: End record that the worker sent, or None.
+        final_message: End record that the worker sent (see worker.ExecuteJob), or None.
         wall: Wall time in s.
         cpu: Processor time in s.
         peak_bytes: Peak memory.
         left_processes: Whether the worker left processes behind, which were killed.
-        output: End of the output.
+        output: The last part of its output.
     """
 
     number: int
@@ -81,8 +81,8 @@ class ProcessEnd:
 class ForkServerDeath:
     """The fork server died while a job was running, or was killed because it did not respond.
 
-    `was_preparing` means that the fork server was preparing this job, `timed_out` that it did not respond. `output` is
-    the end of its output.
+    `description` says how it ended. `was_preparing` means that it was preparing this job, `timed_out` that it did not
+    respond. `output` is the last part of its output.
     """
 
     description: str
@@ -92,13 +92,13 @@ class ForkServerDeath:
 
 
 def pack_job(job: Job) -> bytes:
-    """Return a job as bytes. Pickle is safe here, because both ends are simscen processes."""
+    """Return a job as bytes for `receive_job`. Pickle is safe here, because both ends are simscen processes."""
     data = pickle.dumps(job)
     return _LENGTH.pack(len(data)) + data
 
 
 def receive_job(pipe: int) -> Job | None:
-    """Read one job; None at the end of the stream. Reads no further bytes, so that `select` reports the next job."""
+    """Read one job; return None at the end of the pipe. Reads nothing of the next one, so that `select` reports it."""
     head = _read_exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -150,7 +150,7 @@ JobUpdate = Started | Progressed | Ended
 
 
 def always() -> bool:
-    """Return True."""
+    """Return True; the default of `should_continue`."""
     return True
 
 
@@ -167,6 +167,6 @@ class Backend(Protocol):
         """Execute jobs, several at a time, and yield their updates: exactly one Ended for each that was started.
 
         `plugins` are those that the jobs use. `should_continue` is called before each job; no job starts once it
-        returns False. If the consumer stops early or an exception passes through, all running processes are killed.
+        returns False. If the caller stops iterating or an exception is raised, all running processes are killed.
         """
         ...

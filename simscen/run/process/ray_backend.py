@@ -1,4 +1,4 @@
-"""Backend that runs jobs on a Ray cluster: one runner for each node, which supervises processes on it."""
+"""Backend that runs jobs on a Ray cluster, by one runner on each node, which supervises the processes there."""
 
 import logging
 import shutil
@@ -36,25 +36,25 @@ from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry
 
 MAX_ATTEMPTS = 2
-"""A job whose runner or node is lost is tried once more."""
-
+"""Largest number of attempts at a job whose runner or node is lost, for example by a crash of the machine."""
 QUEUED_JOBS_PER_WORKER = 2
-"""Jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
-
+"""Number of jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
 NODE_SEARCH_PERIOD_S = 5.0
 """Time between two searches for nodes that have joined the cluster."""
-
-CONNECT_S = 5.0
-START_LIMIT_S = 120.0
-"""Time to wait for the first runner."""
-POLL_S = 0.5
-UNSENT_UPDATES = 64
-"""Updates of a runner that wait to be read before the runner pauses."""
+CONNECT_TIMEOUT_S = 5.0
+START_TIMEOUT_S = 120.0
+"""Time to wait until the first runner has started."""
+POLL_PERIOD_S = 0.5
+MAX_UNREAD_UPDATES = 64
+"""Number of updates that a runner sends ahead of the reader before it pauses."""
 
 
 @dataclass
 class _Runner:
-    """A runner: its id, node, actor, workers, and current call, which is `software` until `is_ready`, then `run`."""
+    """A Ray actor of the class NodeRunner with `workers` workers.
+
+    `call` is its pending remote call: of `software` until `is_ready`, then of `run`; None while it has no jobs.
+    """
 
     name: str
     node: str
@@ -68,12 +68,12 @@ class _Runner:
 class RayBackend:
     """Runs jobs on all nodes of a running Ray cluster, at most `workers` at a time.
 
-    Each node needs the same simscen, and the plug-ins of the scenarios. The content of input files is sent. A job whose
-    node or runner is lost is tried once more. Results do not depend on the number of nodes.
+    Each node needs the same version of simscen and the plug-ins of the scenarios. Input files are sent to it. A job
+    whose node or runner is lost is tried once more. Results do not depend on the number of nodes.
     """
 
     def __init__(self, address: str, workers: int, entry: Sequence[str]) -> None:
-        """`entry` are the Python arguments that start the fork server on a node."""
+        """`address` is that of the cluster, and `entry` are the Python arguments that start a fork server on a node."""
         self._address, self._workers, self._entry = address, workers, tuple(entry)
         self._runners: list[_Runner] = []
         self._files: dict[Path, SentFile] = {}
@@ -83,7 +83,7 @@ class RayBackend:
         self._last_search = 0.0
 
     def __enter__(self) -> "RayBackend":
-        """Connect to the cluster. Raises UsageError."""
+        """Connect to the cluster. Raises UsageError if there is none."""
         connect(self._address)
         here = ray.get_runtime_context().get_node_id()
         self._queue = (
@@ -108,7 +108,7 @@ class RayBackend:
                 self._add_runners()
                 self._send(batch)
                 calls = {runner.call: runner for runner in self._runners if runner.call is not None}
-                ready, _ = ray.wait(list(calls), timeout=POLL_S) if calls else ([], [])
+                ready, _ = ray.wait(list(calls), timeout=POLL_PERIOD_S) if calls else ([], [])
                 for call in ready:
                     yield from self._process_reply(calls[call], batch, plugins)
                 for runner in self._runners:
@@ -139,11 +139,11 @@ class RayBackend:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
 
     def _require_free_cpus(self, start_time: float) -> None:
-        """Raise UsageError if no runner has started for too long: Ray waits until a node has enough free CPUs."""
-        if time.monotonic() > start_time + START_LIMIT_S and not any(runner.is_ready for runner in self._runners):
+        """Raise UsageError if no runner has started for too long, because Ray waits without limit for free CPUs."""
+        if time.monotonic() > start_time + START_TIMEOUT_S and not any(runner.is_ready for runner in self._runners):
             raise UsageError(
-                f"no node of the Ray cluster at {self._address} has become free in {START_LIMIT_S:g} s: other programs "
-                "use its CPUs; wait, or use fewer with --jobs"
+                f"no node of the Ray cluster at {self._address} has become free in {START_TIMEOUT_S:g} s: other "
+                "programs use its CPUs; wait, or use fewer with --jobs"
             )
 
     def _new_runner(self, node: str, address: str, workers: int) -> _Runner:
@@ -154,7 +154,7 @@ class RayBackend:
         return _Runner(f"runner-{self._next_name}", node, address, actor, workers, actor.software.remote())
 
     def _start(self, runner: _Runner, plugins: Sequence[Entry]) -> None:
-        call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=UNSENT_UPDATES)
+        call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=MAX_UNREAD_UPDATES)
         runner.call = call.remote(self._queue, runner.name, list(plugins))
 
     def _send(self, batch: "_Batch") -> None:
@@ -175,7 +175,7 @@ class RayBackend:
         return self._files[path]
 
     def _process_reply(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
-        """Process the next reply of a runner. Raises UsageError."""
+        """Process the next reply of a runner. Raises UsageError if its software does not match."""
         try:
             if not runner.is_ready:
                 self._require_same_software(runner, ray.get(runner.call))
@@ -210,7 +210,7 @@ class RayBackend:
             yield from batch.retry_or_fail(number, runner.address)
 
     def _finish_calls(self) -> None:
-        """Read the calls of all runners to their ends, which come at once, because the queue is empty."""
+        """Wait for the ends of all calls, which come at once, because the queue is empty."""
         for runner in [runner for runner in self._runners if runner.is_ready and runner.call is not None]:
             try:
                 ray.get(list(runner.call))
@@ -226,10 +226,10 @@ class RayBackend:
 
 
 def connect(address: str) -> None:
-    """Connect to a running Ray cluster, unless this process is already connected. Raises UsageError."""
+    """Connect to a running Ray cluster, unless this process is already connected. Raises UsageError if that fails."""
     if ray.is_initialized():
         return
-    # Ray prints the end of nodes to standard output, which is for results.
+    # Ray would report lost nodes on standard output, which is for results.
     ray_worker.print_to_stdstream = lambda *_, **__: None
     try:
         _require_answer(address)
@@ -242,15 +242,15 @@ def connect(address: str) -> None:
 
 
 def _require_answer(address: str) -> None:
-    """Raise OSError if nothing listens at the address, for which Ray would wait for minutes."""
+    """Raise OSError if nothing listens at the address, because Ray would wait for it for minutes."""
     known = services.canonicalize_bootstrap_address(address)
     host, colon, port = (known or "").rpartition(":")
     if colon and port.isdigit() and "//" not in host:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=CONNECT_S).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=CONNECT_TIMEOUT_S).close()
 
 
 def cluster_cpus(address: str) -> int:
-    """Return the number of CPUs of a running Ray cluster. Raises UsageError."""
+    """Return the number of CPUs of a running Ray cluster. Raises UsageError if there is none."""
     connect(address)
     return sum(int(node["Resources"].get("CPU", 0)) for node in _nodes() if node["Alive"])
 
@@ -261,7 +261,7 @@ def _nodes() -> list[dict[str, Any]]:
 
 
 class _Batch:
-    """The jobs of one call of `run`: those that are `sent` to the cluster and those that are `running`, by number."""
+    """The jobs of one call of `run`. `sent` are those in the queue and `running` those on a node, by number."""
 
     def __init__(self, jobs: Iterable[Job], should_continue: Callable[[], bool]) -> None:
         self._jobs, self._should_continue = iter(jobs), should_continue

@@ -1,7 +1,7 @@
-"""Code that runs on the nodes of a cluster, and the transfer of jobs to them.
+"""Transfer jobs to the nodes of a cluster, and run them there.
 
-The runner of a node and the queue from which all runners take jobs are plain classes; the backend makes Ray actors of
-them. A job is sent with the content of the files from which its scenario was loaded.
+NodeRunner, which runs jobs on a node, and JobQueue, from which all runners take jobs, are plain classes. The backend
+makes Ray actors of them. A job is sent with the content of the files from which its scenario was loaded.
 """
 
 import hashlib
@@ -49,7 +49,7 @@ class PackedJob:
 def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
     """Return a job for another machine, without its output folder, which differs there.
 
-    `send` is called for each input file.
+    `send` puts the content of an input file into the cluster.
     """
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
@@ -66,10 +66,10 @@ def _input_files(scenario: LoadedScenario) -> Iterable[Path]:
 
 
 class Unpacker:
-    """Restores packed jobs.
+    """Restores packed jobs on another machine.
 
-    If all input files of a job exist here at the same paths with the same content, as in a shared folder, they are used
-    in place. Otherwise all of them are written below `folder`.
+    If all input files of a job exist there at the same paths with the same content, as in a shared folder, they are
+    used in place. Otherwise all of them are written below `folder`.
     """
 
     def __init__(self, folder: Path, receive: Callable[[Any], bytes]) -> None:
@@ -78,7 +78,7 @@ class Unpacker:
         self._is_here: dict[tuple[str, str], bool] = {}
 
     def unpack(self, packed: PackedJob, output: Path) -> Job:
-        """Return the job with this output folder, and with paths that are valid on this machine."""
+        """Return the job with the output folder `output`, and with paths that are valid on this machine."""
         moved: frozenset[str] = frozenset()
         if not all(self._has(path, file.digest) for path, file in packed.files.items()):
             for path, file in packed.files.items():
@@ -110,7 +110,7 @@ def digest_of(data: bytes) -> str:
 
 
 class _Pickler(pickle.Pickler):
-    """Pickler that marks each path as "package" (stored relative to the package) or "path", collected in `paths`."""
+    """Pickler that marks each path: "package" for one in the package, else "path". Collects the latter in `paths`."""
 
     def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
@@ -140,7 +140,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 CHUNK_BYTES = 8 << 20
-"""Maximum size of a chunk of a file in bytes."""
+"""Largest part of a file that is sent at once."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ NodeUpdate = JobStarted | JobProgressed | FileChunk | JobEnded
 
 
 class JobQueue:
-    """Jobs that wait for a runner, and the numbers of the jobs that each runner took, by the name of the runner."""
+    """Jobs that wait for a runner, and a record of the jobs that each runner has taken."""
 
     def __init__(self) -> None:
         self._waiting: deque[PackedJob] = deque()
@@ -190,7 +190,7 @@ class JobQueue:
         self._waiting.append(job)
 
     def take(self, runner: str) -> PackedJob | None:
-        """Return the next job for a runner, or None if no job waits."""
+        """Remove and return the next job, for the runner with this name; None if no job waits."""
         if not self._waiting:
             return None
         job = self._waiting.popleft()
@@ -211,7 +211,7 @@ class NodeRunner:
     """Runs jobs on one node, `workers` at a time, as processes below a supervisor of its own."""
 
     def __init__(self, workers: int, entry: Sequence[str], receive: Callable[[Any], Any]) -> None:
-        """`entry` are the Python arguments that start the fork server; `receive` returns the value of a handle."""
+        """`entry` are the Python arguments that start a fork server; `receive` is `ray.get`."""
         self._temporary = TemporaryDirectory(prefix="simscen-")
         self._folder = Path(self._temporary.name)
         self._supervisor = Supervisor(workers, entry)
@@ -223,7 +223,10 @@ class NodeRunner:
         return __version__, source_digest()
 
     def run(self, queue: Any, runner: str, plugins: Sequence[Entry]) -> Iterator[NodeUpdate]:
-        """Run jobs from the queue until it is empty, and yield their updates and files. Raises UsageError."""
+        """Run jobs from the queue until it is empty, and yield their updates and files; `runner` is this runner's name.
+
+        Raises UsageError if a plug-in is missing or has another version on this node.
+        """
         jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._job)
         for update in self._supervisor.run(jobs, [_same_plugin(entry) for entry in plugins]):
             job = update.job

@@ -1,6 +1,6 @@
 """Supervisor: sends jobs to the fork server, follows their progress, and reports exactly one end for each.
 
-The supervisor never imports PyBullet or OMPL, so that a crash in these cannot end it.
+The process of the supervisor never imports PyBullet or OMPL, so that a crash in these cannot end it.
 """
 
 import json
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from tempfile import TemporaryFile
 from typing import Any, NamedTuple
 
-from simscen.run.process.isolation import clean_environment, plugin_path_arguments
+from simscen.run.process.isolation import TAIL_BYTES, clean_environment, plugin_path_arguments
 from simscen.run.process.jobs import (
     Ended,
     ForkServerDeath,
@@ -29,8 +29,8 @@ from simscen.run.process.jobs import (
 )
 from simscen.spec.registry import Entry
 
-TAIL_BYTES = 16_384
-READ_BYTES = 1 << 16
+PIPE_BYTES = 1 << 16
+"""Largest number of bytes that are written to or read from a pipe at once: the default capacity of a pipe."""
 
 
 class Unresponsive(Exception):
@@ -38,7 +38,7 @@ class Unresponsive(Exception):
 
 
 class ProcessDeath(NamedTuple):
-    """How the fork server ended: description, return code of Popen, and the end of its output."""
+    """How the fork server ended: description, return code of Popen, and the last part of its output."""
 
     description: str
     code: int
@@ -46,12 +46,13 @@ class ProcessDeath(NamedTuple):
 
 
 class ForkServerProcess:
-    """Starts a fork server; `close` ends it and all of its workers.
+    """A fork server and the pipes to it. `close` ends it and all of its workers.
 
     All waits have a time limit, so that a hanging fork server cannot block the session.
     """
 
     def __init__(self, entry: Sequence[str]) -> None:
+        """Start the fork server. `entry` are its Python arguments, e.g. `-m module`."""
         self._output = TemporaryFile()  # noqa: SIM115 - stays open as long as the process runs
         self._receive_pipe, replies = os.pipe()
         jobs, self._send_pipe = os.pipe()
@@ -70,7 +71,7 @@ class ForkServerProcess:
         self._send_buffer, self._receive_buffer = bytearray(), bytearray()
 
     def send(self, data: bytes) -> None:
-        """Send a message, as soon as the pipe has room."""
+        """Queue a message, which `receive_line` sends as soon as the pipe has room."""
         self._send_buffer += data
 
     def receive_line(self, timeout: float) -> bytes:
@@ -95,12 +96,12 @@ class ForkServerProcess:
 
     def _flush(self) -> None:
         try:
-            del self._send_buffer[: os.write(self._send_pipe, self._send_buffer[:READ_BYTES])]
+            del self._send_buffer[: os.write(self._send_pipe, self._send_buffer[:PIPE_BYTES])]
         except BrokenPipeError:  # it has exited; its last messages can still be read
             self._send_buffer.clear()
 
     def _read(self) -> bytes:
-        data = os.read(self._receive_pipe, READ_BYTES)
+        data = os.read(self._receive_pipe, PIPE_BYTES)
         if not data:
             raise EOFError
         return data
@@ -120,7 +121,7 @@ class ForkServerProcess:
         self._process.send_signal(signal.SIGABRT)
 
     def collect_death(self) -> ProcessDeath:
-        """Return how the process ended; kill it if it does not end within a second."""
+        """Wait a second for the end of the process, or kill it; return how it ended."""
         try:
             self._process.wait(timeout=1)
         except subprocess.TimeoutExpired:
@@ -137,11 +138,12 @@ class ForkServerProcess:
 
 
 MAX_SILENCE_S = 30.0
-"""Time without a message after which the fork server counts as dead. A live fork server sends one each second."""
+"""Wall time without a message after which the fork server counts as dead. It sends one each second or
+more often, except while it prepares a job."""
 
 
 class Interrupted(BaseException):
-    """The session was interrupted by the signal `number`."""
+    """The session was interrupted by the signal `number`. Raised by a signal handler."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -151,15 +153,14 @@ class Interrupted(BaseException):
 class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
-    `entry` are the Python arguments that start the fork server, e.g. `-m module`. The fork server starts with the first
-    job, is kept until the context is left, and is restarted if it dies.
+    The fork server starts with the first job, is kept until the context is left, and is restarted if it dies.
 
-    If the fork server dies while it prepares a job, this job fails, and the others that were running are repeated.
-    Otherwise any running job may be the cause: these are suspects, each of which is repeated alone and fails if the
-    fork server dies again.
+    If the fork server crashes or hangs while it prepares a job, this job fails, and the others that ran are repeated.
+    After any other death, each running job is a suspect: it is repeated alone, and fails if the fork server dies again.
     """
 
     def __init__(self, workers: int, entry: Sequence[str]) -> None:
+        """`entry` are the Python arguments that start the fork server, e.g. `-m module`."""
         self._workers, self._entry = workers, tuple(entry)
         self._plugins: frozenset[Entry] = frozenset()
         self._server: ForkServerProcess | None = None
@@ -181,7 +182,7 @@ class Supervisor:
     def run(
         self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
-        """Run jobs and yield their updates, as described in Backend. Takes a job only when it can start."""
+        """Run jobs and yield their updates, as described in Backend. Takes a job from `jobs` only when it can start."""
         if not self._plugins.issuperset(plugins):
             self.close()
             self._plugins |= frozenset(plugins)

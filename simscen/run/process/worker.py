@@ -1,8 +1,7 @@
-"""Worker process of one run."""
+"""Execute one run in a worker process, and send its progress and its end record to the fork server."""
 
 import errno
 import faulthandler
-import json
 import os
 import signal
 import sys
@@ -26,22 +25,24 @@ PROGRESS_INTERVAL_S = 5.0
 """Simulated time between two progress messages."""
 
 ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
-"""Runs a job, reports progress in simulated seconds to a callback, and returns the end record."""
+"""Function that runs a job, passes the simulated time in s to a callback, and returns the end record.
 
+The end record has the keys `outcome` and `sha256` (of the log). After an error, run_worker sends `error` and `message`.
+"""
 
 _DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
 _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run exceeded its memory limit"}
 
 
 class WorkerPipes(NamedTuple):
-    """File descriptors for messages and for output of a worker."""
+    """File descriptors to which a worker writes messages (`report`), and standard output and error (`output`)."""
 
     report: int
     output: int
 
 
 def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -> NoReturn:
-    """Run the job, send the end record, and exit.
+    """Run the job, send the end record, and exit. `parent` is the process id of the fork server.
 
     Uses `os._exit`, because the worker is a copy of the fork server and must not return into its code, and to suppress
     exit messages of nanobind and Bullet.
@@ -104,7 +105,7 @@ def _innermost_frame(error: BaseException) -> str:
 
 
 def _send_progress(report: int, seconds: float) -> None:
-    os.write(report, json.dumps({"seconds": seconds}).encode() + b"\n")
+    os.write(report, json_line({"seconds": seconds}))
 
 
 def _redirect_output(output: int) -> None:

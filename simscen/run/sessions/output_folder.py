@@ -1,4 +1,4 @@
-"""Output folder of a session, created before the first run starts."""
+"""Create the output folder of a session, name the folders of its runs, and write files safely."""
 
 import os
 import secrets
@@ -17,9 +17,9 @@ RUNS_FOLDER = "runs"
 
 
 def create_output_folder(out: Path | None) -> Path:
-    """Create the folder `out`, which must be new or empty, or simscen-out/<UTC time>-<4 hex> with a link `latest`.
+    """Create the folder `out`; if None, simscen-out/<UTC time>-<4 hex digits> and the link simscen-out/latest to it.
 
-    Raises UsageError if the folder cannot be created or written to. Existing files are never changed.
+    Raises UsageError if `out` is not empty, or if the folder cannot be created or written to.
     """
     folder = out or DEFAULT_FOLDER / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
     try:
@@ -35,7 +35,7 @@ def create_output_folder(out: Path | None) -> Path:
 
 
 def run_folder(folder: Path, key: RunKey) -> Path:
-    """Return the folder of a run in the session in `folder`."""
+    """Return the folder of a run in the output folder `folder` of its session."""
     return folder / RUNS_FOLDER / key.scenario / key.folder
 
 
@@ -52,9 +52,7 @@ def probe_writable(path: Path) -> None:
 def write_atomically(path: Path, data: bytes | Iterable[bytes]) -> None:
     """Replace a file atomically, so that readers see the old or the new content, even after a crash.
 
-    `data` is the content, or its parts.
-
-    Raises OSError, also if the target is not a regular file.
+    `data` is the content, or its parts in order. Raises OSError if the file cannot be written or is not a regular file.
     """
     require_regular_file(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Build the result of a run from the end of its process, and the command that repeats it."""
+"""Build the result of a run from how its worker ended, and the command that repeats the run."""
 
 import json
 import os
@@ -23,7 +23,7 @@ MAX_RECOVER_BYTES = 64 << 20
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
-    """Return the result of a run; an error unless its process exited with status 0 and a final message."""
+    """Return the result of a run that was started; an error unless its worker exited 0 and sent an end record."""
     failure = _with_log(_failure(end), job.folder)
     output = output_tail(end.output)
     result = (
@@ -43,7 +43,7 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
 
 
 def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
-    """Return the result of a run that did not finish or did not start."""
+    """Return the result of a run that was interrupted or never started: the error `failure`."""
     result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     return _result_without_log(job, result)
 
@@ -61,7 +61,7 @@ def _result_without_log(job: Job, result: RunResult) -> RunFinished:
 
 
 def _result(job: Job, output: str) -> RunResult:
-    """Read result.json of a run. The key is replaced, since the second run of a pair stores the key of the first."""
+    """Read result.json of a run. The key is replaced, since both runs of a pair of twins store the key of the first."""
     try:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
@@ -77,7 +77,7 @@ def _artifacts(folder: Path) -> Artifacts:
 
 
 def _stack_warnings(folder: Path) -> tuple[str, ...]:
-    """Return the `warnings` that external stacks gave about themselves."""
+    """Return the distinct `warnings` about themselves that external stacks have sent, from stack.json."""
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
         given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
@@ -115,7 +115,7 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
 
 
 def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
-    """Add the location of the partial log to a failure, and recover the log."""
+    """Recover the partial log of a failed run, and name the log in the message of the failure."""
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
@@ -137,7 +137,7 @@ def _worker_failure(end: ProcessEnd, message: str, kind: str = "crashed") -> Run
 
 
 def _place(end: ProcessEnd | ForkServerDeath) -> str:
-    """Return the innermost Python frame, if a stack was dumped."""
+    """Return ", in " and the innermost Python frame if the process dumped its stack, else ""."""
     place = innermost_frame(end.output)
     return f", in {place}" if place else ""
 

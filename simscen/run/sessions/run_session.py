@@ -24,11 +24,14 @@ from simscen.run.sessions.results import finished_run, skipped_run, unfinished_r
 class SessionOptions:
     """Options of a session.
 
-    `seed` None stands for each scenario's own seed; `repeat` runs use consecutive seeds. `twice` runs everything a
-    second time with the same seed and compares. `against` is the output folder of an earlier session to compare with.
-    `wall_limit` limits each run, in seconds. `only` restricts the session to these keys. `replay` selects the runs
-    that get a replay page, `keep_logs` those that keep their logs and pictures. `cluster` is the address of the Ray
-    cluster on which the runs are executed; "" is this machine.
+    Attributes:
+        seed: First of the `repeat` consecutive seeds; None for each scenario's own seed.
+        twice: Whether each run is repeated with the same seed and must give the same log.
+        fail_fast: Whether no run starts after one that did not pass.
+        wall_limit: Limit of the wall time of each run in s.
+        against: Output folder of an earlier session with which each run is compared.
+        only: The runs to execute; None for all.
+        cluster: Address of the Ray cluster that executes the runs; "" for this machine.
     """
 
     workers: int = 1
@@ -45,7 +48,7 @@ class SessionOptions:
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
-    """Return the seeds of a scenario. Raises UsageError if one exceeds the largest seed."""
+    """Return the seeds with which a scenario runs. Raises UsageError if one exceeds the largest seed."""
     first = options.seed if options.seed is not None else scenario.spec.seed
     if first + options.repeat - 1 > MAX_SEED:
         runs = f"{options.repeat} runs of {scenario.title} from seed {first} on"
@@ -54,7 +57,10 @@ def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
 
 
 def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path) -> list[Job]:
-    """Return all runs of a session in the order in which they start: by scenario, seed, variation, and stack."""
+    """Return all runs of a session in the order in which they start: by scenario, seed, variation, and stack.
+
+    `out` is the output folder of the session.
+    """
     jobs: list[Job] = []
     skipped = [scenario for scenario in scenarios if scenario.spec.skip is not None]
     scenarios = [scenario for scenario in scenarios if scenario.spec.skip is None]
@@ -86,9 +92,9 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 def run_session(
     jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
 ) -> tuple[RunStore, Exit | None]:
-    """Run all jobs and report exactly one result for each, in the order in which they finish.
+    """Run all jobs, and pass exactly one result for each to `listen`, in the order in which they finish.
 
-    Returns the results, and the exit code if the session was interrupted.
+    Returns the results, and the exit code if the session was interrupted, else None.
     """
     results, positions = RunStore(), dict[int, int]()
     started: set[int] = set()
@@ -173,8 +179,8 @@ def _unfinished_reason(started: bool, stopped: Exit | None) -> RunFailure:
 def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
     """Return the run, or an error if it differs from the same run of the session in the folder `earlier`.
 
-    Logs that are equal byte for byte agree. Other logs agree if verdicts and trajectories do (see record.agreement),
-    because the last bits differ between machines. A run that is missing in the earlier session is an error.
+    The logs need not be equal byte for byte, because the last bits differ between machines: equal verdicts and nearly
+    equal trajectories are enough. A run that is missing in the earlier session is an error.
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
@@ -194,7 +200,7 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Return the folder of the run in the earlier session, which may have used several stacks."""
+    """Return the folder of the run in the earlier session. Its name contains the stack if that session had several."""
     stack = run.result.stack.partition("=")[0]
     labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
     return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)

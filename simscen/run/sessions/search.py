@@ -1,6 +1,6 @@
-"""Search methods for failures: each proposes points of the unit cube, and learns from the margins of their runs.
+"""Search methods of `simscen falsify`: propose parameter values, and learn from the margins of the runs with them.
 
-Points are proposed and evaluated in batches of a fixed size, so that a search does not depend on the number of workers.
+Values are proposed and run in batches of a fixed size, so that a search does not depend on the number of workers.
 """
 
 import math
@@ -13,9 +13,9 @@ import numpy as np
 from simscen.core.errors import UsageError
 
 Point = tuple[float, ...]
-"""Cumulative probability of each parameter in its distribution, between 0 and 1, both excluded."""
+"""Parameter values to run: the cumulative probability of each value in its distribution, above 0 and below 1."""
 STARTUP_POINTS = 16
-"""Random points before TPE uses what it has learned; its authors use 10 to 20."""
+"""Number of random points before TPE uses what it has learned; its authors use 10 to 20."""
 
 
 class SearchMethod(str, Enum):
@@ -28,7 +28,7 @@ class SearchMethod(str, Enum):
 
 
 class Search(Protocol):
-    """A search for the smallest margin."""
+    """A search for the smallest margin. Calls of `ask` and `tell` alternate."""
 
     def ask(self, count: int) -> list[Point]:
         """Return the next points to run."""
@@ -40,9 +40,10 @@ class Search(Protocol):
 
 
 def make_search(method: SearchMethod, choices: Sequence[int], seed: int) -> Search:
-    """Return a search. `choices` are the numbers of values of the parameters to choose from, 0 for other parameters.
+    """Return a search whose random choices depend on `seed`. AUTO is TPE if Optuna is installed, else SOBOL.
 
-    Raises UsageError if the method needs a package that is not installed.
+    `choices` has one number for each parameter: how many values its list has, or 0 for a continuous parameter. Raises
+    UsageError for TPE without Optuna.
     """
     if method is SearchMethod.RANDOM:
         return RandomSearch(len(choices), seed)

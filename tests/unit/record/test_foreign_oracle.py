@@ -13,12 +13,14 @@ from simscen.core.errors import InvalidInput
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
+from simscen.loading.scenario import load_scenario
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import read_foreign_log
 from simscen.record.log_reader import read_log
 from simscen.record.mcap_reader import RecordReader, open_log
-from simscen.run.simulate import simulate_file
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
 
 SCENARIO = """\
 simscen: 1
@@ -35,7 +37,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a short drive."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "a.scenario.yaml").write_text(SCENARIO)
-    simulate_file(folder / "a.scenario.yaml", 1, folder / "run.mcap", folder)
+    simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), 1, log=folder / "run.mcap")
     return folder / "run.mcap"
 
 

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from simscen.run.simulate import simulate_file
+from simscen.loading.scenario import load_scenario
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
 
 BASE = """\
 simscen: 1
@@ -19,5 +21,6 @@ def test_a_criterion_of_a_base_has_no_line_in_the_file_that_extends_it(tmp_path:
     (tmp_path / "base.yaml").write_text(BASE)
     (tmp_path / "a.scenario.yaml").write_text("extends: base.yaml\n\n\nname: a\n")
     (tmp_path / "b.scenario.yaml").write_text("extends: base.yaml\npass:\n  - collisions: {max: 0}\n")
-    (extended, own) = (simulate_file(tmp_path / f"{name}.scenario.yaml", 1, None, tmp_path) for name in ("a", "b"))
+    files = (tmp_path / f"{name}.scenario.yaml" for name in ("a", "b"))
+    (extended, own) = (simulate(prepare(load_scenario(file, tmp_path)), 1) for file in files)
     assert (extended.result.lines, own.result.lines) == ((0,), (3,))

@@ -66,8 +66,8 @@ def test_an_end_between_two_samples_breaks_nothing_that_is_derived_from_them(pla
 def test_a_new_goal_takes_the_ending_back():
     ending = EndCondition(Clock(240), 60.0, 0.5)
     ending.update(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
-    assert not ending.reached(219)
-    assert ending.reached(220)
+    assert not ending.end_event(219)
+    assert ending.end_event(220)
     ending.update(Decision(STOP, events=(Event(120, EventKind.GOAL_ACCEPTED),)))
-    assert not ending.reached(220)
-    assert ending.reached(60 * 240)
+    assert not ending.end_event(220)
+    assert ending.end_event(60 * 240)

@@ -9,7 +9,7 @@ GO, FAST = Twist(0.3), Twist(0.5)
 def test_the_stack_sends_at_its_rate_and_at_once_when_it_wants_something_else():
     link = CommandLink(12, 120)
     wanted = [GO] * 15 + [STOP] * 15
-    assert [tick for tick, command in enumerate(wanted) if link.sends_message(tick, command)] == [0, 12, 15, 24]
+    assert [tick for tick, command in enumerate(wanted) if link.send(tick, command)] == [0, 12, 15, 24]
 
 
 def test_base_without_commands_keeps_the_last_one_and_stops_after_its_timeout():

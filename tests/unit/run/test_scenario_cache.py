@@ -22,11 +22,11 @@ def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: 
     variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
     assert isinstance(variations, tuple)
     cache = ScenarioCache(CachedWorldBuilder(DiskCache(None)))
-    prepared = [cache.prepared(one) for one in variations]
+    prepared = [cache.get_or_prepare(one) for one in variations]
     assert len({id(one.built) for one in prepared}) == 1
     assert [one.start.x for one in prepared] == [1, 2, 3]
-    assert cache.prepared(variations[2]) is prepared[2]
-    assert cache.prepared(variations[0]) is not prepared[0]
+    assert cache.get_or_prepare(variations[2]) is prepared[2]
+    assert cache.get_or_prepare(variations[0]) is not prepared[0]
 
 
 def test_a_scenario_with_the_same_name_but_other_content_is_prepared_again(tmp_path: Path) -> None:
@@ -35,5 +35,5 @@ def test_a_scenario_with_the_same_name_but_other_content_is_prepared_again(tmp_p
     for x in (1, 2):
         (tmp_path / "a.scenario.yaml").write_text(TEXT.replace("{x: 1, y: 1}", f"{{x: {x}, y: 1}}").split("var")[0])
         loaded = load_scenario(tmp_path / "a.scenario.yaml", tmp_path)
-        starts.append(cache.prepared(loaded).start.x)
+        starts.append(cache.get_or_prepare(loaded).start.x)
     assert starts == [1, 2]

@@ -32,7 +32,7 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
     cache = tmp_path / "cache"
 
     def log(kept: DiskCache) -> bytes:
-        prepared = ScenarioCache(CachedWorldBuilder(kept)).prepared(loaded)
+        prepared = ScenarioCache(CachedWorldBuilder(kept)).get_or_prepare(loaded)
         simulate(prepared, 1, log=tmp_path / "run.mcap")
         return (tmp_path / "run.mcap").read_bytes()
 

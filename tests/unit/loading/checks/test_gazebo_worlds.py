@@ -64,7 +64,7 @@ def errors(loaded: LoadedScenario) -> list[Problem]:
 def test_map_covers_start_and_goals_on_open_ground(tmp_path, content):
     loaded = load(tmp_path, content)
     assert not errors(loaded)
-    for prepared in (prepare(loaded), ScenarioCache(CachedWorldBuilder(DiskCache(None))).prepared(loaded)):
+    for prepared in (prepare(loaded), ScenarioCache(CachedWorldBuilder(DiskCache(None))).get_or_prepare(loaded)):
         assert prepared.map is not None
         stops = prepared.map.cell_of(np.array([prepared.start[:2], prepared.case.goals[0].pose[:2]]))
         assert prepared.map.inside(stops).all()
