@@ -49,6 +49,13 @@ def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
     return np.array(poses)
 
 
+def mean_velocity(step: Pose2, seconds: float) -> Twist:
+    """Return the constant velocity that moves a base along an arc by `step` in the base frame within `seconds`."""
+    x, y, turn = step
+    c, s = math.cos(turn / 2), math.sin(turn / 2)  # the chord of the arc is at half the turn
+    return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)
+
+
 def forward_steps(poses: Array) -> npt.NDArray[np.bool_]:
     """Return for each step (n - 1,) between poses (n, 3) whether the robot drives forward."""
     steps = np.diff(poses[:, :2], axis=0)

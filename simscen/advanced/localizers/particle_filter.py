@@ -19,7 +19,7 @@ from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace, Particles, are_compact, summarize
-from simscen.stack.localizers.resampling import Recovery
+from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNINFORMATIVE_SHARE_OF_HIT = 0.4
@@ -96,11 +96,11 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self._trust = trust
         super().__init__(spec, motion, sensor, free_space, rng)
 
-    def begin(self, estimate: Estimate) -> None:
+    def reset(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
-        super().begin(estimate)
+        super().reset(estimate)
         if self._spec.relocalization == "scan_matching":  # random particles would compete with its search
-            self._recovery = Recovery(0.0, 0.0)
+            self._augmented_mcl = AugmentedMcl(0.0, 0.0)
         self._map_weight, self._is_one_group = 1.0, False
         self.fitting = 0.0
         """Share of the last scan's beams that fit the map at the particles, where the map shows anything."""
@@ -111,7 +111,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def is_certain(self) -> bool:
         """Whether the map explains nearly the whole last scan, and the particles are one narrow group."""
         is_mapped = self._map_weight == 1.0 and self.fitting >= CERTAIN_FIT
-        return is_mapped and self._is_one_group and self._recovery.share == 0
+        return is_mapped and self._is_one_group and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
@@ -146,7 +146,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
         drawn = sample_around(poses, shares, self._bound.max_samples, self._rng)
-        self.particles = Particles.equal(drawn)
+        self.particles = Particles.with_equal_weights(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
         return summarize(self.particles, self._sensor.peak_power)

@@ -16,14 +16,14 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
 from simscen.stack.controllers.dwb.trajectory_generator import Trajectories
+from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-UNKNOWN = 255
-"""Cost of an unknown cell in nav2_costmap_2d."""
+
 BATCH_TRAJECTORIES = 50
 """Number of trajectories that are checked for collisions at once. Usually, one of the first is free."""
 
@@ -100,7 +100,7 @@ def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
     """Return the cells (m, 2) of the first part of the plan (n, 2) that lies on known cells of the costmap."""
     cells, on_map = cells_of(costmap, plan)
     known = on_map.copy()
-    known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != UNKNOWN
+    known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != NO_INFORMATION
     if not known.any():
         return cells[:0]
     first = int(known.argmax())

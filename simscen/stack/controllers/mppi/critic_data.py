@@ -10,6 +10,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.path_handler import UpcomingPath
+from simscen.stack.costmap.layers import INSCRIBED, NO_INFORMATION
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
@@ -17,8 +18,7 @@ from simscen.stack.protocols import CostmapView
 
 Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
-INSCRIBED, UNKNOWN = 253, 255
-"""Costs in nav2_costmap_2d of a cell that the center of the robot must not enter, and of an unknown cell."""
+
 MOVING_CLEARANCE_M = 0.25
 """Clearance that rollouts should keep from moving obstacles, plus one standard deviation of their position."""
 COLLISION_DECAY_S = 1.2
@@ -86,7 +86,7 @@ class CriticData:
     def free_points(self) -> Mask:
         """Mask (m,) of the points of the plan where the center of the robot may be: free or unknown cells."""
         costs = self.costs(self.lookup(*self.path[:2]))
-        return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
+        return np.asarray((costs < INSCRIBED) | (costs == NO_INFORMATION))
 
     @cached_property
     def moving(self) -> MovingObstacles:
