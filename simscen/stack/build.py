@@ -103,10 +103,7 @@ class StackBuilder:
         )
         controller: Controller = build_component(CheckedController, spec.controller, driving)
         costmaps = Costmaps(
-            spec,
-            self.surroundings,
-            controller.full_speed * spec.controller.lookahead_s,
-            self.latency["costmap"],
+            spec, self.surroundings, controller.full_speed * spec.controller.lookahead_s, self.latency["costmap"]
         )
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
         driving = replace(

@@ -89,7 +89,8 @@ class CollisionMonitor:
     def silence_reason(self, tick: int) -> str:
         """Return a message: which lidar is silent, and whether its scans are missing, empty, or too late."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
-        limit, elapsed = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
+        limit = f"source_timeout is {self._spec.source_timeout:g} s"
+        elapsed = (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
         arrived, taken = self._arrivals.get(name, (None, 0))
         if arrived is None or (tick - arrived) > self._timeout:
             return f"lidar `{name}` has been silent for {elapsed:.2f} s; {limit}"
@@ -97,10 +98,6 @@ class CollisionMonitor:
             return f"lidar `{name}` has been blind for {elapsed:.2f} s: its scans contain no returns; {limit}"
         late = (arrived - taken) / self._tick_rate
         return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
-
-    def _since(self, name: str, tick: int) -> float:
-        """Return the time in s since the last usable scan of a lidar."""
-        return (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
 
     def allow(self, command: Twist, odometry: Pose2) -> Twist:
         """Return the command, slowed down in proportion if it leads to a contact within `time_before_collision`.

@@ -76,7 +76,6 @@ def cusps(poses: Array) -> npt.NDArray[np.int64]:
 Axes = tuple[float, float, float]
 """Values for vx, vy, and turn rate."""
 OptionalAxes = tuple[float | None, float | None, float | None]
-"""Values for vx, vy, and turn rate, each of which may be None."""
 Limits = TypeVar("Limits", bound="VelocityLimits")
 Real = TypeVar("Real", np.float32, np.float64)
 

@@ -96,18 +96,19 @@ class RegulatedPurePursuit(PathFollower):
 
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command to the farthest carrot with a free arc, or else on the arc that is free for longest."""
-        lookahead_distance = self._lookahead_distance(twist.vx)
+        spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
         arcs: list[Arc] = []
         rotation: float | None = None
         escape_rotation: float | None = None
         for ratio in LOOKAHEAD_RATIOS:
-            if ratio < 1.0 and ratio * lookahead_distance < self._spec.min_lookahead_dist:
+            if ratio < 1.0 and ratio * lookahead_distance < spec.min_lookahead_dist:
                 break
             carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
-            curvature_carrot = (
-                self._curvature_carrot(tracker, pose) if self._spec.use_fixed_curvature_lookahead else carrot
-            )
-            backward = not tracker.is_forward or (self._spec.allow_reversing and carrot.x < 0.0)
+            curvature_carrot = carrot
+            if spec.use_fixed_curvature_lookahead:
+                beyond = spec.interpolate_curvature_after_goal
+                curvature_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, beyond)
+            backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
             if self._should_rotate(curvature_carrot, backward):
                 rotation = curvature_carrot.bearing(backward)
                 break
@@ -121,7 +122,7 @@ class RegulatedPurePursuit(PathFollower):
         if rotation is not None:
             return self._rotate(rotation, pose, twist, costmap)
         command, free_time, horizon = max(arcs, key=lambda arc: arc.free_time)
-        required = self._spec.max_allowed_time_to_collision_up_to_carrot
+        required = spec.max_allowed_time_to_collision_up_to_carrot
         try:
             slowed = self._collision_checker.slow_down(command, free_time, horizon, required)
         except NavigationFailure:
@@ -144,11 +145,6 @@ class RegulatedPurePursuit(PathFollower):
         rotated = Pose2(pose.x, pose.y, pose.yaw + angle)
         arc = self._checked_arc(Twist(command.vx, 0.0, 0.0), rotated, costmap, carrot.distance)
         return arc.free_time >= arc.horizon
-
-    def _curvature_carrot(self, tracker: PathTracker, pose: Pose2) -> Carrot:
-        """Return the point that determines the curvature with use_fixed_curvature_lookahead."""
-        spec = self._spec
-        return _carrot(tracker, pose, spec.curvature_lookahead_dist, spec.interpolate_curvature_after_goal)
 
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
         """Return the distance in m that must be free: to the carrot or, for a car, to the next cusp if it is nearer."""

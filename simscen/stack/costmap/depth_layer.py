@@ -92,7 +92,6 @@ def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]
     return np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape)
 
 
-Pixels = npt.NDArray[np.bool_]
 GROUND_STEP_M = 0.05
 """Minimum horizontal distance between two points of a column from which a ground slope is computed."""
 MAX_RISE_RATIO = 1.0
@@ -101,7 +100,7 @@ SLOPE_ROWS_DIVISOR = 8
 """The slope at the lowest point of a column is measured over this fraction (one eighth) of the image rows."""
 
 
-def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
+def above_ground(away: Array, heights: Array, slope: float, low: float, known: Mask) -> tuple[Array, Mask]:
     """Return the heights in m above the ground of the points of an image (rows, columns), and which of them are ground.
 
     away:     horizontal distances of the points from the camera in m, top row first
@@ -126,16 +125,16 @@ def above_ground(away: Array, heights: Array, slope: float, low: float, known: P
     return above, level
 
 
-def _upright(away: Array, heights: Array) -> Pixels:
+def _upright(away: Array, heights: Array) -> Mask:
     """Return which points belong to an upright face: they are steeply above or below the point in an adjacent row."""
-    steep: Pixels = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
+    steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
     upright[:-1] |= steep
     return upright
 
 
-def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixels:
+def _on_a_step(away: Array, heights: Array, upright: Mask, low: float) -> Mask:
     """Return in which columns the lowest point is on a step whose edge is below the image.
 
     Such a point is higher than `low`. Besides, it is on an upright face, or the slope at this point, extended to the
@@ -146,7 +145,7 @@ def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixe
     upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)
     r, z = away[lowest, all_columns], heights[lowest, all_columns]
     rise = (heights[upper, all_columns] - z) / np.maximum(away[upper, all_columns] - r, GROUND_STEP_M)
-    step: Pixels = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
+    step: Mask = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
     return step
 
 

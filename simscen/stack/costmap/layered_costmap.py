@@ -88,7 +88,7 @@ class LayeredCostmap:
         self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
         self.moving = NO_MOVING_OBSTACLES
         """Moving obstacles in the frame of the costmap, included in the view."""
-        layer = self._initial_layer(Pose2(0.0, 0.0))
+        layer = self._static_layer_in(window_around(Pose2(0.0, 0.0), self._size, spec.resolution))
         self._frame: GridFrame = layer.frame
         self._live = ObstacleLayer(spec, self._inscribed, layer.frame)
         self._set_static_layer(layer)
@@ -219,9 +219,6 @@ class LayeredCostmap:
         if self._tracks_unknown:
             self._unknown = shift_layer(self._unknown, before, window, True)
         self._mark_changed(*self._whole)
-
-    def _initial_layer(self, center: Pose2) -> StaticLayer:
-        return self._static_layer_in(window_around(center, self._size, self._spec.resolution))
 
     def _static_layer_in(self, window: GridFrame) -> StaticLayer:
         """Return the static layer of the map, or of this window if there is no map."""

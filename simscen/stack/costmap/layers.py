@@ -137,17 +137,12 @@ def empty_layer(
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
-        lethal |= inside_polygon(frame, polygon)
+        lethal |= points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
     if mask is not None:
         columns = np.arange(frame.shape[1])
         for row in range(frame.shape[0]):
             lethal[row] |= in_keepout_mask(mask, frame.centers(np.column_stack((np.full_like(columns, row), columns))))
     return lethal
-
-
-def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
-    """Return the cells whose center is inside the polygon (even-odd rule)."""
-    return points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
 
 
 def _all_centers(frame: GridFrame) -> Array:

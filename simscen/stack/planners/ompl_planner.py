@@ -14,13 +14,7 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import cusps
-from simscen.stack.planners.endpoints import (
-    Endpoints,
-    find_endpoints,
-    free_points,
-    reachable_bounds,
-    reachable_cells,
-)
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, free_points, reachable_bounds, reachable_cells
 from simscen.stack.planners.ompl_search import OmplSearch, Problem, set_parameters
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
@@ -76,10 +70,7 @@ class PosePlanner:
         self._turning_radius = spec.minimum_turning_radius or max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 5 cm apart: the cheapest of `pose_searches` searches.
-
-        Raises NavigationFailure if there is none.
-        """
+        """Return the cheapest path of `pose_searches` searches: poses in the map frame, at most 5 cm apart."""
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         field = DistanceLookup(costmap if self._spec.allow_unknown else self._block_unknown(costmap))
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
@@ -118,12 +109,8 @@ class PosePlanner:
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         """Yield the attempts in order: with less and less clearance, and finally with finer collision checks."""
-        bounds, reachable, size, (x0, y0) = (
-            reachable_bounds(costs, ends),
-            ends.reachable,
-            costs.resolution,
-            costs.origin,
-        )
+        bounds, reachable = reachable_bounds(costs, ends), ends.reachable
+        size, (x0, y0) = costs.resolution, costs.origin
         rows, columns = reachable.shape
 
         def contains(x: float, y: float) -> bool:
@@ -183,10 +170,7 @@ class PosePlanner:
         return best
 
     def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
-        """Return the validity check of poses: in the region, and free of collisions with the clearance of the attempt.
-
-        Near the start and the goal (`ends`), no clearance is required.
-        """
+        """Return a check of poses: in the region, and free of collisions with the clearance, except near the `ends`."""
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance
         # The distances are those between cell centers, which are wrong by up to a cell diagonal.

@@ -37,11 +37,7 @@ class DynamicWindowController(PathFollower):
         self._kinematics = kinematic_parameters(spec, robot, self._full_speed)
         self._sample_counts = (spec.vx_samples, spec.vy_samples, spec.vtheta_samples)
         self._goal_rotation = GoalRotation(
-            robot,
-            spec.max_vel_theta,
-            robot.angular_acceleration,
-            setting.control_period,
-            spec.goal_tolerance_ratio,
+            robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period, spec.goal_tolerance_ratio
         )
         self._obstacle_critic = ObstacleCritic(setting.footprint, spec.preferred_clearance)
         self._rotate_to_goal = RotateToGoalCritic(spec.trans_stopped_velocity, spec.slowing_factor)

@@ -92,9 +92,8 @@ def velocity_samples(
     return samples
 
 
-def velocity_window(kinematics: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
+def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
     """Return velocities (n, 3) that can be reached within `seconds`, in order of vx. `counts`: samples of each axis."""
-    limits = kinematics
     axes = [
         velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
         for velocity, low, high, acceleration, deceleration, count in zip(
@@ -132,28 +131,22 @@ class Trajectories:
 
 
 def generate_trajectories(
-    pose: Pose2,
-    now: Twist,
-    velocities: Array,
-    kinematics: KinematicParameters,
-    seconds: float,
-    meters: float,
-    radians: float,
+    pose: Pose2, now: Twist, velocities: Array, limits: KinematicParameters, seconds: float, length: float, angle: float
 ) -> Trajectories:
     """Return the trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
 
-    No step is longer than `meters` or turns by more than `radians`. Trajectories with fewer steps are padded with their
-    final pose. The heading is constant within a step.
+    No step is longer than `length` m or turns by more than `angle` rad. Trajectories with fewer steps are padded with
+    their final pose. The heading is constant within a step.
     """
-    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / meters
-    turn_steps = np.abs(velocities[:, 2]) * seconds / radians
+    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / length
+    turn_steps = np.abs(velocities[:, 2]) * seconds / angle
     step_counts = np.maximum(1.0, np.ceil(np.maximum(distance_steps, turn_steps)))
     _, first, yaw_index = np.unique(velocities[:, 2] + 1j * step_counts, return_index=True, return_inverse=True)
     count, dt = step_counts[first], seconds / step_counts[first]
     step = np.arange(math.ceil(step_counts.max()) + 1)[:, None]
     times, step = np.minimum(step, count) * dt, step[1:]
     yaw_times, durations = times[1:], np.where(step <= count, dt, 0.0)
-    axes = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
+    axes = list(zip(now, limits.acceleration, limits.deceleration, strict=True))
     wz = _ramp(velocities[first, 2], *axes[2], yaw_times)
     yaw = _accumulate(pose.yaw, wz * durations)
     cosine = (np.cos(yaw[:-1]) * durations).take(yaw_index, axis=1)

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -21,6 +20,7 @@ from simscen.stack.controllers.mppi.rollouts import (
     VX,
     VY,
     WZ,
+    Floats,
     Rollouts,
     apply_model_delay,
     axis_order,
@@ -34,7 +34,6 @@ from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-Floats = npt.NDArray[np.float32]
 SMOOTHING_KERNELS = {
     1: np.full(9, 1.0 / 9.0, np.float32),
     2: np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21], np.float32) / np.float32(231.0),
@@ -82,10 +81,8 @@ def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: floa
     `sequence` is modified. `dt` is the time step in s.
     """
     low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
-    increase, decrease = (
-        (axis_order(limits.acceleration) * dt).tolist(),
-        (axis_order(limits.deceleration) * dt).tolist(),
-    )
+    increase = (axis_order(limits.acceleration) * dt).tolist()
+    decrease = (axis_order(limits.deceleration) * dt).tolist()
     _limit_curvature(sequence, limits)
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):
@@ -227,11 +224,9 @@ class MppiController(PathFollower):
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        decrease, increase = (
-            axis_order(limits.deceleration) * self._period,
-            axis_order(limits.acceleration) * self._period,
-        )
-        reachable = np.clip(sent, measured + decrease[: self._axes], measured + increase[: self._axes])
+        lowest = measured + (axis_order(limits.deceleration) * self._period)[: self._axes]
+        highest = measured + (axis_order(limits.acceleration) * self._period)[: self._axes]
+        reachable = np.clip(sent, lowest, highest)
         return reachable.astype(np.float32)
 
     def _iterate(self, velocity: Floats, critic_data: Callable[[Rollouts], CriticData]) -> bool:

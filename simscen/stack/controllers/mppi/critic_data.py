@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.controllers.mppi.rollouts import Rollouts
+from simscen.stack.controllers.mppi.rollouts import Floats, Rollouts
 from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.costmap.layers import INSCRIBED, NO_INFORMATION
 from simscen.stack.footprint import CoveringDiscs, Footprint
@@ -16,7 +16,6 @@ from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 
-Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 
 MOVING_CLEARANCE_M = 0.25

@@ -7,15 +7,13 @@ A critic takes its parameters and the critic data, and returns the cost of each 
 from typing import get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.model import mppi as model
 from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, hypot_in_place
-from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
+from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Floats
 from simscen.stack.kinematics import accumulate_rows
 
-Floats = npt.NDArray[np.float32]
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
 """Smaller turn rates are replaced by this one, so that the turning radius of a car stays finite."""
 HALF_TURN_RAD = np.float32(np.pi)
