@@ -70,8 +70,7 @@ class BackUp:
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
         """Return the command to back up; None when done.
 
-        Raises BACKUP_COLLISION_AHEAD (with `backup_partial`, only if the robot cannot move by a single cell),
-        BACKUP_TIMEOUT, or BACKUP_INVALID_INPUT if the robot cannot drive backward.
+        Raises BACKUP_COLLISION_AHEAD, BACKUP_TIMEOUT, or BACKUP_INVALID_INPUT (the robot cannot drive backward).
         """
         remaining = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
@@ -127,8 +126,7 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 PROGRESS_M = 1.0
-"""With `retries_since_progress`, all retries are restored when a recovery starts this much nearer to the goal than any
-earlier one."""
+"""A recovery that starts this much nearer to the goal than any earlier one counts as progress: it restores retries."""
 
 
 class BehaviorSequence:

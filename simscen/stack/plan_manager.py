@@ -39,10 +39,7 @@ class PlanResult:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request to the planner, whose answer becomes available at tick `due`.
-
-    If `is_optional`, a failure has no consequence.
-    """
+    """A request to the planner, answered at tick `due`. If `is_optional`, a failure has no consequence."""
 
     due: int
     reason: str
@@ -152,10 +149,7 @@ class PlanManager:
         return self._scheduled_reason(now, plan)
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
-        """Return the reason for periodic replanning: "rate", or with `replanning: on_invalid` "blocked" or "window".
-
-        Return "" if no new plan is due.
-        """
+        """Return why periodic replanning is due: "rate", or for `on_invalid` "blocked" or "window"; "" if it is not."""
         rate = self._spec.replanning_rate or (THROUGH_POSES_RATE_HZ if self._via else TO_POSE_RATE_HZ)
         if now - self._scheduled_at < 1.0 / rate:
             return ""

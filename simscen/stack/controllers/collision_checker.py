@@ -35,8 +35,8 @@ class CollisionChecker:
     def slow_down(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
         """Return the command; if it is not free for `horizon` s, slowed down so that it becomes free for `required` s.
 
-        Raises NO_VALID_CONTROL if it would be slower than the minimum. Nav2 fails without slowing down, which gives the
-        planner no time to find a way around the obstacle.
+        Raises NO_VALID_CONTROL if it would be slower than the minimum. Nav2 fails at once; slowing down first gives the
+        planner time to find a way around the obstacle.
         """
         if free_time >= horizon:
             return command
@@ -117,8 +117,8 @@ CELL_DIAGONAL = 1.4143
 def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
     """Return the time in s until the first collision with a static obstacle at this velocity, at most `horizon`.
 
-    A robot may already be in collision according to the costmap, for example because of a localization error. It must
-    be able to leave. So only motion into another obstacle, or over half a cell deeper into the same one, then counts.
+    A robot may already be in collision according to the costmap, for example because of a localization error. So that
+    it can leave, only motion into another obstacle or more than half a cell deeper into the same one counts then.
     """
     if _is_surely_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon

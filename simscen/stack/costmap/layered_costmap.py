@@ -128,10 +128,7 @@ class LayeredCostmap:
         return self._revision
 
     def changed_near(self, revision: int, points: Plane, distance: float) -> bool:
-        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision.
-
-        Does not compute the view.
-        """
+        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision."""
         count = self._revision - revision
         if count > len(self._changes):
             return True
@@ -148,10 +145,7 @@ class LayeredCostmap:
         return self._live.count + self._keepout_change
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
-        """Clear the cells that a sensor sees through, then mark its obstacles.
-
-        `base` is the pose of the robot at the time of the reading.
-        """
+        """Clear the cells that a sensor sees through, then mark its obstacles. `base`: robot pose of the reading."""
         if self._rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
         self._latest_readings[reading.sensor] = (base, reading)
