@@ -15,7 +15,7 @@ MAX_INT32_EDGE_CELLS = 30_000
 """Longest edge of a grid for which squared distances fit into 32 bits."""
 
 MAX_REACH_CELLS = 180
-"""Largest maximum distance in cells: the sum of two squares must fit into 16 bits."""
+"""Largest supported `reach` in cells: the sum of two squares must fit into 16 bits."""
 OUT_OF_REACH = 65535
 """Value for cells beyond the maximum distance, larger than any squared distance within it."""
 MAX_COMPARED_CELLS = 60
