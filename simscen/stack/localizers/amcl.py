@@ -134,7 +134,7 @@ class AmclLocalizer:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by `delta`, the odometry since the last update (None at first), and weigh them."""
+        """Move the particles by `delta`, the odometry since the last update (None at first), and weight them."""
         if delta is not None:
             self._filter.move(delta)
         self._mark_updated(scan, odometry)
