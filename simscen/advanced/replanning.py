@@ -20,11 +20,11 @@ from simscen.core.messages.navigation import Goal, Path
 from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.plan_manager import PlanManager, PlanResult
-from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 DECAY_TIME_S = 2.0

@@ -114,9 +114,9 @@ class AdvancedStack(ReferenceStack):
     def _on_idle(self, tick: int, pose: Pose2) -> None:
         """Make the robot step aside for moving obstacles, and drive back to its position afterward."""
         command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
-        if command == STOP or self._monitor.silent(tick):
+        if command == STOP or self._monitor.is_silent(tick):
             self._commands.stop(tick)
-        elif not self._commands.busy(tick):
+        elif not self._commands.is_busy(tick):
             self._commands.request(tick, command, self._commands.periods(tick))
 
 

@@ -1,4 +1,4 @@
-"""Recovery behaviors that move the robot or let it wait (nav2_behaviors)."""
+"""Recovery behaviors (nav2_behaviors), and the sequence in which the navigator runs them."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 SPIN_TOLERANCE_RAD = 0.01
-"""Rest of a turn that counts as done: a fraction of a degree, which odometry measures no better."""
+"""A turn is done when its remaining angle is at most this: about half a degree, the accuracy of odometry."""
 
 
 class Spin:
@@ -51,10 +51,10 @@ class Spin:
 
 
 class BackUp:
-    """Drive straight back by `backup_dist`, or as far as possible.
+    """Drive straight back by `backup_dist` or, with `backup_partial`, as far as possible.
 
-    Nav2's behavior fails if a collision is nearer than simulate_ahead_time, as this one without `backup_partial`. But a
-    few centimeters often suffice for the robot to turn.
+    Nav2's behavior fails if it predicts a collision within simulate_ahead_time, and so does this one without
+    `backup_partial`. But a few centimeters are often enough for the robot to turn afterwards.
     """
 
     name = "backup"
@@ -70,7 +70,7 @@ class BackUp:
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
         """Return the command to back up; None when done.
 
-        Raises BACKUP_COLLISION_AHEAD if it cannot move by a single cell, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
+        Raises BACKUP_COLLISION_AHEAD, BACKUP_TIMEOUT, or BACKUP_INVALID_INPUT (the robot cannot drive backward).
         """
         remaining = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
@@ -107,11 +107,7 @@ class Wait:
 
 
 class ClearCostmap:
-    """Clear live obstacles that are not in current readings: around the robot, or everywhere with `clear_entirely`.
-
-    Obstacles far from the robot do not stop the controller, and after a planning failure the global costmap has already
-    been cleared.
-    """
+    """Clear obstacles that current readings do not show: around the robot or, with `clear_entirely`, everywhere."""
 
     name = "clear_costmap"
 
@@ -128,14 +124,13 @@ class ClearCostmap:
 
 
 PLANNER_CODES = frozenset(get_args(PlannerCode))
-
-
+"""Names of the error codes of planners."""
 PROGRESS_M = 1.0
-"""Decrease of the distance to the goal, since the closest recovery so far, that counts as progress."""
+"""A recovery that starts this much nearer to the goal than any earlier one counts as progress: it restores retries."""
 
 
 class BehaviorSequence:
-    """Behaviors in turn, until the retries for a goal are used up."""
+    """Recovery behaviors in a fixed cyclic order (Nav2's RoundRobin), with a limited number of retries per goal."""
 
     def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
         """Take the behaviors and the parameters of the recovery."""
@@ -144,8 +139,8 @@ class BehaviorSequence:
         self._resets_on_progress = spec.retries_since_progress
         self._next, self._used, self._nearest = 0, 0, math.inf
 
-    def helps(self, failure: NavigationFailure) -> bool:
-        """Return whether to try a recovery after a failure with this code."""
+    def can_help(self, failure: NavigationFailure) -> bool:
+        """Return False if the code of the failure is a planner code for which no recovery is configured."""
         return getattr(failure.code, "name", "") not in self._final_codes
 
     def reset(self) -> None:
@@ -153,7 +148,7 @@ class BehaviorSequence:
         self._used, self._nearest = 0, math.inf
 
     def next(self, goal_distance: float) -> Behavior | None:
-        """Return the next behavior, with the goal `goal_distance` meters away, or None if the retries are used up."""
+        """Use up one retry and return the next behavior; None if no retry is left. `goal_distance` is in m."""
         if self._resets_on_progress and goal_distance <= self._nearest - PROGRESS_M and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, goal_distance)

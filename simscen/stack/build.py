@@ -1,4 +1,4 @@
-"""Construction of a stack from its specification."""
+"""Construction of a reference stack with all its components from its specification."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -47,10 +47,10 @@ def build_stack(
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
 ) -> CheckedStack:
-    """Build the stack of a specification, ready to `start`.
+    """Build the stack that a specification describes, with checks of its decisions. Call `start` on it next.
 
-    `wrap_localizer` wraps the localizer that the rest of the stack uses, for example to inject faults. Raises
-    ValueError if a rate does not divide the tick rate.
+    `wrap_localizer` replaces the localizer for the rest of the stack by a wrapper, for example to inject faults.
+    Raises ValueError if a rate does not divide the tick rate.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
@@ -66,7 +66,7 @@ def build_stack(
 
 
 def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
-    """Build the stack with the builder that the specification names: that of the reference or of the advanced stack."""
+    """Build the stack with the StackBuilder that `spec.builder` names: for the reference or the advanced stack."""
     module, _, name = spec.builder.partition(":")
     stack: ReferenceStack = getattr(import_module(module), name)(spec, setting).build()
     return stack
@@ -75,9 +75,9 @@ def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
 class StackBuilder:
     """Builder of the reference stack. Subclasses replace components by overriding the methods that make them.
 
-    The map is refined to cells no larger than those of the costmap. Random streams: "localizer", "controller", and
-    "planner#1", "planner#2", … for successive plans. Components of packages have their own streams besides, so adding
-    one does not change the random numbers of the others.
+    The map is refined to cells no larger than those of the costmap. Each component has its own random stream, for
+    example "localizer", and each plan has one ("planner#1", "planner#2", …). So adding a component does not change the
+    random numbers of the others.
     """
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
@@ -103,10 +103,7 @@ class StackBuilder:
         )
         controller: Controller = build_component(CheckedController, spec.controller, driving)
         costmaps = Costmaps(
-            spec,
-            self.surroundings,
-            controller.full_speed * spec.controller.lookahead_s,
-            self.latency["costmap"],
+            spec, self.surroundings, controller.full_speed * spec.controller.lookahead_s, self.latency["costmap"]
         )
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
         driving = replace(
@@ -160,11 +157,11 @@ class StackBuilder:
         )
 
     def plan_seed(self, number: int) -> int:
-        """Return the seed of a plan by its number in the run."""
+        """Return the random seed of the n-th plan of the run."""
         return self.streams.integer(f"planner#{number}")
 
     def make_odometry_filter(self) -> "OdometryFilter | None":
-        """Make the filter of wheel odometry and IMU; None to use the wheel odometry as it is."""
+        """Make the filter that fuses wheel odometry and IMU; None if the wheel odometry is used unfiltered."""
         if not self.spec.filters_odometry(self.surroundings.has_imu):
             return None
         from simscen.stack.localizers.odometry_filter import OdometryFilter
@@ -172,11 +169,11 @@ class StackBuilder:
         return OdometryFilter(self.spec.odometry, self.surroundings.tick_rate)
 
     def make_clearing_policy(self) -> ClearingPolicy:
-        """Make the policy for clearing the global costmap."""
+        """Make the policy that decides how much of the global costmap is cleared when planning has failed."""
         return ClearEntirely()
 
     def make_stack(self, *parts: Any) -> ReferenceStack:
-        """Make the stack of its components."""
+        """Make the stack from the arguments of `ReferenceStack`."""
         return ReferenceStack(*parts)
 
 

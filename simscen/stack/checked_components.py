@@ -1,4 +1,4 @@
-"""Wrappers that check what installed planners, controllers, goal checkers, behaviors, and localizers return."""
+"""Wrappers that check the return values of planners, controllers, and other stack components of installed packages."""
 
 import math
 import traceback
@@ -33,25 +33,25 @@ from simscen.stack.setting import Setting
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
 S = TypeVar("S", bound=Component)
 
 
 def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Setting) -> T:
-    """Build a component: with checks if it comes from another package, without if it ships with simscen.
+    """Build a component, inside its `wrapper` only if it comes from another package.
 
-    A stack of components that ship with simscen is checked as a whole, by its decisions.
+    Components that ship with simscen need no wrapper, because CheckedStack checks the decisions of the whole stack.
     """
     component: T = (spec.implementation() if spec.component.startswith("simscen.") else wrapper)(spec, setting)
     return component
 
 
 class CheckedPlugin:
-    """Base class of the wrappers of installed components; `role` is their role in a stack.
+    """Base class of wrappers around an installed component, whose `role` is for example "planner".
 
-    An exception other than NavigationFailure, or an invalid return value (not finite, wrong shape), is a fault of the
+    An exception other than NavigationFailure, or an invalid return value (not finite, wrong shape), is a defect of the
     component. Since it says nothing about the scenario, it ends the run with an error instead of a verdict.
+
+    `what` of the methods is the verb phrase in front of the wrong value in an error message, such as "returned".
     """
 
     may_fail: ClassVar[bool] = True
@@ -78,7 +78,7 @@ class CheckedPlugin:
             self.raise_as_run_error(error)
 
     def raise_as_run_error(self, error: Exception) -> NoReturn:
-        """Raise the error that corresponds to an exception of the component."""
+        """Raise the exception itself if the component may raise it, otherwise a RunError that names the component."""
         if isinstance(error, RunError | MemoryError):
             raise error
         if isinstance(error, NavigationFailure) and self.may_fail:
@@ -89,11 +89,11 @@ class CheckedPlugin:
         raise RunError("crashed", message, by_stack=True) from error
 
     def raise_invalid(self, what: str) -> NoReturn:
-        """Raise the RunError of a component that returned an invalid value; `what` follows its name in the message."""
+        """Raise a RunError for an invalid value. Its message is the component's label, followed by `what`."""
         raise RunError(BROKEN_COMPONENT, f"{self.label} {what}", by_stack=True)
 
     def checked_path(self, path: object, what: str) -> Path:
-        """Return the path if it consists of finite poses (n, 3)."""
+        """Return the path if it consists of finite poses (n, 3); otherwise raise RunError."""
         if not isinstance(path, Path):
             self.raise_invalid(f"{what} {type(path).__name__} instead of a Path")
         points = path.points
@@ -104,7 +104,7 @@ class CheckedPlugin:
         return path
 
     def checked_twist(self, command: object) -> Twist:
-        """Return the velocity if it consists of three finite numbers."""
+        """Return the velocity if it consists of three finite numbers; otherwise raise RunError."""
         if not isinstance(command, Twist):
             self.raise_invalid(f"commanded {type(command).__name__} instead of a Twist")
         if not are_numbers(command):
@@ -112,13 +112,13 @@ class CheckedPlugin:
         return command
 
     def checked_pose(self, pose: object, what: str) -> Pose2:
-        """Return the pose if it consists of three finite numbers."""
+        """Return the pose if it consists of three finite numbers; otherwise raise RunError."""
         if not isinstance(pose, Pose2) or not are_numbers(pose):
             self.raise_invalid(f"{what} {pose!r}, which is not a finite pose")
         return pose
 
     def _location(self, error: Exception) -> str:
-        """Return the innermost line of the traceback in the component's package, or the innermost of all."""
+        """Return "file:line" of the innermost traceback entry in the component's package, if any, or else of all."""
         package = self._spec.component.partition(":")[0].partition(".")[0]
         frames = list(traceback.walk_tb(error.__traceback__))
         own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
@@ -140,7 +140,7 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 
 def all_finite(values: Array) -> bool:
-    """Return whether all numbers of an array are finite. A finite sum of squares proves it quickly."""
+    """Return whether all numbers of an array are finite. The sum of squares is tried first, because it is fast."""
     return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
@@ -160,7 +160,10 @@ class CheckedPlanner(CheckedPlugin):
         self._radius = setting.robot.circumscribed_radius
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return the planner's path. Raises RunError when it is invalid or leads through an obstacle."""
+        """Return the planner's path. Raises RunError if it is invalid or leads through a lethal cell.
+
+        Lethal cells within the circumscribed radius of the start are ignored, since the robot already stands there.
+        """
         path = self.checked_path(self.call(self.inner.plan, costmap, start, goal, seed), "returned")
         points = path.points
         if not len(points):
@@ -168,13 +171,13 @@ class CheckedPlanner(CheckedPlugin):
         if np.hypot(points[0, 0] - start.x, points[0, 1] - start.y) > START_TOLERANCE_M:
             self.raise_invalid(f"returned a path from {_at(points[0])} instead of the start {_at(np.array(start))}")
         outside = points[np.hypot(points[:, 0] - start.x, points[:, 1] - start.y) > self._radius]
-        if len(outside) and (is_lethal := lethal(costmap, outside)).any():
+        if len(outside) and (is_lethal := on_lethal_cells(costmap, outside)).any():
             self.raise_invalid(f"returned a path through the lethal cell at {_at(outside[is_lethal.argmax()])}")
         return path
 
 
-def lethal(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, …) are on a lethal cell; points outside the costmap are not."""
+def on_lethal_cells(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the points (n, 2 or 3) are on a lethal cell; points outside the costmap are not."""
     cells = np.floor((points[:, :2] - costmap.origin) / costmap.resolution)[:, ::-1]
     inside: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < costmap.costs.shape), axis=1)
     rows, columns = np.where(inside[:, None], cells, 0).astype(np.int64).T
@@ -240,7 +243,7 @@ class CheckedGoalChecker(CheckedPlugin):
 
 
 class CheckedBehavior(CheckedPlugin):
-    """Calls the behavior and checks its commands. `name` is its type, or the name that the behavior gives itself."""
+    """Calls the behavior and checks its commands. `name` is its `type`, or its own `name` if it has no type."""
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
@@ -294,7 +297,10 @@ class CheckedLocalizer(CheckedPlugin):
 
 
 def checked_belief(plugin: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
-    """Return the belief if it is finite and has the right shape. Parts shared with `before` are not checked again."""
+    """Return the belief if it is finite and has the right shape; otherwise raise RunError of the plugin.
+
+    Parts that are the same objects as in `before`, the last valid belief, are not checked again.
+    """
     if not isinstance(belief, Belief):
         plugin.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")
     plugin.checked_pose(belief.pose, "returned a Belief with the pose")

@@ -1,4 +1,4 @@
-"""Wrapper that checks the decisions of an installed navigation stack."""
+"""Wrapper that checks the decisions of a navigation stack, either the reference stack or one of another package."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class CheckedStack(CheckedPlugin):
         self.call(self.inner.start, estimate, goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Drive to this goal first."""
+        """Replace the current goal by this one."""
         self.call(self.inner.preempt, tick, goal)
 
     def cancel(self, tick: int) -> None:
@@ -95,7 +95,7 @@ class CheckedStack(CheckedPlugin):
         return decision
 
     def _check_costmap(self, costmap: object) -> None:
-        """Check the name, frame and cell type (int8) of a published costmap."""
+        """Raise RunError if the name, the frame, or the cell type (int8) of a published costmap is wrong."""
         if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
             self.raise_invalid(f"published {type(costmap).__name__} instead of a CostGrid")
         if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):

@@ -10,17 +10,17 @@ from simscen.model.controllers import SimpleGoalChecker as GoalSpec
 from simscen.stack.setting import Setting
 
 STANDSTILL_SPEED, STANDSTILL_YAW_RATE = 0.02, 0.1
-"""m/s and rad/s below which the robot stands still."""
+"""The robot counts as stationary below these speeds in m/s and rad/s."""
 STANDSTILL_CHECKS = 10
-"""Consecutive checks in which the robot must stand still: half a second at the default controller rate. The robot also
-stops for a moment between reaching the position and turning to the heading."""
+"""Number of consecutive checks with a stationary robot before `well_inside` no longer applies: half a second at the
+default rate, since the robot also stops briefly between reaching the position and turning to the heading."""
 
 
 class SimpleGoalChecker:
-    """Check whether the goal is reached, like nav2_controller::SimpleGoalChecker.
+    """Decides whether the goal is reached, like nav2_controller::SimpleGoalChecker.
 
-    Checks the position first and then the heading. If `stateful`, a position that was reached stays reached while the
-    robot turns. With `well_inside` below 1, a moving robot must come closer than the tolerance by this factor.
+    With `stateful`, a position that was reached counts as reached until the robot leaves the tolerance. The tolerances
+    of a moving robot are multiplied by `well_inside`, so that a value below 1 lets it drive on into the goal.
     """
 
     def __init__(self, spec: GoalSpec, setting: Setting) -> None:
@@ -46,7 +46,7 @@ class SimpleGoalChecker:
 
 
 class ProgressChecker:
-    """Check whether the robot makes progress, like nav2_controller's SimpleProgressChecker and PoseProgressChecker.
+    """Decides whether the robot is stuck, like nav2_controller's SimpleProgressChecker and PoseProgressChecker.
 
     The robot must move by `required_movement_radius` (m), or turn by `required_movement_angle` (rad) if given, within
     `movement_time_allowance` (s).
@@ -63,10 +63,10 @@ class ProgressChecker:
         """Restart with the next pose."""
         self._baseline = None
 
-    def stuck(self, pose: Pose2, now: float) -> bool:
+    def is_stuck(self, pose: Pose2, now: float) -> bool:
         """Return whether the time allowance has passed without progress.
 
-        `now` in s is a clock that does not advance while the robot is not allowed to move.
+        `now` in s is the time of a clock that stops while the robot must not move.
         """
         baseline = self._baseline
         if (

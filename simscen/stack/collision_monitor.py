@@ -1,6 +1,6 @@
 """Collision monitor: limits the velocity by the latest scans, independent of map and costmap (nav2_collision_monitor).
 
-Predicted moving obstacles are checked at their predicted positions.
+Moving obstacles are checked at their predicted positions, if the stack predicts motion.
 """
 
 import math
@@ -18,21 +18,21 @@ from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import RobotModel
 
 DEFAULT_STEPS = 8
-"""Number of time steps until `time_before_collision` without `simulation_time_step`."""
+"""Number of time steps until `time_before_collision` if `simulation_time_step` is not set."""
 STEP_ROUNDING = 1e-9
-"""Fraction of a time step by which rounding may exceed the horizon, so that it does not add a step."""
+"""Fraction of a time step that is taken for a rounding error, so that it does not add a step."""
 MAX_STEPS = 1000
 """Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_APPROACH_M = 0.005
-"""Braking for a moving obstacle helps only if it would come closer by this much than to a stationary robot."""
+"""The robot brakes for a moving obstacle only if standing still keeps the obstacle farther away by at least this."""
 ROUNDING_M = 1e-6
-"""Tolerance of the quick check of moving obstacles."""
+"""Rounding error allowed in the quick check of moving obstacles that precedes the exact one."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedScan:
-    """The latest scan of a lidar, the odometry pose at its time, and a lower bound of the distance to its hits in m."""
+    """The latest scan of a lidar and the odometry pose at its time. All hits are at least `nearest` m from the base."""
 
     scan: Scan
     odometry: Pose2
@@ -40,7 +40,7 @@ class RecordedScan:
 
 
 class CollisionMonitor:
-    """Stop if a lidar is silent, and slow down before obstacles in the latest scans (APPROACH)."""
+    """Slows the robot down before obstacles (Nav2's "approach" polygon), and detects lidars without usable scans."""
 
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
         """Take the parameters, the robot, the names of its lidars, and the tick rate in Hz."""
@@ -69,7 +69,7 @@ class CollisionMonitor:
         self._start_tick = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
-        """Process a scan that arrived at `tick`, with the odometry pose of its time; ignored without returns."""
+        """Process a scan that arrived at `tick`, taken at pose `odometry`. A scan without returns is not usable."""
         self._arrivals[scan.sensor] = tick, scan.tick
         nearest = _nearest(scan)
         if nearest is None:
@@ -79,17 +79,18 @@ class CollisionMonitor:
         self._scans[scan.sensor] = RecordedScan(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def on_moving(self, moving: MovingObstacles) -> None:
-        """Set the moving obstacles in the base frame. Beams that hit them must be marked in the scans."""
+        """Set the moving obstacles in the base frame. Scans must mark the beams that hit them (ScanWithMovingHits)."""
         self._moving, self._has_moving = moving, len(moving) > 0
 
-    def silent(self, tick: int) -> bool:
+    def is_silent(self, tick: int) -> bool:
         """Return whether any lidar has sent no usable scan for `source_timeout`, or none at all."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence_reason(self, tick: int) -> str:
-        """Return the reason why a lidar counts as silent."""
+        """Return a message: which lidar is silent, and whether its scans are missing, empty, or too late."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
-        limit, elapsed = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
+        limit = f"source_timeout is {self._spec.source_timeout:g} s"
+        elapsed = (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
         arrived, taken = self._arrivals.get(name, (None, 0))
         if arrived is None or (tick - arrived) > self._timeout:
             return f"lidar `{name}` has been silent for {elapsed:.2f} s; {limit}"
@@ -98,12 +99,11 @@ class CollisionMonitor:
         late = (arrived - taken) / self._tick_rate
         return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
 
-    def _since(self, name: str, tick: int) -> float:
-        """Return the time in s since the last usable scan of a lidar."""
-        return (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
-
     def allow(self, command: Twist, odometry: Pose2) -> Twist:
-        """Return the command, scaled so that the first contact is at least `time_before_collision` away."""
+        """Return the command, slowed down in proportion if it leads to a contact within `time_before_collision`.
+
+        `odometry` is the current pose in the odom frame.
+        """
         if not self._spec.enabled or command == STOP:
             return command
         free_time = horizon = self._spec.time_before_collision
@@ -139,7 +139,7 @@ class CollisionMonitor:
     def _may_meet_moving(self, command: Twist, horizon: float) -> bool:
         """Return whether a moving obstacle can come within the stop margin of the footprint within the horizon.
 
-        For straight motion, the closest approach has a closed form; a turning robot deviates at most by `deviation`.
+        A quick check: the closest approach of straight motions has a closed form, and turns are bounded.
         """
         own_velocity = complex(command.vx, command.vy)
         deviation = abs(own_velocity) * abs(command.wz) * horizon * horizon / 2
@@ -156,7 +156,7 @@ class CollisionMonitor:
     def _time_to_moving(self, command: Twist, horizon: float) -> float:
         """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        Obstacles that would come as close to a stationary robot do not count, because braking does not help.
+        Obstacles that would come as close to a stationary robot do not count, because braking would not help.
         """
         times = self._times
         centers = self._moving.at(times)
@@ -172,15 +172,15 @@ class CollisionMonitor:
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _gaps_to(self, centers: Array, twist: Twist) -> Array:
-        """Return distances (times, obstacles) of moving obstacles from the stop margin for a constant `twist`."""
+        """Return distances (times, obstacles) in m from the stop margin to moving obstacles at a constant `twist`."""
         return self._gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 
     def _gaps(self, points: Array, poses: Array) -> Array:
-        """Return distances (poses, n) from the footprint at each pose to points (poses or 1, n, 2); negative inside.
+        """Return distances (m, n) from the footprint at poses (m, 3) to points (m or 1, n, 2); negative inside.
 
-        For a polygon, it is the distance to the farthest of its edge lines, a lower bound of the true distance.
+        For a polygon, the result is a lower bound: the largest signed distance from any of its edge lines.
         """
         dx = points[:, :, 0] - poses[:, None, 0]
         dy = points[:, :, 1] - poses[:, None, 1]

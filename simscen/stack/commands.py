@@ -10,14 +10,11 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import RobotModel
 
 CRAWL_SPEED, CRAWL_YAW_RATE = 0.02, 0.1
-"""m/s and rad/s below which the robot does not count as driving."""
+"""The robot counts as stopped by the monitor below these speeds in m/s and rad/s."""
 
 
 class VelocitySmoother:
-    """Limit velocity and acceleration of commands, like nav2_velocity_smoother in open loop.
-
-    Slowing down uses the full deceleration of the robot.
-    """
+    """Limits velocity and acceleration of commands, like nav2_velocity_smoother in open loop."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
         """Take the limits of the specification, at most those of the robot; `period` between commands in s."""
@@ -32,7 +29,7 @@ class VelocitySmoother:
         self._last = Twist()
 
     def reset(self, twist: Twist) -> None:
-        """Set the current velocity of the base after another component changed the command."""
+        """Set the velocity from which the next command accelerates, because the last one was not sent unchanged."""
         self._last = twist
 
     def smooth(self, command: Twist, periods: int = 1) -> Twist:
@@ -52,7 +49,7 @@ class VelocitySmoother:
         return self._last
 
     def _limited(self, command: Twist) -> Twist:
-        """Return the velocity within the speed limits; a steered base keeps its curvature."""
+        """Return the velocity within the speed limits; a car keeps the curvature of its path."""
         if not self._has_limits or (
             max(abs(command.vx), abs(command.vy)) <= self._max_speed and abs(command.wz) <= self._max_yaw_rate
         ):
@@ -73,12 +70,12 @@ class VelocitySmoother:
 
 
 class CommandPipeline:
-    """Velocity smoother, then collision monitor. Results become available after the latency of their component."""
+    """Passes commands through velocity smoother and collision monitor, and delays them by the components' latencies."""
 
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """Combine the components. `period` of the controller, and `latency` of controller and monitor, in ticks."""
+        """Take the components, the controller's `period`, and the `latency` of (controller, monitor), both in ticks."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._requested, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
         self._immediate: tuple[Twist, int] | None = None
@@ -90,9 +87,9 @@ class CommandPipeline:
         self.sent = STOP
         """The velocity that is sent to the base now."""
 
-    def busy(self, tick: int) -> bool:
+    def is_busy(self, tick: int) -> bool:
         """Return whether the controller is still computing its last command."""
-        return self.has_latency and self._requested.busy(tick)
+        return self.has_latency and self._requested.is_busy(tick)
 
     def periods(self, tick: int) -> int:
         """Return the number of controller periods since the last command or stop, at least 1."""
@@ -126,7 +123,7 @@ class CommandPipeline:
             self.sent = self._allowed.take()
 
     def hold_timed_out(self, tick: int) -> bool:
-        """Return whether the monitor has stopped the robot for `hold_timeout`, and restart that time if so."""
+        """Return whether the monitor has stopped the robot for `hold_timeout`; if so, the time starts again."""
         is_over = tick - self._last_free_tick >= self._monitor.hold_ticks
         if is_over:
             self._last_free_tick = tick

@@ -1,4 +1,4 @@
-"""The plan that the robot follows: in the map frame, and in the odom frame for the controller."""
+"""The plan that the robot follows, its occupied points, and its transformation to the odom frame for the controller."""
 
 import math
 
@@ -14,27 +14,27 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Changes of the costmap this close to the plan are compared with the plan, or closer if the robot is larger."""
+"""Changes of the costmap count if they are this close to the plan, or closer than a larger inscribed radius."""
 WATCH_EVERY_POINTS = 4
 """Every n-th point of the plan is checked for changes nearby."""
 MAX_UNLOCATED_M = 0.5
-"""Distance that the robot may move before its position on the plan is determined even if it is not needed."""
+"""After this much motion, the position on the plan is computed even if nothing needs it, to keep the search short."""
 MISSED_M, END_M = 0.2, 0.03
-"""A car needs a new plan this far from its plan, or this close to its end, because it cannot turn in place."""
+"""A car has missed its plan if it is farther than 0.2 m from it, or has less than 0.03 m of it left."""
 COMPARISON_DISTANCE_M = 1.0
-"""Distance ahead of the robot at which a shift between map and odom frame is measured."""
+"""Distance from the robot at which a shift between map and odom frame is measured."""
 MIN_SHIFT_M = 0.01
-"""Shift of the map frame in the odom frame from which on the controller gets the path again. Corrections of the
-localizer are larger; the continuous drift of odometry between two controller periods is smaller."""
+"""The controller gets the path again if the map frame has shifted by more than this in the odom frame. Corrections of
+the localizer are larger; the continuous drift of odometry between two controller periods is smaller."""
 ROUNDING_M = 1e-9
-"""Shift that rounding alone can cause."""
+"""Largest shift that rounding alone can cause."""
 
 
 class FollowedPlan:
     """A plan in the map frame and the position of the robot on it."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
-        """Follow a path with a robot of this inscribed `radius` in m."""
+        """Take a path, the inscribed `radius` of the robot in m, and the costmap that shows which points are free."""
         self.path, self._radius = path, radius
         self._tracker = PathTracker(path)
         self._pose: Pose2 | None = None
@@ -45,18 +45,18 @@ class FollowedPlan:
         self.compare(costmap)
 
     def compare_if_changed(self, costmap: LayeredCostmap) -> None:
-        """Compare the plan with the costmap if that has changed near the rest of the plan."""
+        """Update the occupied points if the costmap has changed near the points ahead of the robot."""
         ahead = self._complex_points[self._track.index :: WATCH_EVERY_POINTS]
         if costmap.changed_near(self._revision, ahead, self._watch_distance):
             self.compare(costmap.view)
         self._revision = costmap.revision
 
     def compare(self, costmap: CostmapView) -> None:
-        """Compare the plan with a costmap."""
+        """Determine the occupied points: those where the inscribed circle of the robot does not fit on a costmap."""
         self._occupied = distances(costmap, self.path.points[:, :2]) <= np.float32(self._radius)
 
     def locate(self, pose: Pose2) -> None:
-        """Set the pose of the robot. Its position on the plan is determined when it is needed."""
+        """Set the pose of the robot in the map frame. Its position on the plan is computed when needed."""
         self._pose, (x, y, _) = pose, self._located_pose
         if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_UNLOCATED_M:
             self._update_tracker(pose)
@@ -82,8 +82,8 @@ class FollowedPlan:
         """Return every n-th point ahead as x + iy."""
         return self._track.sampled_points(every)
 
-    def missed(self, pose: Pose2) -> bool:
-        """Return whether a car can no longer reach its goal on this plan."""
+    def is_missed(self, pose: Pose2) -> bool:
+        """Return whether a car can no longer reach its goal on this plan, because it cannot turn in place."""
         x, y, _ = self._track.points[self._track.index].tolist()
         return math.hypot(pose.x - x, pose.y - y) > MISSED_M or self.remaining() < END_M
 
@@ -91,10 +91,10 @@ class FollowedPlan:
         """Return the length of the plan ahead in m."""
         return self._track.remaining()
 
-    def blocked(self) -> bool:
-        """Return whether the robot does not fit at a point ahead.
+    def is_blocked(self) -> bool:
+        """Return whether any point ahead is occupied.
 
-        Occupied points at the start are ignored, so that a robot in collision can leave.
+        Occupied points next to the robot are ignored if free ones follow, so that a robot in collision can leave.
         """
         occupied = self._occupied[self._track.index :: 2]
         if not occupied.any():
@@ -104,11 +104,10 @@ class FollowedPlan:
 
 
 class LocalPath:
-    """Pass the plan to the controller in the odom frame.
+    """Passes the plan to the controller in the odom frame.
 
-    Nav2's controllers transform the plan in each cycle. Here, the controller gets the plan once, and the rest of it
-    again whenever the transform between map and odom frame has changed, so that it can reuse what it has computed for
-    the path.
+    Nav2's controllers transform the plan in each cycle. Here, the controller gets the plan once, and the part ahead
+    again when the transform between map and odom frame has changed. Until then, it can reuse what it has computed.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -121,12 +120,12 @@ class LocalPath:
 
     def update(self, plan: FollowedPlan, goal: Goal, frames: Frames) -> Goal:
         """Update the controller's path for the current plan and frames. Return the goal in the odom frame."""
-        is_unchanged = frames.moved(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
+        is_unchanged = frames.shift_since(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
         if not is_unchanged:
             self._odom_from_map = frames.odom_from_map
         if plan is not self._plan:
             self._send(plan, plan.path.points)
-        elif not is_unchanged and frames.moved(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
+        elif not is_unchanged and frames.shift_since(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
             plan.locate(frames.pose)
             self._send(plan, plan.ahead)
         local = self._local_goal

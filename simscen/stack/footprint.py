@@ -1,4 +1,4 @@
-"""Collision checks of the robot's footprint on a costmap, shared by planners and controllers."""
+"""Collision checks of the robot's footprint with costmap cells and moving obstacles, for planners and controllers."""
 
 import math
 
@@ -26,7 +26,7 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
 
 
 def distance_at(costmap: CostmapView, x: float, y: float) -> float:
-    """Return the distance of `distances` for one point, in a tenth of the time."""
+    """Return the same as `distances` for one point, in a tenth of the time."""
     left, low = costmap.origin
     distance, resolution = costmap.distance, costmap.resolution
     row, column = math.floor((y - low) / resolution), math.floor((x - left) / resolution)
@@ -47,13 +47,15 @@ def lethal_near(costmap: CostmapView, x: float, y: float, meters: float) -> Arra
 class Footprint:
     """Collision checker for many poses at once.
 
-    A round robot is in collision if the center of a lethal cell is within its radius. Another robot is in collision if
-    one is within the inscribed radius or inside the footprint polygon. Attributes in m: `inscribed` and `circumscribed`
-    radius, and `reach`, the largest distance that a point of the footprint moves per radian of rotation (0 if round).
+    A round robot is in collision if the center of a lethal cell is within its radius. Any other robot is in collision
+    if the center of a lethal cell is within its inscribed radius or inside its footprint polygon.
+
+    Attributes in m: `inscribed` and `circumscribed` radius; `reach`, the largest distance that a point of the footprint
+    moves per radian of rotation (0 if round). `discs` cover the footprint, for faster checks.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
-        """Prepare checks of this robot on costmaps with this cell size in m."""
+        """Prepare the checks of a robot on costmaps whose `resolution` is the cell size in m."""
         self.inscribed = robot.inscribed_radius
         self._is_round = robot.radius is not None
         self.reach = 0.0 if self._is_round else robot.circumscribed_radius
@@ -65,7 +67,7 @@ class Footprint:
         self._corners, self.discs = corners, CoveringDiscs(robot)
 
     def gaps(self, points: Array, poses: Array) -> Array:
-        """Return distances (n, k) from the footprint's edge at poses (n, 3) to points (k, 2); negative inside."""
+        """Return distances (n, k) in m from the footprint's edge at poses (n, 3) to points (k, 2); negative inside."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x, y = points[None, :, 0] - poses[:, 0, None], points[None, :, 1] - poses[:, 1, None]
         if self._is_round:
@@ -88,13 +90,13 @@ class Footprint:
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
         """Return the approximate distance (n,) in m from the footprint's edge to the nearest lethal cell.
 
-        In collision, it is the negative depth of the deepest lethal cell inside the footprint, so that it shows whether
-        a motion leads out of a collision or further into it.
+        In collision, it is minus the depth of the deepest lethal cell inside the footprint. Its change then shows
+        whether a motion leads out of the collision or further into it.
         """
         center = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
         if self._is_round:
             return np.asarray(center)
-        near = distances(costmap, self._placed(poses))
+        near = distances(costmap, self._points_at(poses))
         edge = near.min(axis=1).astype(np.float64)
         touching = np.flatnonzero(edge <= 0.0)
         if len(touching):
@@ -102,19 +104,19 @@ class Footprint:
         return np.asarray(np.minimum(edge, center))
 
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
-        """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles, negative in collision.
+        """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles; negative in collision.
 
         The obstacles are at their positions predicted for `times` (s, broadcast with the poses), inflated by `sigmas`
-        standard deviations. For a footprint that is not round, the result is a lower bound, a few centimeters too
-        small.
+        standard deviations of these. If the footprint is not round, the result is a few centimeters too small.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
 
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
-        return np.asarray((distances(costmap, self._placed(poses)) > 0).all(axis=1))
+        return np.asarray((distances(costmap, self._points_at(poses)) > 0).all(axis=1))
 
-    def _placed(self, poses: Array) -> Array:
+    def _points_at(self, poses: Array) -> Array:
+        """Return the check points (n, k, 2) of the footprint at poses (n, 3)."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x = poses[:, 0, None] + cosine * self._hull[:, 0] - sine * self._hull[:, 1]
         y = poses[:, 1, None] + sine * self._hull[:, 0] + cosine * self._hull[:, 1]
@@ -122,11 +124,11 @@ class Footprint:
 
 
 class CoveringDiscs:
-    """Row of equal discs along the x axis of the base that covers the footprint: `offsets` (k,) and `radius` in m.
+    """Row of equal discs along the x axis of the base that covers the footprint.
 
-    `reach` is the largest distance of their edges from the base; `centered` is True for a single disc at the base.
-    Checks with discs need a few lookups per pose and err on the safe side by a centimeter or two. Controllers use them
-    to compare thousands of trajectories.
+    `offsets` (k,) are the x of their centers and `radius` is their radius, in m. `reach` is the largest distance of
+    their edges from the base; `centered` is True for a single disc at the base. A check needs only k lookups per pose
+    and errs on the safe side by a centimeter or two. Controllers compare thousands of trajectories with it.
     """
 
     def __init__(self, robot: RobotModel) -> None:
@@ -158,7 +160,7 @@ class CoveringDiscs:
 
     def gap(self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Return distances (…,) in m from the discs at poses (…,) to moving obstacles; see MovingObstacles.gap."""
-        least, *others = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
+        least, *others = [moving.gap(*at, times, sigmas) for at in self._centers_at(x, y, yaw)]
         for other in others:
             np.minimum(least, other, out=least)
         least -= self.radius
@@ -167,16 +169,16 @@ class CoveringDiscs:
     def nearness(
         self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, margin: float
     ) -> tuple[Reals, Mask]:
-        """Return the nearness (…,) of the discs to moving obstacles and whether they touch; see MovingObstacles."""
-        positions = self._placed(x, y, yaw)
+        """Return nearness (…,) and contact (…,) of discs and moving obstacles; see MovingObstacles.nearness."""
+        positions = self._centers_at(x, y, yaw)
         (nearest, touched), *others = [moving.nearness(*at, times, self.radius, margin) for at in positions]
         for near, touch in others:
             np.maximum(nearest, near, out=nearest)
             touched |= touch
         return nearest, touched
 
-    def _placed(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
-        """Return the x and y of each disc's center."""
+    def _centers_at(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
+        """Return x (…,) and y (…,) of each disc's center at poses (…,)."""
         if self.centered:
             return [(x, y)]
         cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -184,7 +186,7 @@ class CoveringDiscs:
 
 
 def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
-    """Return points inside the footprint, dense enough to hit each cell, outside the inscribed circle."""
+    """Return points (n, 2) inside the footprint but outside its inscribed circle, at least one for each cell."""
     spacing = resolution / math.sqrt(2.0)
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
@@ -204,7 +206,7 @@ def _inside(corners: Array, points: Array) -> Mask:
 
 
 def _depths(corners: Array, points: Array) -> Array:
-    """Return distances (n,) from points (n, 2) to the nearest edge."""
+    """Return distances (n,) from points (n, 2) to the nearest edge of the polygon."""
     depths: Array = np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = np.clip((points - a) @ (b - a) / float((b - a) @ (b - a)), 0.0, 1.0)
@@ -213,7 +215,7 @@ def _depths(corners: Array, points: Array) -> Array:
 
 
 def _edge_points(corners: Array, resolution: float) -> Array:
-    """Return points along the footprint's edge, at most one cell apart."""
+    """Return points (n, 2) along the footprint's edge, at most one cell apart."""
     points = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         count = max(1, math.ceil(float(np.hypot(*(b - a))) / resolution))

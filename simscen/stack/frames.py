@@ -1,4 +1,4 @@
-"""Pose of the robot in the map frame and in the odom frame, and the transform between them (REP 105)."""
+"""Poses of the robot in the map and odom frames, the transform between these (REP 105), and the odometry history."""
 
 import math
 from bisect import bisect_left
@@ -29,11 +29,10 @@ class Frames(NamedTuple):
         """The inverse transform."""
         return self.odometry.compose(self.pose.inverse())
 
-    def moved(self, odom_from_map: Pose2, reach: float) -> float:
-        """Return the maximum distance in m that points of the map near the robot have moved in the odom frame.
+    def shift_since(self, odom_from_map: Pose2, reach: float) -> float:
+        """Return how far in m points of the map have shifted in the odom frame since an earlier `odom_from_map`.
 
-        This is an upper bound for points within `reach` m of the robot. `odom_from_map` is the earlier transform to
-        compare with.
+        The result is an upper bound for all points within `reach` m of the robot.
         """
         (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (odom_x, odom_y, odom_yaw) = (
             odom_from_map,
@@ -59,24 +58,24 @@ def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
 
 
 HISTORY_S = 10
-"""Time for which readings are available: the default of tf2's buffer."""
+"""Time for which past poses can be looked up: the default of tf2's buffer."""
 TRAIL_S = 60
-"""Time for which poses are stored as the trail of the robot, longer than a stuck robot waits between two recoveries."""
+"""Time covered by the trail of the robot: longer than a stuck robot waits between two recoveries."""
 # Larger values, as from a broken encoder, are rejected: their squares could overflow.
 _MAX_VALUE = 1e6
 
 
 def is_plausible(values: tuple[float, float, float]) -> bool:
-    """Return whether these values are a plausible pose or velocity: finite and not absurdly large."""
+    """Return whether a pose or velocity is finite and below 1e6 in all components."""
     x, y, yaw = values
     return -_MAX_VALUE < x < _MAX_VALUE and -_MAX_VALUE < y < _MAX_VALUE and -_MAX_VALUE < yaw < _MAX_VALUE
 
 
 class OdometryHistory:
-    """The odometry poses of the last HISTORY_S seconds by tick. Older ones are removed about once per second."""
+    """Odometry poses of the last HISTORY_S seconds by tick, and the longer trail of the robot."""
 
     def __init__(self, tick_rate: int, trail: float = HISTORY_S) -> None:
-        """Create an empty history. `trail` in s: time for which poses are stored for `trail()`."""
+        """Create an empty history with a tick rate in Hz. `trail` is the time in s that `trail()` covers."""
         self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail * tick_rate, (trail + 1) * tick_rate
         self.clear()
 
@@ -95,9 +94,7 @@ class OdometryHistory:
 
     def add(self, tick: int, pose: Pose2) -> bool:
         """Add a pose. Return False if it is rejected: not plausible, or not newer than the latest."""
-        x, y, yaw = pose
-        plausible = -_MAX_VALUE < x < _MAX_VALUE and -_MAX_VALUE < y < _MAX_VALUE and -_MAX_VALUE < yaw < _MAX_VALUE
-        if tick <= self._newest or not plausible:
+        if tick <= self._newest or not is_plausible(pose):
             return False
         self._newest, self.now = tick, pose
         self._readings.append((tick, pose))
@@ -130,7 +127,7 @@ class OdometryHistory:
         return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
 
     def at(self, tick: int) -> Pose2 | None:
-        """Return the pose at `tick`, interpolated linearly; None outside the available time."""
+        """Return the pose at `tick`, interpolated linearly; None before the oldest or after the latest pose."""
         if tick == self._newest:
             return self.now
         first = self._first()
@@ -148,6 +145,6 @@ class OdometryHistory:
         return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
     def past_pose(self, latest: Pose2, tick: int) -> Pose2:
-        """Return the pose at `tick`, without interpolation, in the frame of `latest`, the latest pose of the robot."""
+        """Return the pose at `tick`, not interpolated, in the frame in which `latest` is the robot's latest pose."""
         past = self.latest_until(tick)
         return latest if past is self.now else latest.compose(self.now.between(past))

@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 MIN_YAW_RATE = 1e-6
-"""rad/s below which an arc is a straight line."""
+"""Yaw rate in rad/s below which an arc is taken for a straight line."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
 """Times of the poses in a logged local plan. At 0.5 m/s and 1 rad/s, the chords are at most 4 mm off the arc."""
 
@@ -37,7 +37,7 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
 
 
 def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
-    """Return the same poses (n, 3), computed with scalars: faster than with arrays for about a dozen times."""
+    """Return the same poses (n, 3) as `poses_along`, but faster if there are only about a dozen times."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
     start, velocity = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
     poses: list[tuple[float, float, float]] = []
@@ -49,20 +49,27 @@ def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
     return np.array(poses)
 
 
+def mean_velocity(step: Pose2, seconds: float) -> Twist:
+    """Return the constant velocity that moves a base along an arc by `step` in the base frame within `seconds`."""
+    x, y, turn = step
+    c, s = math.cos(turn / 2), math.sin(turn / 2)  # the chord of the arc is at half the turn
+    return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)
+
+
 def forward_steps(poses: Array) -> npt.NDArray[np.bool_]:
-    """Return for each step (n - 1,) between poses (n, 3) whether it points forward in the robot's heading."""
+    """Return for each step (n - 1,) between poses (n, 3) whether the robot drives forward."""
     steps = np.diff(poses[:, :2], axis=0)
     forward: npt.NDArray[np.bool_] = steps[:, 0] * np.cos(poses[:-1, 2]) + steps[:, 1] * np.sin(poses[:-1, 2]) >= -1e-9
     return forward
 
 
 def direction_changes(forward: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Return the indices of the poses between a forward and a backward step."""
+    """Return the indices of the poses between a forward and a backward step; `forward` is from `forward_steps`."""
     return np.flatnonzero(forward[1:] != forward[:-1]) + 1
 
 
 def cusps(poses: Array) -> npt.NDArray[np.int64]:
-    """Return the indices of the cusps among the poses (n, 3)."""
+    """Return the indices of the cusps of a path (n, 3): poses at which the driving direction changes."""
     return direction_changes(forward_steps(poses))
 
 
@@ -75,7 +82,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 @dataclass(frozen=True)
 class VelocityLimits:
-    """Limits of vx and vy in m/s and of the turn rate in rad/s, and their acceleration and (negative) deceleration.
+    """Lowest and highest velocity, acceleration, and (negative) deceleration of vx, vy (m, s) and turn rate (rad, s).
 
     `turning_radius` is the minimum turning radius in m; 0 for a base that turns in place.
     """
@@ -87,7 +94,7 @@ class VelocityLimits:
     turning_radius: float
 
     def scaled(self: Limits, ratio: float) -> Limits:
-        """Return the limits with all velocities scaled by a speed limit; the same object if `ratio` is at least 1."""
+        """Return limits with velocities multiplied by `ratio`; the same object if that is at least 1."""
         if ratio >= 1.0:
             return self
         (a, b, c), (d, e, f) = self.low, self.high
@@ -102,7 +109,7 @@ def velocity_limits(
     deceleration: OptionalAxes,
     turning_radius: float | None = None,
 ) -> VelocityLimits:
-    """Return the requested limits, bounded by those of the robot; None means the limit of the robot."""
+    """Return the requested limits, each bounded by that of the robot; for None, the limit of the robot."""
     linear, lateral, angular = robot.max_linear, robot.max_lateral, robot.max_angular
     increase, decrease = robot.linear_acceleration, -robot.linear_deceleration
     angular_change = robot.angular_acceleration
@@ -123,7 +130,7 @@ def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, li
 
 
 def accumulate_rows(rows: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """Replace the rows (m, n) by their cumulative sums, in place, several times as fast as np.cumsum."""
+    """Replace the rows (m, n) by their cumulative sums, in place, and return them. Faster than np.cumsum."""
     for previous, row in pairwise(rows):
         np.add(previous, row, out=row)
     return rows

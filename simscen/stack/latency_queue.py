@@ -8,9 +8,9 @@ T = TypeVar("T")
 
 
 class LatencyQueue(Generic[T]):
-    """Results that become available `latency` ticks after their computation started, in the same order.
+    """First-in, first-out queue of results, each available `latency` ticks after its computation started.
 
-    `due` is the tick at which the oldest result is available: `while tick >= queue.due: queue.take()`.
+    `due` is the tick at which the oldest result becomes available: `while tick >= queue.due: queue.take()`.
     """
 
     def __init__(self, latency: int) -> None:
@@ -31,8 +31,8 @@ class LatencyQueue(Generic[T]):
         self.due = self._waiting[0][0] if self._waiting else math.inf
         return oldest
 
-    def busy(self, tick: int) -> bool:
-        """Return whether a computation continues beyond this tick."""
+    def is_busy(self, tick: int) -> bool:
+        """Return whether any computation still runs at this tick."""
         return bool(self._waiting) and self._waiting[-1][0] > tick
 
     def clear(self) -> None:

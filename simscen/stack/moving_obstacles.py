@@ -1,4 +1,4 @@
-"""Snapshot of moving obstacles: position, velocity, and their uncertainty, with predictions from it."""
+"""Moving obstacles at one time: position and velocity with their uncertainty, and predictions from these."""
 
 import cmath
 import math
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 
 MAX_UNCERTAINTY_M = 0.8
-"""Largest inflation of an obstacle for its uncertainty, or for a margin and its uncertainty."""
+"""Largest inflation of an obstacle: by its uncertainty in `gap`, by margin plus uncertainty in `nearness`."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
 """Limits of the time steps of `is_surely_clear`.
 
@@ -27,8 +27,7 @@ Reals = npt.NDArray[np.floating]
 class MovingObstacle(NamedTuple):
     """A moving upright cylinder: center (m) and velocity (m/s) as x + iy, and radius in m.
 
-    The uncertainty is isotropic: variance of the position, covariance of position and velocity, variance of the
-    velocity.
+    The uncertainty is the same along all axes. `covariance` is that of position and velocity.
     """
 
     position: complex
@@ -48,7 +47,7 @@ class MovingObstacle(NamedTuple):
         return math.sqrt(variance + seconds * (2.0 * covariance + velocity_variance * seconds) + drift * drift)
 
     def min_distance(self, start: complex, speed: float, seconds: float) -> float:
-        """Return the smallest distance in m, within `seconds`, to a point that leaves `start` at `speed`.
+        """Return the smallest distance in m, within `seconds`, to a point that moves from `start` at `speed`.
 
         The point moves in the worst direction. The distance is negative if the point can get into the obstacle.
         """
@@ -65,9 +64,9 @@ class MovingObstacle(NamedTuple):
 
 
 class MovingObstacles:
-    """Moving obstacles in one frame at the time of the snapshot. All times are in s after it.
+    """Moving obstacles in one frame at one time. All other times are in s after it.
 
-    `acceleration` is the standard deviation of their acceleration in m/s², with which the uncertainty of predictions
+    `acceleration` is the standard deviation of their acceleration in m/s², by which the uncertainty of predictions
     grows.
     """
 
@@ -90,7 +89,7 @@ class MovingObstacles:
 
     @classmethod
     def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """Create a set of these obstacles."""
+        """Return a set of these obstacles."""
         moving = object.__new__(cls)
         moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
         return moving
@@ -129,8 +128,8 @@ class MovingObstacles:
     def gap(self, x: Reals, y: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Return distances (…,) in m from points (…,) to the surface of the nearest obstacle at `times`.
 
-        `times` broadcast with the points. Obstacles are inflated by `sigmas` standard deviations, at most by
-        MAX_UNCERTAINTY_M. Without obstacles, the distance is inf.
+        `times` broadcast with the points. Obstacles are inflated by `sigmas` standard deviations of their position, at
+        most by MAX_UNCERTAINTY_M. Without obstacles, the distance is inf.
         """
         nearest = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
         for obstacle, gap in self._gaps(x, y, times):
@@ -141,8 +140,8 @@ class MovingObstacles:
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, margin: float) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
 
-        The nearness is 1 at contact. It is 0 at the distance `margin` (m) plus one standard deviation of the position,
-        or at MAX_UNCERTAINTY_M if that is less. Farther away it is negative.
+        The nearness falls linearly with the distance: 1 at contact, 0 at `margin` (m) plus one standard deviation of
+        the position (at most MAX_UNCERTAINTY_M), and negative beyond.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
@@ -156,9 +155,9 @@ class MovingObstacles:
     def is_surely_clear(
         self, position: Callable[[float], complex], speed: float, radius: float, margin: float, seconds: float
     ) -> bool:
-        """Return True if the nearness of a moving disc stays at 0 or less for `seconds`; False if that is not certain.
+        """Return True if the nearness of a moving disc certainly stays at 0 or less for `seconds`. A quick check.
 
-        This check is quick. The disc is at `position(t)` and not faster than `speed`.
+        The disc is at `position(t)` (x + iy in m) after t s and is not faster than `speed` in m/s.
         """
         for obstacle in self.obstacles:
             closing_speed, time = max(speed + abs(obstacle.velocity), 1e-3), 0.0
@@ -181,7 +180,7 @@ class MovingObstacles:
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + velocity_variance * times**2 + drift))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
-        """Yield each obstacle with the distances (…,) in m to its surface."""
+        """Yield each obstacle with the distances (…,) in m from points (…,) to its surface."""
         for obstacle in self.obstacles:
             position, velocity, radius, *_ = obstacle
             dx, dy = x - (position.real + velocity.real * times), y - (position.imag + velocity.imag * times)
@@ -193,16 +192,16 @@ class MovingObstacles:
             yield obstacle, dx
 
     def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
-        """Return the obstacles that can get closer than `reach` m to a robot that leaves (x, y) at `speed`.
+        """Return the obstacles that can get closer than `reach` m to a robot within the next `seconds`.
 
-        Only the next `seconds` count.
+        The robot moves from (x, y) at `speed` in any direction.
         """
         start = complex(x, y)
         close = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
         return self if len(close) == len(self.obstacles) else MovingObstacles.of(close, self.acceleration)
 
     def in_frame(self, frame: Pose2) -> "MovingObstacles":
-        """Return the obstacles expressed in another frame, whose pose in this frame is `frame`."""
+        """Return the obstacles expressed in another frame; `frame` is its pose in the current one."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
         return MovingObstacles.of(
             [

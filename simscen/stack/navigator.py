@@ -1,11 +1,10 @@
-"""Navigation to one goal: replanning and recovery of Nav2's default behavior trees as a state machine.
+"""Navigation to one goal: the replanning and recovery logic of Nav2's default behavior trees, as a state machine.
 
-Without errors, one step is: check the goal, check the plan, call the controller. When planning fails, the global
-costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
-of Nav2's tree). If planning or control fails again after this, the next recovery behavior of the round robin runs.
-Planning has one retry until a plan is found; control has one retry until the next recovery behavior. After
-`number_of_retries` behaviors, the goal fails with the code of the last failure. A goal outside the map or inside a
-mapped wall fails after the first retry, because no recovery can help.
+Without failures, one step checks the goal, checks the plan, and calls the controller. When planning fails, the global
+costmap is cleared and planning is retried; when control fails, the local costmap is cleared (the contextual recoveries
+of Nav2's tree). If the retry fails too, the next recovery behavior runs, after which both may be retried again.
+Planning may also be retried again once a plan has been found. After `number_of_retries` behaviors, the goal fails with
+the code of the last failure. A goal inside a mapped wall fails after the first retry, because no recovery can help.
 """
 
 from typing import NamedTuple, Protocol
@@ -23,22 +22,22 @@ from simscen.stack.protocols import Behavior, Controller, GoalChecker, Navigatio
 
 
 class ClearingPolicy(Protocol):
-    """Decision how much of the global costmap to clear when planning has failed."""
+    """Decides how much of the global costmap is cleared when planning has failed."""
 
     def reset(self) -> None:
         """Prepare for a new goal."""
         ...
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear the entire global costmap at the time `now` in s, or only the area around the robot.
+        """Return True to clear the entire global costmap, False to clear only the area around the robot.
 
-        `goal_distance` is the straight distance to the goal in m.
+        `now` is the navigator's time in s, `goal_distance` the straight distance to the goal in m.
         """
         ...
 
 
 class ClearEntirely:
-    """Clear the entire costmap each time, as Nav2's default tree does."""
+    """Clears the entire costmap each time, as Nav2's default tree does."""
 
     def reset(self) -> None:
         """Prepare for a new goal."""
@@ -49,7 +48,7 @@ class ClearEntirely:
 
 
 class Step(NamedTuple):
-    """Result of a step: the requested velocity, whether the goal is reached or has failed, and the events."""
+    """Result of a step of the navigator. `failure` is not None if the goal has failed."""
 
     command: Twist = STOP
     reached: bool = False
@@ -75,7 +74,7 @@ class Navigator:
         failure_tolerance: float,
         clearing: ClearingPolicy,
     ) -> None:
-        """Combine the components. `period` between two steps and `failure_tolerance` in s; -1 tolerates forever."""
+        """Take the components, the `period` of the steps in s, and Nav2's `failure_tolerance` in s (-1: forever)."""
         self.plans = plans
         """The manager of the plan that is being followed."""
         self._controller, self._recovery = controller, recovery
@@ -96,7 +95,7 @@ class Navigator:
         self._failing_since: float | None = None
 
     def pursue(self, goal: Goal) -> None:
-        """Set the goal for the following steps."""
+        """Drive to this goal in the following steps, with all retries restored."""
         self.goal = goal
         self._reset()
         self._recovery.reset()
@@ -105,14 +104,14 @@ class Navigator:
         self._progress.reset()
 
     def stop(self) -> None:
-        """Remove the goal."""
+        """Remove the goal, so that `step` requests a stop."""
         self.goal, self.via = None, ()
         self._reset()
 
     def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> Step:
-        """Run one step, `periods` controller periods after the previous one.
+        """Run one step, `periods` controller periods after the previous one; `twist` is the measured velocity.
 
-        `is_held` means that the collision monitor has kept the robot stopped for its `hold_timeout`; this counts as a
+        `is_held` means that the collision monitor has kept the robot stopped for its `hold_timeout`. This counts as a
         control failure.
         """
         goal = self.goal
@@ -134,7 +133,7 @@ class Navigator:
         return Step(command, events=events)
 
     def _follow(self, goal: Goal, frames: Frames, twist: Twist, is_held: bool) -> Twist:
-        """Return the controller's command on the current plan; a stop while the first plan is being computed."""
+        """Return the controller's command on the current plan, or a stop if there is no plan yet."""
         plan = self.plans.plan
         if plan is None:
             return STOP
@@ -144,17 +143,17 @@ class Navigator:
         command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local)
         if is_held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
-        if self._progress.stuck(frames.pose, self._clock):
+        if self._progress.is_stuck(frames.pose, self._clock):
             self._progress.reset()
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return command
 
     def _handle_failure(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
-        """Handle a failure: tolerate it for a while, then clear a costmap and retry, then recover, then give up."""
+        """Tolerate a control failure for a while; then clear a costmap and retry; then run a recovery; then give up."""
         planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
             events = (Event(tick, EventKind.PLAN_FAILED, "", _failure_data(failure)),)
-            if not self._recovery.helps(failure):
+            if not self._recovery.can_help(failure):
                 return Step(failure=failure, events=events)
             retry, self._planning_retried = not self._planning_retried, True
         else:
@@ -192,19 +191,19 @@ class Navigator:
         return tolerance < 0.0 or self._clock - self._failing_since < tolerance
 
     def _patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
-        """Return the failure that nav2_controller reports when a controller has failed for too long."""
+        """Return what nav2_controller reports when NO_VALID_CONTROL has lasted too long, or else the failure itself."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
     def _is_unreachable(self, goal: Goal, failure: NavigationFailure) -> bool:
-        """Return whether a goal lies inside a mapped obstacle, so that no recovery helps."""
+        """Return whether the failure means that a goal lies inside a mapped obstacle, so that no recovery helps."""
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
             self._costmaps.global_costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
-        """Run the current recovery behavior."""
+        """Run one step of the current recovery behavior."""
         result: dict[str, Value] = {"outcome": "succeeded"}
         try:
             costmap = self._costmaps.local_costmap.view

@@ -1,4 +1,4 @@
-"""Planning half of Nav2's default behavior trees: request a plan, monitor it while it is followed, and replace it."""
+"""Planning part of Nav2's default behavior trees: request a plan, monitor it while the robot follows it, replace it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,20 +14,21 @@ from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 MISSED_AFTER_S = 1.0
-"""A car follows a plan for this time before it may find that it has missed it."""
+"""Minimum time for which a car follows a plan before this can count as missed."""
 CHECK_EVERY_STEPS = 2
-"""Steps between two checks of the plan: 10 Hz at the default controller rate."""
+"""Number of steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
-"""Replanning rates of Nav2's default trees."""
+"""Replanning rates of Nav2's default trees, without and with intermediate goals."""
 PLAN_END_M = 0.1
-"""An intermediate goal that is not reached this close to the end of the plan has been missed."""
+"""If less of the plan than this is left and an intermediate goal is not reached, the robot has missed that goal."""
 
 
 @dataclass(frozen=True)
 class PlanResult:
-    """A computed path. `is_partial`: it leads only to the edge of a rolling costmap, whose corner was at `origin`.
+    """A computed path.
 
-    `avoids_moving`: it was planned on costs that include predicted obstacles.
+    `is_partial`: the path leads only to the edge of a rolling costmap. `origin`: corner of the costmap when the path
+    was planned. `avoids_moving`: the costs included the predicted positions of moving obstacles.
     """
 
     path: Path
@@ -38,7 +39,7 @@ class PlanResult:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request to the planner that is answered at the tick `due`; if `is_optional`, a failure has no consequence."""
+    """A request to the planner, answered at tick `due`. If `is_optional`, a failure has no consequence."""
 
     due: int
     reason: str
@@ -47,7 +48,7 @@ class _Request:
 
 
 class PlanManager:
-    """Maintains the plan in the map frame for one goal after another. Times `now` are those of the navigator's clock.
+    """Maintains the plan to the current goal in the map frame. The parameter `now` is the navigator's time in s.
 
     Replans as Nav2's trees do: at a fixed rate, or only if the plan has become invalid. Subclasses may add reasons.
     """
@@ -64,8 +65,8 @@ class PlanManager:
     ) -> None:
         """Take the planner and its costmap.
 
-        `plan_seed` returns the seed of the n-th plan, `radius` is the inscribed radius of the robot in m, `steered`
-        means that it cannot turn in place, and `latency` is the time that planning takes, in ticks.
+        `plan_seed` returns the seed of the n-th plan; `radius` is the inscribed radius of the robot in m; `steered`
+        means that the robot is a car, which cannot turn in place; `latency` is the planning time in ticks.
         """
         self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._steered, self._latency = plan_seed, radius, steered, latency
@@ -87,13 +88,13 @@ class PlanManager:
         self._reason = reason
 
     def report_control_failure(self) -> None:
-        """Handle that the controller could not follow the plan. Has no effect here."""
+        """React to a control failure. Does nothing here; for subclasses."""
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
-        """Request, receive, or replace the plan, and return an event if a new plan is followed.
+        """Request, receive, or replace the plan. Return an event if the robot follows a new plan from now on.
 
-        One plan leads through all poses of `via` (Nav2's ComputePathThroughPoses). `plan` is None while the first plan
-        is being computed. Raises NavigationFailure when planning fails.
+        The plan leads through the goals `via` to `goal` (Nav2's ComputePathThroughPoses). `plan` stays None while the
+        first plan is being computed. Raises NavigationFailure when planning fails.
         """
         self._via = via
         if self.plan is None and self._request is None:
@@ -111,12 +112,12 @@ class PlanManager:
         return events if self._request is None else self._receive(tick, now)
 
     @property
-    def waiting(self) -> int:
-        """The latency of the planner in ticks while there is no plan to follow, otherwise 0."""
+    def wait_ticks(self) -> int:
+        """Latency of the planner in ticks while the robot waits for its first plan, otherwise 0."""
         return self._latency if self.plan is None and self._request is not None else 0
 
     def _send_request(self, tick: int, goal: Goal, pose: Pose2, reason: str, is_optional: bool = False) -> None:
-        """Plan from the current pose; the answer becomes available after the planner's latency."""
+        """Plan from the current pose. The answer becomes available after the planner's latency."""
         due = tick + self._latency
         try:
             answer: PlanResult | NavigationFailure = self._compute(due, goal, pose)
@@ -125,7 +126,7 @@ class PlanManager:
         self._request = _Request(due, reason, is_optional, answer)
 
     def _receive(self, tick: int, now: float) -> tuple[Event, ...]:
-        """Follow the requested plan once it is available. Raises the failure of a mandatory request."""
+        """Follow the requested plan once it is available. Raises the failure of a request that is not optional."""
         request = self._request
         if request is None or tick < request.due:
             return ()
@@ -141,14 +142,14 @@ class PlanManager:
 
     def _mandatory_reason(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
         """Return why the plan must be replaced; "" if it can still be followed."""
-        if self._steered and now - self._adopted_at >= MISSED_AFTER_S and plan.missed(pose):
+        if self._steered and now - self._adopted_at >= MISSED_AFTER_S and plan.is_missed(pose):
             return "missed"
         if self._via and not self._is_partial and plan.remaining() < PLAN_END_M:
             return "missed"
         return self._scheduled_reason(now, plan)
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
-        """Return why a new plan is due by the clock: "rate", or with `replanning: on_invalid` "blocked" or "window"."""
+        """Return why periodic replanning is due: "rate", or for `on_invalid` "blocked" or "window"; "" if it is not."""
         rate = self._spec.replanning_rate or (THROUGH_POSES_RATE_HZ if self._via else TO_POSE_RATE_HZ)
         if now - self._scheduled_at < 1.0 / rate:
             return ""
@@ -161,19 +162,19 @@ class PlanManager:
         return "" if may_keep and not self._is_blocked(plan) else "rate"
 
     def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
-        """Return why there may be a better plan; "" if there is no reason."""
+        """Return why a better plan may exist; "" if there is no reason. Always "" here; for subclasses."""
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
         plan.compare_if_changed(self._costmap)
-        return plan.blocked()
+        return plan.is_blocked()
 
     def _accepts(self, reason: str, result: PlanResult) -> bool:
-        """Return whether to follow a new plan."""
+        """Return whether to follow a new plan. Always True here; for subclasses."""
         return True
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> PlanResult:
-        """Compute one path through all intermediate goals; each leg ends with the heading to the next one."""
+        """Compute one path through all intermediate goals to the goal."""
         legs, start, is_partial = list[Array](), pose, False
         view = self._planning_view(pose)
         for target in (*self._via, goal):
@@ -192,7 +193,7 @@ class PlanManager:
     def _compute_leg(self, view: CostmapView, goal: Goal, start: Pose2) -> tuple[Array, bool]:
         """Return the points (n, 3) to a goal, and whether they lead only to the edge of the costmap."""
         self._plan_count += 1
-        aim = self._costmap.aim(start, goal.pose)
+        aim = self._costmap.goal_in_window(start, goal.pose)
         is_partial = aim is not goal.pose
         path = self._call_planner(view, start, aim, self._plan_seed(self._plan_count))
         x, y, yaw = path.points[-1].tolist()

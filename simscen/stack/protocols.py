@@ -1,9 +1,11 @@
-"""Protocols of a navigation stack and its components. You can implement each of them in a package of your own.
+"""Protocols of a navigation stack and its components, with the data that they exchange.
 
-Contracts are written as *given … then …*; tests/contracts checks them for every implementation. These apply to all:
+You can implement each protocol in a package of your own. Contracts are written as *given … then …*; tests/contracts
+checks them for every implementation. These contracts apply to all protocols:
 
-- *Given* the same calls and random generators *then* the results are bit-identical: no clock, no global generator.
-- *Given* data in a call *then* the component neither changes it nor keeps it to change it later.
+- *Given* the same calls and random generators *then* the results are bit-identical. So the component uses no wall
+  clock and no global random generator.
+- *Given* arguments of a call *then* the component does not change them, neither during the call nor later.
 - *Given* a failure *then* it raises NavigationFailure with one of Nav2's error codes, and no other exception.
 """
 
@@ -38,8 +40,9 @@ class NavigationFailure(Exception):
 class RobotModel:
     """Description of the robot for its stack, in SI units.
 
-    `footprint` contains the corners in the base frame, counterclockwise; a round robot has a regular polygon and a
-    `radius`. Speeds and accelerations are limits of the base. `turning_radius` is 0 for a base that turns in place.
+    `footprint` contains the corners in the base frame, counterclockwise. For a round robot, it is a regular polygon,
+    and `radius` is not None. Speeds and accelerations are limits of the base. `turning_radius` is the minimum turning
+    radius, 0 for a base that turns in place. A `holonomic` base can drive sideways.
     """
 
     footprint: Polygon
@@ -107,7 +110,7 @@ class SupportsPose(Protocol):
 
     @property
     def pose(self) -> Pose2:
-        """The pose of the belief, bit-identical."""
+        """Exactly the pose of `belief`."""
         ...
 
 
@@ -122,20 +125,20 @@ LETHAL = 254
 
 @fast_dataclass(eq=False)
 class CostmapView:
-    """A costmap at one time: the global one in the map frame for planners, or the local one in the odom frame.
+    """A costmap at one time: for planners the global one in the map frame, for the others the local one (odom frame).
 
-    Poses, paths, and goals in the same call are in its frame.
+    Poses, paths, and goals in the same call are in the frame of the costmap.
 
     `costs` (height, width) uint8 has nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown). Row 0
     has the lowest y; `origin` is the corner of cell (0, 0) without rotation. `distance` (height, width) float32 is the
-    distance in m from the center of each cell to the center of the nearest lethal cell. It may be capped, but not below
-    the inflation radius and half a meter beyond the footprint. `revision` increases with each change.
-    `inflation_radius` in m is the range of an obstacle's costs. The arrays may be views of a live costmap and are valid
-    until its next update.
+    distance in m from the center of each cell to the center of the nearest lethal cell. Distances beyond the inflation
+    radius and half a meter beyond the footprint may be cut off. `resolution` is the cell size in m. `revision`
+    increases with each change. `inflation_radius` is the distance in m up to which obstacles increase costs. The arrays
+    may be views of a live costmap and are valid until its next update.
 
-    `moving` contains the moving obstacles that motion prediction has found, now and in this frame; `Footprint.gap`
-    returns the distance to them. It is empty without prediction. They do not affect the costs, except in the view for a
-    planner, where cells at which the robot would meet them cost more.
+    `moving` contains the moving obstacles in this frame that motion prediction has found; `Footprint.gap` returns the
+    distance to them. It is empty without prediction. Moving obstacles do not affect the costs, except in the view for a
+    planner, where cells cost more if the robot would meet an obstacle there.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -147,7 +150,7 @@ class CostmapView:
     moving: MovingObstacles = NO_MOVING_OBSTACLES
 
     def with_grown_obstacles(self, meters: float) -> "CostmapView":
-        """Return a copy with every obstacle larger by `meters` in all directions."""
+        """Return a copy with every obstacle enlarged by `meters` in all directions."""
         costs = np.where(self.distance <= meters, np.uint8(LETHAL), self.costs)
         return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(meters), np.float32(0)))
 
@@ -155,34 +158,35 @@ class CostmapView:
 class Planner(Protocol):
     """Finds a path on a costmap.
 
-    *Given* a start or goal outside the map or in an obstacle *then* it fails at once with the corresponding code.
+    *Given* a start or goal outside the map or in an obstacle *then* it fails at once, for example with GOAL_OCCUPIED.
     *Given* that no path exists *then* it fails with NO_VALID_PATH after a bounded number of iterations.
     *Given* success *then* the path starts at `start`, ends within `tolerance` of `goal`, and the footprint is on no
     lethal cell at any of its points.
     """
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 0.1 m apart."""
+        """Return a path of poses in the map frame, at most 0.1 m apart. `seed` is for its random generator, if any."""
         ...
 
 
 class Controller(Protocol):
     """Follows a path. All inputs are in the odom frame like the local costmap, because that frame is continuous.
 
-    *Given* limits *then* no command exceeds them. *Given* an obstacle on the arc that it would drive *then* it fails
-    with NO_VALID_CONTROL.
+    *Given* limits of the robot and its speed *then* no command exceeds them. *Given* an obstacle on the arc that it
+    would drive *then* it fails with NO_VALID_CONTROL.
     """
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on.
 
-        It is a new path, or the rest of the current path after the transform between map and odom frame has changed.
+        The path is new, or it is the part of the current path ahead of the robot, after the transform between map and
+        odom frame has changed.
         """
         ...
 
     @property
     def full_speed(self) -> float:
-        """Speed in m/s without any limit."""
+        """Maximum speed in m/s while no speed limit is set."""
         ...
 
     def set_speed_limit(self, limit: float | None) -> None:
@@ -201,7 +205,7 @@ class Controller(Protocol):
 
 @runtime_checkable
 class SupportsArc(Protocol):
-    """Optional extension of a controller whose local plan is an arc, so that it need not be transformed by points."""
+    """Optional extension of a controller whose local plan is an arc at constant velocity, which is faster to log."""
 
     @property
     def arc(self) -> tuple[Pose2, Twist] | None:
@@ -286,10 +290,11 @@ class Stack(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Configuration of a stack by its scenario: robot, map (None for mapless navigation), and tick rate in Hz.
+    """Robot and environment that a scenario configures for a stack. `tick_rate` is in Hz.
 
-    `keepout` contains polygons that the robot must not enter, `speed_zones` polygons with a speed limit in m/s; `masks`
-    express the same by cells. `lidars` are the names of the lidars that localize; `has_imu`: there is an IMU.
+    `map` is None for mapless navigation. The robot must not enter `keepout` polygons (map frame); `speed_zones` are
+    polygons with a speed limit in m/s; `masks` are the same as grids of cells. `lidars` are the names of the lidars
+    that the localizer uses. `has_imu`: the robot has an IMU.
     """
 
     robot: RobotModel

@@ -1,4 +1,4 @@
-"""Publishing of plans, local plans, beliefs, and costmaps: only changes, and at limited rates."""
+"""Selection of the plans, local plans, beliefs, costmaps, and standstill events that the stack publishes."""
 
 import math
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
-"""Rates in Hz of beliefs without a scan, and of local plans."""
+"""Rates in Hz of beliefs between scans, and of local plans."""
 MAX_CELLS_PER_SECOND = 125_000
-"""Limit for each costmap; a larger one is published less often."""
+"""Maximum number of cells published per second for each costmap; a larger costmap is published less often."""
 # Translation of costs as in nav2_costmap_2d's publisher: 1 … 252 become 1 … 98.
 _PUBLISHED = np.array(
     [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
@@ -29,12 +29,12 @@ _PUBLISHED = np.array(
 
 
 Updates = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
-"""Plan, local plan, and costmaps; each only if it has changed."""
+"""Plan, local plan, and costmaps to publish: None or empty if there is no change."""
 NO_UPDATES: Updates = (None, None, ())
 
 
 class Publisher:
-    """Selects what has changed since it was published last."""
+    """Selects what to publish: only changes, and at limited rates."""
 
     def __init__(
         self, tick_rate: int, localizer: Localizer, controller: Controller, local_frame: Literal["map", "odom"] = "odom"
@@ -52,12 +52,12 @@ class Publisher:
         self._local_costmap = _CostmapPublisher("local", local_frame)
 
     def belief(self, tick: int) -> Belief:
-        """Return the belief. Call it with each scan, and otherwise when `belief_due`."""
+        """Return the belief to publish. To be called after each scan, and when the tick `belief_due` is reached."""
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
     def updates(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
-        """Return what is new after a controller period in which the robot follows this plan."""
+        """Return what to publish after a controller period in which the robot follows `plan`."""
         local_plan: Path | None = None
         grids: tuple[CostGrid, ...] = ()
         if plan is not None and tick >= self._local_plan_due:
@@ -89,7 +89,7 @@ class Publisher:
 
 @dataclass
 class _CostmapPublisher:
-    """Revision of a costmap that was last published, and the tick from which it may be published again."""
+    """Publisher of one costmap: the revision published last, and the tick `due` from which the next may follow."""
 
     name: str
     frame: str
@@ -97,7 +97,7 @@ class _CostmapPublisher:
     revision: int = -1
 
     def update(self, tick: int, costmap: LayeredCostmap, tick_rate: int) -> CostGrid | None:
-        """Return the costmap, or None if it has not changed or is never published."""
+        """Return the costmap to publish; None if it has not changed or is never published."""
         if costmap.publish_frequency == 0.0:
             self.due = math.inf
             return None
@@ -113,11 +113,11 @@ class _CostmapPublisher:
 
 
 REPORT_AFTER_S = 1.0
-"""Time for which the robot must wait for the same component before that is reported."""
+"""Time for which a component must hold the robot before this is reported."""
 
 
 class StandstillReporter:
-    """Creates an event when a component has held the robot for a while, and another when it releases the robot."""
+    """Creates an event when a component has kept the robot from driving for a while, and another when that ends."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -127,7 +127,7 @@ class StandstillReporter:
         self._since, self._is_reported = 0, False
 
     def report_hold(self, tick: int, component: str, reason: Callable[[], str]) -> tuple[Event, ...]:
-        """Record that the robot waits for a component. `reason` returns the message for the event."""
+        """Record that a component holds the robot. `reason` returns the message of the event."""
         ended: tuple[Event, ...] = ()
         if component != self.holder:
             ended = self.report_release(tick)
@@ -138,7 +138,7 @@ class StandstillReporter:
         return (*ended, Event(tick, EventKind.ROBOT_HELD, component, {"message": reason()}))
 
     def report_release(self, tick: int) -> tuple[Event, ...]:
-        """Record that nothing holds the robot any more, or that it has no goal."""
+        """Record that no component holds the robot any more, or that the robot has no goal."""
         if not self.holder:
             return ()
         component, is_reported, self.holder, self._is_reported = self.holder, self._is_reported, "", False

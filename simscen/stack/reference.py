@@ -1,4 +1,4 @@
-"""The reference stack: Nav2 in miniature. It processes readings and returns one command."""
+"""The reference stack, Nav2 in miniature: passes readings to its components and returns velocity commands."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from simscen.stack.localizers.odometry_filter import OdometryFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
-"""Readings that only measure the motion of the robot. They can wait for the next scan or controller period."""
+"""Types of readings that only measure motion. They can wait until the next scan or controller period."""
 
 
 class ReferenceStack:
     """Localizer, costmaps, navigator, controller, velocity smoother, and collision monitor of one robot.
 
-    It decides at the controller's rate and repeats its command in between. Subclasses extend it through the methods
-    that are named `_on_…` and `_adjust_…`; here these do nothing.
+    It decides at the controller's rate and repeats its command in between. Subclasses override the methods `_on_…` and
+    `_adjust_…`. Except for `_on_idle`, these do nothing here, or return their argument.
     """
 
     def __init__(
@@ -54,8 +54,8 @@ class ReferenceStack:
     ) -> None:
         """Combine the components. `control_period` and `localizer_latency` are in ticks.
 
-        `fuses_odometry`: the localizer's belief is used as the odom frame, instead of the wheel odometry.
-        `odometry_filter`: filter of the wheel odometry; without one, it is used as it is.
+        `fuses_odometry`: the localizer (an EKF) provides the pose in the odom frame, instead of the wheel odometry.
+        `odometry_filter`: filter of the wheel odometry; None to use it unfiltered.
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
@@ -113,7 +113,7 @@ class ReferenceStack:
 
     @property
     def components(self) -> tuple[tuple[str, Any, tuple[str, ...]], ...]:
-        """The components to measure in benchmarks: name, object, and the methods that take time."""
+        """Name, object, and time-consuming methods of each component that benchmarks measure."""
         filters = () if self._odometry_filter is None else (("odometry filter", self._odometry_filter, ("fuse",)),)
         return (
             *filters,
@@ -149,13 +149,13 @@ class ReferenceStack:
     # Extension points -------------------------------------------------------------------------------------------------
 
     def _on_motion(self, reading: Odometry | Imu) -> None:
-        """Process an accepted odometry or IMU reading."""
+        """Process an odometry or IMU reading that has been accepted as plausible."""
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
-        """Compare the pose of the wheel odometry with the fused pose in the odom frame."""
+        """Process the pose by wheel odometry and the pose used in the odom frame, which a filter may have fused."""
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
-        """Process a scan and return the scan that costmaps and the collision monitor use."""
+        """Process a scan, and return the scan for costmaps and collision monitor."""
         return scan
 
     def _on_costmaps_updated(self, tick: int, frames: Frames) -> None:
@@ -173,13 +173,13 @@ class ReferenceStack:
         return command
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
-        """Run each controller period without a goal: stop."""
+        """Stop the robot. Runs in each controller period without a goal."""
         self._commands.stop(tick)
 
     # Readings ---------------------------------------------------------------------------------------------------------
 
     def _can_wait(self, tick: int, readings: Readings) -> bool:
-        """Return whether these readings can be processed together with the next scan, as at half of all beats."""
+        """Return whether these readings can be processed together with the next scan, which saves time."""
         if self._events or self._commands.has_latency or self._fuses_odometry:
             return False
         if tick >= self._publishing.belief_due or tick >= self._localizer_scans.due:
@@ -187,7 +187,7 @@ class ReferenceStack:
         return MOTION_READINGS.issuperset(map(type, readings))
 
     def _repeated_decision(self, sent: Twist) -> Decision:
-        """Return a decision without news other than the command; the same object while the command stays."""
+        """Return a decision with nothing but the command; the same object as long as the command stays the same."""
         if sent is not self._last_decision.command:
             self._last_decision = Decision(sent)
         return self._last_decision
@@ -230,7 +230,7 @@ class ReferenceStack:
         self._costmaps.add_reading(processed)
 
     def _process_odometry(self, reading: Odometry) -> None:
-        """Pass a reading to the localizer, filtered if there is a filter, and add it to the odometry history."""
+        """Filter an odometry reading, pass it to the localizer, and add its pose to the odometry history."""
         if reading.sensor == TRUTH:
             self._process_true_pose(reading)
             return
@@ -257,7 +257,7 @@ class ReferenceStack:
         return odometry
 
     def _process_true_pose(self, reading: Odometry) -> None:
-        """Pass the true pose to the localizer. For robots without wheel odometry, it is the odometry, too."""
+        """Pass the true pose to the localizer. Without wheel odometry, it also serves as odometry."""
         self._localizer.on_odometry(reading)
         if self._wheel_sensor:
             return
@@ -284,7 +284,7 @@ class ReferenceStack:
 
     def _update_costmaps(self, tick: int, frames: Frames) -> None:
         """Apply new zones, and update the costmaps when they are due."""
-        if self._zones is not None and self._costmaps.due(tick):
+        if self._zones is not None and self._costmaps.is_global_due(tick):
             self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
             self._zones = None
@@ -309,12 +309,12 @@ class ReferenceStack:
         self._navigator.via = leg[:-1]
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
             self._fail_goal(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"not reached in {goal.timeout:g} s"))
-        elif self._monitor.silent(tick):
+        elif self._monitor.is_silent(tick):
             self._commands.stop(tick)
             self._events += self._standstill.report_hold(
                 tick, "collision_monitor", partial(self._monitor.silence_reason, tick)
             )
-        elif not self._commands.busy(tick):
+        elif not self._commands.is_busy(tick):
             self._navigate(tick, frames)
         elif self._commands.sent == STOP:
             self._report_waiting(tick, "controller", self._commands.latency)
@@ -323,7 +323,7 @@ class ReferenceStack:
 
     def _navigate(self, tick: int, frames: Frames) -> None:
         """Run the navigator once and act on its result."""
-        if self._speed_filter.used:
+        if self._speed_filter.is_used:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
         is_held, periods = self._commands.hold_timed_out(tick), self._commands.periods(tick)
         step = self._navigator.step(tick, frames, self._twist, is_held, periods)
@@ -335,8 +335,8 @@ class ReferenceStack:
             self._stop(tick)
         else:
             self._commands.request(tick, self._adjust_controller_command(tick, frames, step.command), periods)
-            if waiting := self._navigator.plans.waiting:
-                self._report_waiting(tick, "planner", waiting)
+            if wait_ticks := self._navigator.plans.wait_ticks:
+                self._report_waiting(tick, "planner", wait_ticks)
             elif self._standstill.holder and self._commands.sent != STOP:
                 self._events += self._standstill.report_release(tick)
 
@@ -347,7 +347,7 @@ class ReferenceStack:
         self._events += self._standstill.report_hold(tick, component, lambda: message)
 
     def _remove_passed_goals(self, tick: int, pose: Pose2) -> Goal | None:
-        """Skip the intermediate goals that the robot is close to (Nav2's RemovePassedGoals). Return the next one."""
+        """Record intermediate goals close to the robot as passed (Nav2's RemovePassedGoals). Return the next goal."""
         while (goal := self._task.goal) is not None and goal.via:
             if pose.distance(goal.pose) > goal.xy_tolerance:
                 break

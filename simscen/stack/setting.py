@@ -1,4 +1,4 @@
-"""Context in which a component of a stack is built: robot, map, random generator, and services of the stack."""
+"""What the constructor of a stack component gets: robot, map, random generator, and functions of the stack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ UNKNOWN_POSE = Estimate(None)
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Everything that a component or a whole stack gets besides its specification: `Class(specification, setting)`.
+    """Second constructor argument of each component and of a whole stack: `Class(specification, setting)`.
 
     Units are SI and rad. The map frame is that of `map`; the base frame has x forward and y to the left (REP 103).
 
@@ -29,13 +29,13 @@ class Setting:
     streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
-    estimate:         initial pose estimate; `reset` or `start` provides it again
+    estimate:         initial pose estimate; `reset` or `start` passes it again
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
-    mode:             Nav2 action that accepts the goals; `via` and `wait` of the goals express what it implies
-    clear_costmap:    clears obstacles that are no longer seen (for a behavior)
-    clear_around:     does the same within the range of the local costmap
+    mode:             Nav2 action that the task imitates (for a whole stack)
+    clear_costmap:    clears all obstacles from the costmaps that current readings do not show (for a behavior)
+    clear_around:     does the same only within the range of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
-    limit_command:    returns a command after the collision monitor, at a pose in the odom frame (for a behavior)
+    limit_command:    returns a command as the collision monitor limits it, given the pose in the odom frame
     wrap_localizer:   wraps the localizer for all other components (for the reference stack)
     """
 
@@ -54,7 +54,7 @@ class Setting:
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":
-        """Return the setting for another component with its own random stream."""
+        """Return the setting for another component, whose random stream has this name."""
         return replace(self, name=name)
 
     @property
@@ -74,7 +74,7 @@ class Setting:
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """The component's own random generator, so that its draws do not affect other components."""
+        """The component's own random generator. Its draws do not affect other components."""
         return self.streams.generator(self.name)
 
     @cached_property
@@ -84,4 +84,4 @@ class Setting:
 
 
 _footprint = lru_cache(maxsize=16)(Footprint)
-"""Shared between components, because it is immutable and takes a millisecond to build."""
+"""Return the cached footprint checker, which components share, because it takes a millisecond to build."""

@@ -1,4 +1,4 @@
-"""Goal list of a navigation task, with the events and the result that an action client would see."""
+"""List of the goals of a navigation task, with the events and the result that an action client would see."""
 
 from simscen.core.clock import Clock
 from simscen.core.messages.navigation import ErrorCode, Goal, Mode, TaskResult
@@ -8,7 +8,7 @@ Events = tuple[Event, ...]
 
 
 class Task:
-    """Goals in order. Methods return the events that a client of the action would see.
+    """Goals in the order in which the robot drives to them. Methods return the events that an action client would see.
 
     Intermediate goals (`via`) and the goal after them are one action: they fail, are canceled, and are preempted
     together.
@@ -18,7 +18,7 @@ class Task:
         """Create an empty task.
 
         If `stop_on_failure` is true, a failed goal ends the task. `clock` converts the `wait` times of goals to ticks.
-        `mode` is the action of Nav2 that the task imitates, which determines the error code of a failed task.
+        `mode` is the Nav2 action that the task imitates, which determines the error code of a failed task.
         """
         self._stop_on_failure = stop_on_failure
         self._clock, self._mode = clock or Clock(), mode
@@ -37,7 +37,7 @@ class Task:
         self._wait_until = None
 
     def accept_next(self, tick: int) -> Events:
-        """End a wait that is over as `end_wait` does, then accept the next goal if there is no current one."""
+        """Call `end_wait`, then accept the next goal if there is no current one and the robot does not wait."""
         events = self.end_wait(tick)
         if self.goal is None and self._wait_until is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
@@ -50,11 +50,11 @@ class Task:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether the robot waits at a goal."""
+        """Whether the robot waits at a reached goal for its `wait` time."""
         return self._wait_until is not None
 
     def end_wait(self, tick: int) -> Events:
-        """End a wait that is over at this tick, and the task if that was its last goal."""
+        """End the wait if its time is over, and with it the task if no goal is left."""
         if self._wait_until is None or tick < self._wait_until:
             return ()
         self._wait_until = None
@@ -69,7 +69,7 @@ class Task:
         return tuple(self._waiting[: last + 1])
 
     def record_reached(self, tick: int) -> Events:
-        """Record that the current goal is reached."""
+        """Record that the current goal is reached, and start the wait there, if any."""
         assert self.goal is not None
         reached = self._event(tick, EventKind.GOAL_REACHED)
         if self.goal.wait > 0:
@@ -78,13 +78,13 @@ class Task:
         return (reached, *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_passed(self, tick: int) -> Events:
-        """Record that the robot has passed the current, intermediate goal."""
+        """Record that the robot has passed the current goal, which is an intermediate one."""
         return (self._event(tick, EventKind.GOAL_PASSED), *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
         """Record that the current goal has failed, and end the task if it stops on failures.
 
-        `code` is a number for error codes of foreign stacks without a name.
+        `code` is a plain number if a stack of another package uses a code that has no name here.
         """
         details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
         dropped = self._end_action(tick, EventKind.GOAL_FAILED, **details)
@@ -104,9 +104,9 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:
-        """Replace the current goal, and the other goals of its action, by `goal`. Also ends a wait.
+        """Replace the current goal and the other goals of its action by `goal`, and end a wait.
 
-        The goals after that action stay.
+        The goals of later actions stay.
         """
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
         self.goal, self._wait_until = None, None
@@ -114,7 +114,7 @@ class Task:
         return dropped
 
     def _end_action(self, tick: int, kind: EventKind, **details: Value) -> Events:
-        """End the current goal and the other goals of the same action with one kind of event."""
+        """End the current goal and the other goals of its action, each with an event of this kind."""
         remaining = self.remaining_in_action
         dropped = [self._event(tick, kind, **details)]
         for goal in remaining:

@@ -14,7 +14,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.grid_planner import navfn, smac_2d
 from simscen.stack.planners.ompl_planner import ompl_planner
-from simscen.stack.planners.path_postprocessing import spaced
+from simscen.stack.planners.path_postprocessing import densify
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import box_robot, setting
@@ -41,7 +41,7 @@ def query(
 
 def costs_along(rates: TraversalCosts, points: Array) -> np.ndarray:
     """Return the traversal cost at each half millimeter of a path."""
-    return rates.at(spaced(points[:, :2], 0.0005))
+    return rates.at(densify(points[:, :2], 0.0005))
 
 
 def spec(kind: str, **options: object) -> Spec:

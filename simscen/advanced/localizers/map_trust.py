@@ -104,7 +104,7 @@ class MapTrust:
         classes = self._classes(self._endpoint_cells(particles.poses, beams))
         known_share, fitting = _shares(classes)
         exponent = _ramp(known_share, *MAPPED_SHARE)
-        if not particles.within(CLUSTER_RADIUS_M):
+        if not particles.are_within(CLUSTER_RADIUS_M):
             return ScanWeight(exponent, fitting, None)
         used = None
         if known_share < 1.0:

@@ -19,7 +19,7 @@ from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace, Particles, are_compact, summarize
-from simscen.stack.localizers.resampling import Recovery
+from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNINFORMATIVE_SHARE_OF_HIT = 0.4
@@ -96,12 +96,12 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self._trust = trust
         super().__init__(spec, motion, sensor, free_space, rng)
 
-    def begin(self, estimate: Estimate) -> None:
+    def reset(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
-        super().begin(estimate)
+        super().reset(estimate)
         if self._spec.relocalization == "scan_matching":  # random particles would compete with the search
-            self._recovery = Recovery(0.0, 0.0)
-        self._map_weight, self._is_one_cluster = 1.0, False
+            self._augmented_mcl = AugmentedMcl(0.0, 0.0)
+        self._map_weight, self._is_one_group = 1.0, False
         self.fitting_share = 0.0
         """Share of the last scan's beams that fit the map at the particles, of those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
@@ -109,9 +109,9 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     @property
     def is_certain(self) -> bool:
-        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow cluster."""
+        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow group."""
         is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
-        return is_mapped and self._is_one_cluster and self._recovery.share == 0
+        return is_mapped and self._is_one_group and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
@@ -147,7 +147,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         count = self._bound.max_samples
         drawn = poses[self._rng.choice(len(poses), count, p=shares)] + self._rng.normal(0.0, CERTAIN_STD, (count, 3))
         drawn[:, 2] = wrap_array(drawn[:, 2])
-        self.particles = Particles.equal(drawn)
+        self.particles = Particles.with_equal_weights(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
         return summarize(self.particles, self._sensor.peak_power)

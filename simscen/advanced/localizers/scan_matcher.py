@@ -16,7 +16,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
-from simscen.stack.localizers.particles import columns, wrapped
+from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 BASELINE_M = 0.15
 """Distance between the two points whose line gives the normal of the point between them."""
@@ -194,10 +194,10 @@ def sample_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
     turn += step.delta.yaw
     x, y, heading = poses.T
     c, s = np.cos(heading), np.sin(heading)
-    after = columns(len(poses))
+    after = empty_poses(len(poses))
     after[:, 0] = x + c * ahead - s * left
     after[:, 1] = y + s * ahead + c * left
-    after[:, 2] = wrapped(heading + turn)
+    after[:, 2] = wrap_headings(heading + turn)
     return after
 
 

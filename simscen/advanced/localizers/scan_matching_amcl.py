@@ -15,7 +15,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.amcl import AmclLocalizer, Correction
 from simscen.stack.localizers.motion_models import MotionModel
-from simscen.stack.localizers.particles import spread
+from simscen.stack.localizers.particles import covariance_about
 
 CERTAIN_AFTER_UPDATES = 8
 """The robot is certain of its pose after this many consecutive updates in which map, scans and wheels agreed."""
@@ -98,7 +98,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             last = self._correction
             pose = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
             tick = scan.tick if self._skipped else last.tick
-            self._correction = Correction(pose, spread(self._filter.particles, pose), odometry, tick)
+            self._correction = Correction(pose, covariance_about(self._filter.particles, pose), odometry, tick)
         if not self._skipped:
             consistent = agreed and estimate is not None and self._filter.is_certain
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0

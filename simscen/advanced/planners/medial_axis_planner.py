@@ -19,14 +19,14 @@ from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import resample_polyline
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.ompl_planner import (
-    FINE_CELLS,
+    FINE_SPACING_CELLS,
     Attempt,
     PosePlanner,
     state_space_for,
 )
 from simscen.stack.planners.ompl_search import Point
-from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, smoothed, spaced, with_headings
-from simscen.stack.planners.planning_window import plan_in_windows, window
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, smoothed, with_headings
+from simscen.stack.planners.planning_window import crop_costmap, plan_in_windows
 from simscen.stack.planners.pose_search import POSE_SPACING_M
 from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
@@ -146,7 +146,7 @@ class MedialAxisPlanner:
             costmap, start, goal, radius, lambda part, part_goal: self._path_on_part(part, start, part_goal, seed)
         )
         if points is not None:
-            return Path(with_headings(spaced(points, SPACING_M), goal))
+            return Path(with_headings(densify(points, SPACING_M), goal))
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
@@ -166,11 +166,11 @@ class MedialAxisPlanner:
     def _points(self, costs: TraversalCosts, start: Pose2, goal: Pose2, seed: int) -> Array:
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         path = np.array([ends.start]) if ends.start == ends.goal else self._search(costs, ends, seed)
-        return spaced(np.vstack(((start.x, start.y), path)), SPACING_M)
+        return densify(np.vstack(((start.x, start.y), path)), SPACING_M)
 
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
         """Return the path (n, 2) of the first search that finds one."""
-        for spacing in (costs.stride, FINE_CELLS * costs.resolution):
+        for spacing in (costs.stride, FINE_SPACING_CELLS * costs.resolution):
             costs.stride, was_rejected = spacing, False
             for number, legs in enumerate(searches(costs, ends, seed)):
                 points = [ends.start]
@@ -195,8 +195,8 @@ class MedialAxisPlanner:
 
 def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
     """Return the path, refined and led around corners of blocked cells; None if it crosses a blocked cell."""
-    path = avoid_cell_corners(costs, spaced(refine(costs, points), SPACING_M))
-    return path if path is not None else avoid_cell_corners(costs, spaced(points, SPACING_M))
+    path = avoid_cell_corners(costs, densify(refine(costs, points), SPACING_M))
+    return path if path is not None else avoid_cell_corners(costs, densify(points, SPACING_M))
 
 
 ATTEMPTS = (
@@ -250,7 +250,7 @@ def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float
         return None
     ratio = (costly + MARGIN_BEHIND_M) / length
     part_goal = Pose2(start.x + ratio * (goal.x - start.x), start.y + ratio * (goal.y - start.y))
-    part = window(costmap, start, part_goal, MARGIN_AROUND_M)
+    part = crop_costmap(costmap, start, part_goal, MARGIN_AROUND_M)
     if part is None:
         return None
     try:

@@ -16,7 +16,7 @@ from simscen.advanced.planners.informed_set import InformedSet, cells_with_most_
 from simscen.core.geometry import Array
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.endpoints import Endpoints
-from simscen.stack.planners.ompl_planner import whole_problem
+from simscen.stack.planners.ompl_planner import make_problem
 from simscen.stack.planners.ompl_search import Motion, OmplSearch, Problem, StateValidity, Termination
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
@@ -123,7 +123,7 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
     the medial axis has more than MAX_SAMPLES, searches in corridors follow. The last ones sample everywhere, with
     increasing density.
     """
-    problem, samples = whole_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
+    problem, samples = make_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
     yield iter((Leg(problem, _cheap_samples(costs, ends, samples), REACH_M),))
     if len(samples) > MAX_SAMPLES:
         informed = InformedSet(costs, ends.start, ends.goal)

@@ -67,7 +67,7 @@ CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
 
 
 class HypotheticalSensor:
-    """Computes what a lidar or camera would see from another pose or without some objects (faults.base.SensorSimulator)."""
+    """Computes readings from another pose or without some objects, as faults.base.SensorSimulator promises."""
 
     def __init__(
         self,

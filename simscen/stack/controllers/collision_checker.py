@@ -1,4 +1,4 @@
-"""Collision checks of velocity commands, shared by the controllers."""
+"""Collision checks of velocity commands and rotations, shared by the controllers."""
 
 import math
 
@@ -14,28 +14,29 @@ from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Factors by which a command is slowed to let moving obstacles pass."""
+"""Factors by which a command may be multiplied to let moving obstacles pass, in the order of the attempts."""
 MAX_TIME_STEP_S, UNCERTAINTY_SIGMAS = 0.1, 0.5
-"""Largest time between two collision checks, and standard deviations by which obstacles are enlarged."""
+"""Largest time between two checks of moving obstacles, and standard deviations by which these are enlarged."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Decrease of the distance above which a robot that is already too close counts as approaching."""
+"""A robot that is already too close counts as approaching if its distance decreases by more than this."""
 
 
 class CollisionChecker:
-    """Checks the arc of a command for collisions, and slows the command down if a collision is too near."""
+    """Checks the arc of a command for collisions, and slows the command down if a collision is near."""
 
     def __init__(self, footprint: Footprint, min_speed: float) -> None:
-        """Take the footprint, and the speed in m/s below which a command is not slowed further."""
+        """Take the footprint, and the lowest speed in m/s to which a command is slowed down."""
         self._footprint, self._min_speed = footprint, min_speed
 
     def free_time(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
-        """Return how long the command can be driven without touching a static obstacle, in s, at most `horizon`."""
+        """Return the time in s, at most `horizon`, for which the command does not hit a static obstacle."""
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
-    def slowed(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
-        """Return the command, slowed so that the free time becomes `required` s. Raises NO_VALID_CONTROL.
+    def slow_down(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
+        """Return the command; if it is not free for `horizon` s, slowed down so that it becomes free for `required` s.
 
-        Nav2 fails at once. Slowing down first gives the planner time to find a way around the obstacle.
+        Raises NO_VALID_CONTROL if it would be slower than the minimum. Nav2 fails at once; slowing down first gives the
+        planner time to find a way around the obstacle.
         """
         if free_time >= horizon:
             return command
@@ -44,11 +45,12 @@ class CollisionChecker:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free_time:.2f} s")
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
 
-    def slowed_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
-        """Return the fastest fraction of the command that hits no moving obstacle, or the one that hits one last.
+    def slow_down_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
+        """Return the command times the largest of SPEED_FACTORS that avoids moving obstacles for `horizon` s.
 
-        The positions of robot and obstacles are compared at the same times, so that the robot does not slow down for an
-        obstacle that will have left by then. A stop is not a failure, because a moving obstacle will move on.
+        If none does, take the factor with the latest collision. Robot and obstacles are compared at the same times, so
+        that the robot does not slow down for an obstacle that will have left. A stop is not a failure, because a moving
+        obstacle will move on.
         """
         if not costmap.moving.obstacles or command == STOP:
             return command
@@ -73,13 +75,13 @@ ROTATION_CLEARANCE_CELLS = 1.01
 """Minimum distance, in cells, between the footprint and the center of a lethal cell during a rotation in place. The
 obstacle may be half a cell nearer, and a robot without a rear lidar does not see obstacles behind it."""
 BACKUP_SPEED_M_S, BACKUP_FREE_TIME_S = 0.15, 1.0
-"""Speed of backing up (Nav2's backup_speed), and time for which a command to back up must be free."""
+"""Speed of backing up (Nav2's backup_speed), and time for which the command must be free of collisions."""
 BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
 """Turn rates to try in this order: a robot that entered on a curve may not be able to leave in a straight line."""
 
 
 class RotationClearance:
-    """Checks whether a footprint with corners can rotate in place at a pose.
+    """Checks whether a robot with corners can rotate in place, and finds a way to back out if not.
 
     A robot that starts a rotation without room for all of it gets stuck: its corners come closer to obstacles with each
     step, until it can neither turn nor leave.
@@ -99,7 +101,7 @@ class RotationClearance:
         required = min(ROTATION_CLEARANCE_CELLS * costmap.resolution, float(clearance[0]))
         return bool((clearance >= required).all())
 
-    def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
+    def backup_command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Return a command that backs up as straight as possible; None if every curvature is blocked."""
         for turn_rate in BACKUP_TURN_RATES_RAD_S:
             command = Twist(-BACKUP_SPEED_M_S, 0.0, turn_rate)
@@ -113,13 +115,12 @@ CELL_DIAGONAL = 1.4143
 
 
 def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
-    """Return the time in s until the first collision at this velocity, at most `horizon`.
+    """Return the time in s until the first collision with a static obstacle at this velocity, at most `horizon`.
 
-    A robot that is in collision according to the costmap, for example because of a localization error, may move unless
-    that brings it further into the same obstacle by more than half a cell, or into another one. Otherwise, it could
-    never leave the collision.
+    A robot may already be in collision according to the costmap, for example because of a localization error. So that
+    it can leave, only motion into another obstacle or more than half a cell deeper into the same one counts then.
     """
-    if _clearly_free(footprint.circumscribed, costmap, pose, twist, horizon):
+    if _is_surely_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
     speed = math.hypot(twist.vx, twist.vy) + abs(twist.wz) * footprint.reach
     steps = max(2, math.ceil(horizon * speed / costmap.resolution) + 1)
@@ -134,7 +135,7 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
 
 
 def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the poses (n, 3) are further inside a lethal cell than the first pose, or inside another one."""
+    """Return which of the poses (n, 3) are deeper inside an obstacle than the first pose, or inside another one."""
     reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
     gaps = footprint.gaps(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
     deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
@@ -142,11 +143,11 @@ def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.N
     return np.asarray(deeper.any(axis=1) | (in_lethal_cell & ~in_lethal_cell[0]))
 
 
-def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
-    """Return True if a disc of `radius` is free along the whole arc. Each step is as long as the free distance.
+def _is_surely_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
+    """Return True if a disc of `radius` m is certainly free along the arc: a quick check for open space.
 
-    Half a cell diagonal is added at both ends of a step, because distances are known between cell centers. This quick
-    check avoids the check of all poses in open space.
+    Each step is as long as the free distance. Half a cell diagonal is added at both of its ends, because distances are
+    those between cell centers.
     """
     vx, vy, wz = twist
     speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE

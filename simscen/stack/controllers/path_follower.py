@@ -1,4 +1,4 @@
-"""Base class of the controllers: path, progress on it, speed limit, and rotation at the goal."""
+"""Base class of the controllers: path, position on the path, speed limit, and rotation to the heading of the goal."""
 
 import math
 
@@ -12,7 +12,8 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 DEFAULT_SPEED_M_S = 0.5
 """Nav2's default of desired_linear_vel and of MPPI's vx_max."""
 SAME_GOAL_M = 0.1
-"""Distance by which a localization correction may move the goal without a reset of the controller."""
+"""A path to a goal within this distance of the previous goal does not reset the controller: localization corrections
+move the goal in the odom frame."""
 
 
 class PathFollower:
@@ -27,7 +28,7 @@ class PathFollower:
         self._end: Pose2 | None = None
 
     def set_path(self, path: Path) -> None:
-        """Follow this path from now on."""
+        """Follow this path from now on. Raises INVALID_PATH if it has no points."""
         if not len(path.points):
             raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
         end = Pose2(*path.points[-1].tolist())
@@ -36,7 +37,7 @@ class PathFollower:
         self._end, self._tracker = end, PathTracker(path, self._search_distance)
 
     def begin(self) -> None:
-        """Reset the state for a path to another goal. A new path to the same goal does not reset it."""
+        """Reset the state for another goal. Not called for a new path to the same goal."""
 
     @property
     def full_speed(self) -> float:
@@ -49,16 +50,16 @@ class PathFollower:
 
     @property
     def _speed(self) -> float:
-        """Maximum speed now, in m/s."""
+        """Maximum speed in m/s with the current speed limit."""
         return self._full_speed if self._speed_limit is None else min(self._full_speed, self._speed_limit)
 
     @property
     def _speed_ratio(self) -> float:
-        """Ratio by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
+        """Factor by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
         return self._speed / self._full_speed
 
     def _locate(self, pose: Pose2) -> PathTracker:
-        """Return the path, updated with the position of the robot on it."""
+        """Return the path with the updated position of the robot on it. Raises INVALID_PATH if there is no path."""
         if self._tracker is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
         self._tracker.locate(pose)
@@ -66,17 +67,17 @@ class PathFollower:
 
 
 PASSED_TOLERANCE_RATIO = 0.8
-"""Distance beyond the goal at which driving stops, relative to xy_goal_tolerance: the robot could only come back."""
+"""A goal behind the robot is reached within this fraction of its tolerance, because the robot could only drive back."""
 STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
-"""A robot that stands within the tolerance has arrived if its speed and the rest of its path are below these."""
+"""A robot within the tolerance has also arrived if its speed and the remaining length of its path are below these."""
 PASSED_PATH_LENGTH_M = 0.1
-"""Maximum length of the rest of the path for a goal to count as passed."""
+"""Remaining length of the path below which a goal behind the robot can be reached."""
 CAR_PATH_END_M = 0.03
-"""Length of the rest of the path at which a car has arrived: it gets its heading from the last arc."""
+"""Remaining length of the path below which a car has arrived: it gets its heading from the last arc."""
 SETTLING_PERIODS = 2.0
-"""Minimum number of control periods for the rest of a rotation. With fewer, the heading would oscillate."""
+"""Minimum number of control periods for the remaining rotation. With fewer, the heading would oscillate."""
 BRAKING_FACTOR = 1.6
-"""Factor of deceleration times distance in the square of the speed. Twice the distance would leave no reserve."""
+"""Speed limit before a stop: sqrt(factor · deceleration · distance). The exact factor, 2, would leave no reserve."""
 
 
 class GoalRotation:
@@ -87,7 +88,7 @@ class GoalRotation:
     ) -> None:
         """Take the limits in rad/s and rad/s², and the control period in s.
 
-        `tolerance_ratio` is the fraction of the goal's tolerance at which driving stops.
+        Driving stops within the fraction `tolerance_ratio` of the goal's tolerance.
         """
         self._tolerance_ratio = tolerance_ratio
         self._can_turn = robot.turning_radius == 0.0
@@ -99,10 +100,10 @@ class GoalRotation:
         """Prepare for another goal."""
         self._is_reached = False
 
-    def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
-        """Return whether to stop driving and to rotate; `remaining` is the length of the rest of the path in m.
+    def is_position_reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
+        """Return whether to rotate instead of driving on; `remaining` is the remaining length of the path in m.
 
-        The answer stays True until the robot leaves the tolerance.
+        The result stays True until the robot leaves the tolerance.
         """
         distance = goal.pose.distance(pose)
         if not self._can_turn:

@@ -1,4 +1,4 @@
-"""Path handler: the progress of the robot along its path, and the part of the path that lies ahead."""
+"""Path handler: the position of the robot on its path, and the part of the path ahead of it."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -14,7 +14,7 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.kinematics import direction_changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
-"""Default search distance, also of the plan manager. That of controllers is `max_robot_pose_search_dist`."""
+"""Default length of path that is searched for the nearest point; controllers use `max_robot_pose_search_dist`."""
 CUSP_REACHED_M = 0.03
 """Length of path before a cusp at which the cusp counts as reached."""
 CURVATURE_SPAN_M = 0.3
@@ -26,17 +26,17 @@ LENGTH_TOLERANCE_M = 1e-9
 
 
 class PathTracker:
-    """Position of the robot on a path. It only moves forward.
+    """Path with the position of the robot on it, which only moves toward the end of the path.
 
-    A path may change between forward and backward driving (Reeds-Shepp). It is followed segment by segment: points
-    beyond the next cusp are not considered until the robot has reached it.
+    A path may change between forward and backward driving (Reeds-Shepp) at cusps. The robot follows one segment after
+    the other: points beyond the next cusp are not considered until the robot has reached the cusp.
 
-    Searches skip points that cannot be the result: a step along the path changes the distance to the robot by at most
-    the length of the step. So few points remain that scalars (points as x + iy) are faster than arrays.
+    Searches skip points that cannot be the result, since a step along the path changes the distance to the robot by at
+    most the length of the step. So few points remain that scalars (points as x + iy) are faster than arrays.
     """
 
     def __init__(self, path: Path, search_distance: float = SEARCH_AHEAD_M) -> None:
-        """Take a path, and the length of path in m beyond the last position that is searched for the nearest point."""
+        """Take a path. The nearest point is searched up to `search_distance` m of path beyond the last position."""
         self._search_distance = search_distance
         self.points = np.ascontiguousarray(path.points)
         steps = np.diff(self.points[:, :2], axis=0)
@@ -66,14 +66,14 @@ class PathTracker:
         return len(self._segment_ends) > 1
 
     @property
-    def forward(self) -> bool:
+    def is_forward(self) -> bool:
         """Whether the current segment is driven forward."""
         return self._segment_forward[0]
 
     def locate(self, pose: Pose2) -> None:
-        """Move to the point of the segment nearest to the robot, and on to the next segment at its end."""
+        """Update the position: the point of the segment nearest to the robot, or of the next segment at a cusp."""
         self._find_nearest(pose)
-        while len(self._segment_ends) > 1 and self.to_cusp() <= CUSP_REACHED_M:
+        while len(self._segment_ends) > 1 and self.remaining_in_segment() <= CUSP_REACHED_M:
             self.index = self._segment_start = self._segment_ends.pop(0)
             self._segment_forward.pop(0)
             self._find_nearest(pose)
@@ -90,9 +90,9 @@ class PathTracker:
         self.index = nearest
 
     def ahead(self, length: float) -> tuple[Array, Array]:
-        """Return the points (n, 3) of the segment for a length of path in m, and the length of path (n,) to each.
+        """Return the points (n, 3) of the segment over the next `length` m of path, and the path length (n,) to each.
 
-        There are at least two points if the segment has as many.
+        There are at least two points, unless the segment has only one.
         """
         end = bisect_right(self._along, self._along[self.index] + length)
         end = min(end + 1, self._segment_ends[0] + 1)
@@ -104,9 +104,9 @@ class PathTracker:
         return self._complex_points[self.index :: every]
 
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
-        """Yield points of the segment about `spacing` m apart, up to `reach` m ahead, starting with the first spacing.
+        """Yield (path length in m, x + iy, curvature in 1/m) of points ahead on the segment.
 
-        Each comes with the length of path to it in m, and with the curvature in 1/m: (length, x + iy, curvature).
+        The points are about `spacing` m apart. The first one is `spacing` m ahead, the last one at most `reach` m.
         """
         along, start = self._along, self._along[self.index]
         length = spacing
@@ -128,25 +128,25 @@ class PathTracker:
         return 2.0 * abs(turn) / (along[after] - along[before])
 
     def remaining(self) -> float:
-        """Return the length of path from the nearest point to the end, in m."""
+        """Return the remaining length of the path in m."""
         return self._along[-1] - self._along[self.index]
 
-    def to_cusp(self) -> float:
-        """Return the length of path to the end of the segment, in m."""
+    def remaining_in_segment(self) -> float:
+        """Return the remaining length of the segment in m."""
         return self._along[self._segment_ends[0]] - self._along[self.index]
 
     @property
     def segment_end(self) -> tuple[float, float]:
-        """End point of the segment."""
+        """Position (x, y) of the end of the segment."""
         end = self._complex_points[self._segment_ends[0]]
         return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
-        """Return the point where the segment leaves the circle of radius `distance` around the robot, or its end.
+        """Return (x, y) where the segment leaves the circle of radius `distance` m around the robot, or its end.
 
-        It is interpolated between points, so that it moves smoothly (RPP's circleSegmentIntersection). With `beyond`,
-        the segment is extended straight beyond its end (interpolate_curvature_after_goal), so that the robot arrives
-        with the heading of the end.
+        The carrot is interpolated between points, so that it moves smoothly (RPP's circleSegmentIntersection). With
+        `beyond`, the segment is extended straight beyond its end (interpolate_curvature_after_goal), so that the robot
+        arrives with the heading of the end.
         """
         search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
         outside = self._first_outside(pose, distance, search_end)
@@ -154,7 +154,7 @@ class PathTracker:
             x, y, yaw = self.points[min(bisect_right(self._along, search_end), self._segment_ends[0])].tolist()
             if not beyond:
                 return x, y
-            extension = distance if self.forward else -distance
+            extension = distance if self.is_forward else -distance
             extended_x, extended_y = x + 2 * extension * math.cos(yaw), y + 2 * extension * math.sin(yaw)
             return _on_circle(x - pose.x, y - pose.y, extended_x - pose.x, extended_y - pose.y, distance, pose)
         point = self._complex_points[outside]
@@ -166,9 +166,9 @@ class PathTracker:
         )
 
     def _first_outside(self, pose: Pose2, distance: float, search_end: float) -> int | None:
-        """Return the first point of the segment that is at least `distance` m away from the robot.
+        """Return the index of the first point ahead that is at least `distance` m from the robot; None if none is.
 
-        The search ends `search_end` m along the path.
+        The search ends at the path length `search_end`, and at the end of the segment.
         """
         points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
         index, end = self.index, self._segment_ends[0]
@@ -181,7 +181,7 @@ class PathTracker:
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
-    """Return where the segment from a (inside) to b leaves a circle; a and b are relative to its `center`."""
+    """Return (x, y) where the line from a (inside) to b leaves a circle; a and b are relative to its `center`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
@@ -190,14 +190,14 @@ def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center
 
 Floats = npt.NDArray[np.float32]
 PATH_SPACING_M = 0.05
-"""Distance between points: Nav2's planners return one per costmap cell, and its critics count points."""
+"""Default distance between points. Nav2's planners return one point per costmap cell, and its critics count points."""
 
 
 @dataclass(frozen=True, eq=False)
 class UpcomingPath:
-    """Poses (n, 3) from the position of the robot on its path on, `spacing` m apart, and their `length` in m.
+    """Part of the path ahead of the robot: poses (n, 3) that are `spacing` m apart, and their total `length` in m.
 
-    They end at the next cusp, at the end of the path, or after the requested length.
+    It ends at the next cusp, at the end of the path, or after the requested length.
     """
 
     points: Array
@@ -205,7 +205,7 @@ class UpcomingPath:
     length: float
 
     def relative_to(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
-        """Return x and y (n,) relative to a pose, in the same orientation, and the headings.
+        """Return x and y (n,) relative to the position of `pose`, without rotation, and the headings (n,).
 
         Relative positions are small, so that float32 is precise enough.
         """

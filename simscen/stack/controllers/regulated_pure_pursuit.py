@@ -16,19 +16,19 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 MIN_SQUARED_CHORD_M2 = 0.001
-"""Squared distance of the carrot below which the curvature is 0 (Nav2's calculateCurvature)."""
+"""Squared distance of the carrot below which the arc is straight (Nav2's calculateCurvature)."""
 CAR_LOOKAHEAD_RATIO = 0.4
-"""Maximum lookahead distance of a car relative to its turning radius. A plan can change from full left to full right,
-and a car cannot correct the error of a shortcut there."""
+"""Maximum lookahead distance of a car relative to its turning radius. Where a plan changes from full left to full
+right, a farther carrot would cut the bend, and a car cannot correct that."""
 MIN_ROTATION_RAD = 0.1
-"""Angle to the carrot below which a rotation in place would change nothing."""
+"""Angle to the carrot below which a rotation in place would not help."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
 """Ratios of the lookahead distance to try until the arc is free. An arc to a far carrot cuts the bends of the path; a
 shorter one stays closer to it. nav2_graceful_controller tries its targets in the same way."""
 
 
 class Carrot(NamedTuple):
-    """Point of the path to drive to, in m in the frame of the robot."""
+    """Point of the path that the robot steers to, in m in the base frame."""
 
     x: float
     y: float
@@ -45,7 +45,7 @@ class Carrot(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A command, the time in s for which it is free of collisions, and the time in s for which it must be free."""
+    """A command, the time in s for which it is free of collisions, and the time `horizon` for which it has to be."""
 
     command: Twist
     free_time: float
@@ -55,8 +55,8 @@ class Arc(NamedTuple):
 class RegulatedPurePursuit(PathFollower):
     """Steers at a carrot on the path, and regulates the speed by curvature, nearby obstacles, and distance to the goal.
 
-    Where Nav2's controller fails because the arc to the carrot is blocked, this one tries nearer carrots, then a slower
-    command, and then a rotation in place.
+    Nav2's controller fails if the arc to the carrot is blocked. This one tries nearer carrots, then a lower speed, and
+    then a rotation in place.
     """
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
@@ -82,9 +82,9 @@ class RegulatedPurePursuit(PathFollower):
         return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if all arcs are blocked and no rotation helps."""
         tracker = self._locate(pose)
-        is_reached = self._goal_rotation.reached(pose, twist, goal, tracker.remaining())
+        is_reached = self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining())
         if is_reached and self._is_car:
             command = STOP
         elif is_reached and self._spec.use_rotate_to_heading:
@@ -95,48 +95,49 @@ class RegulatedPurePursuit(PathFollower):
         return command
 
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command to the farthest carrot with a free arc, or else the arc that is free for the longest."""
-        lookahead_distance = self._lookahead_distance(twist.vx)
+        """Return the command to the farthest carrot with a free arc, or else on the arc that is free for longest."""
+        spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
         arcs: list[Arc] = []
         rotation: float | None = None
         escape_rotation: float | None = None
         for ratio in LOOKAHEAD_RATIOS:
-            if ratio < 1.0 and ratio * lookahead_distance < self._spec.min_lookahead_dist:
+            if ratio < 1.0 and ratio * lookahead_distance < spec.min_lookahead_dist:
                 break
             carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
-            curvature_carrot = (
-                self._curvature_carrot(tracker, pose) if self._spec.use_fixed_curvature_lookahead else carrot
-            )
-            backward = not tracker.forward or (self._spec.allow_reversing and carrot.x < 0.0)
+            curvature_carrot = carrot
+            if spec.use_fixed_curvature_lookahead:
+                beyond = spec.interpolate_curvature_after_goal
+                curvature_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, beyond)
+            backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
             if self._should_rotate(curvature_carrot, backward):
                 rotation = curvature_carrot.bearing(backward)
                 break
             command = self._drive(tracker, curvature_carrot, backward, pose, costmap)
             arc = self._checked_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
             if arc.free_time >= arc.horizon:
-                return self._slowed_for_moving(command, pose, costmap, arc.horizon)
+                return self._slow_down_for_moving(command, pose, costmap, arc.horizon)
             arcs.append(arc)
             if escape_rotation is None and self._is_straight_free(carrot, backward, command, pose, costmap):
                 escape_rotation = carrot.bearing(backward)
         if rotation is not None:
             return self._rotate(rotation, pose, twist, costmap)
         command, free_time, horizon = max(arcs, key=lambda arc: arc.free_time)
-        required = self._spec.max_allowed_time_to_collision_up_to_carrot
+        required = spec.max_allowed_time_to_collision_up_to_carrot
         try:
-            slowed = self._collision_checker.slowed(command, free_time, horizon, required)
+            slowed = self._collision_checker.slow_down(command, free_time, horizon, required)
         except NavigationFailure:
             if escape_rotation is None:
                 raise
             return self._rotate(escape_rotation, pose, twist, costmap)
-        return self._slowed_for_moving(slowed, pose, costmap, horizon)
+        return self._slow_down_for_moving(slowed, pose, costmap, horizon)
 
     def _is_straight_free(
         self, carrot: Carrot, backward: bool, command: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
         """Return whether the robot could drive straight to the carrot after a rotation in place.
 
-        That is often the only way out of a tight place. Only for round robots, because others come closer to obstacles
-        when they rotate.
+        That is often the only way out of a narrow space. Always False if the robot is not round, because its corners
+        come closer to obstacles when it rotates.
         """
         angle = carrot.bearing(backward)
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
@@ -145,25 +146,20 @@ class RegulatedPurePursuit(PathFollower):
         arc = self._checked_arc(Twist(command.vx, 0.0, 0.0), rotated, costmap, carrot.distance)
         return arc.free_time >= arc.horizon
 
-    def _curvature_carrot(self, tracker: PathTracker, pose: Pose2) -> Carrot:
-        """Return the point that determines the curvature with use_fixed_curvature_lookahead."""
-        spec = self._spec
-        return _carrot(tracker, pose, spec.curvature_lookahead_dist, spec.interpolate_curvature_after_goal)
-
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
         """Return the distance in m that must be free: to the carrot or, for a car, to the next cusp if it is nearer."""
         if not self._is_car:
             return carrot.distance
-        return min(carrot.distance, max(CUSP_REACHED_M, tracker.to_cusp()))
+        return min(carrot.distance, max(CUSP_REACHED_M, tracker.remaining_in_segment()))
 
     def _rotate(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command to rotate in place or, if there is no room for all of the rotation, to back out."""
+        """Return the command to rotate in place or, if there is no room for the whole rotation, to back out."""
         if not self._spec.use_collision_detection or self._rotation_clearance.has_room(angle, pose, costmap):
             return self._goal_rotation.turn(angle, twist)
-        back_out = self._rotation_clearance.back_out(pose, costmap)
-        if back_out is None:
+        command = self._rotation_clearance.backup_command(pose, costmap)
+        if command is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no room to turn, nor to back out")
-        return back_out
+        return command
 
     def _lookahead_distance(self, speed: float) -> float:
         spec = self._spec
@@ -204,7 +200,7 @@ class RegulatedPurePursuit(PathFollower):
 
     def _approach_speed(self, tracker: PathTracker, speed: float, pose: Pose2) -> float:
         """Return the speed near the end of the path or a cusp: scaled as in Nav2, and limited by the brakes."""
-        remaining, spec = tracker.to_cusp(), self._spec
+        remaining, spec = tracker.remaining_in_segment(), self._spec
         if remaining < spec.approach_velocity_scaling_dist:
             distance = _to_robot_frame(pose, *tracker.segment_end).distance
             scaled = speed * distance / spec.approach_velocity_scaling_dist
@@ -214,18 +210,17 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
     def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> Arc:
-        """Return the command with its free time; it must be free for `distance` m, but not longer than Nav2's limit."""
+        """Return the command with its free time. It has to be free for `distance` m, but at most for Nav2's limit."""
         max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:
             return Arc(command, max_time, max_time)
         horizon = min(max_time, distance / abs(command.vx)) if command.vx != 0.0 else max_time
         return Arc(command, self._collision_checker.free_time(costmap, pose, command, horizon), horizon)
 
-    def _slowed_for_moving(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
-        """Return the command, slowed if it would hit a moving obstacle."""
+    def _slow_down_for_moving(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
         if not self._spec.use_collision_detection:
             return command
-        return self._collision_checker.slowed_for_moving(command, costmap, pose, horizon)
+        return self._collision_checker.slow_down_for_moving(command, costmap, pose, horizon)
 
 
 def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
@@ -239,17 +234,17 @@ def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
 
 
 DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
-"""Fraction of the maximum deceleration used for planning, and delay before braking starts."""
+"""Fraction of the maximum deceleration that is planned for braking, and delay before braking starts."""
 SAMPLE_SPACING_M = 0.1
-"""Distance along the path between the points that are checked."""
+"""Distance between the points of the path ahead for which a speed is determined."""
 SPEED_PER_CLEARANCE_1_S = 10.0
-"""Speed allowed per meter of clearance next to the footprint, to react when the robot leaves the center of a gap."""
+"""Speed in m/s that each meter of clearance adds to the minimum, so that the robot can react in a narrow gap."""
 
 
 class SpeedRegulation:
-    """Regulates the speed by curvature and nearby obstacles, and brakes before bends and narrow passages.
+    """Regulates the speed (m/s) by curvature and nearby obstacles, also those farther ahead on the path.
 
-    Nav2's controller slows down in them; this one also takes the braking distance into account. Speeds are in m/s.
+    Nav2's controller slows down in bends and narrow passages, but does not brake before them.
     """
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
@@ -257,7 +252,7 @@ class SpeedRegulation:
         self._doubled_deceleration = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
 
     def for_distance(self, speed: float, distance: float) -> float:
-        """Return the speed with an obstacle `distance` m from the base: Nav2's, and less in narrow passages."""
+        """Return the speed with an obstacle `distance` m from the base: as in Nav2, but lower in narrow passages."""
         spec = self._spec
         if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
             return speed
@@ -268,14 +263,14 @@ class SpeedRegulation:
         return min(scaled, spec.regulated_linear_scaling_min_speed + SPEED_PER_CLEARANCE_1_S * clearance)
 
     def for_curvature(self, speed: float, curvature: float) -> float:
-        """Return the speed in a bend of this curvature in 1/m."""
+        """Return the speed for a bend with this curvature in 1/m."""
         ratio = abs(curvature) * self._spec.regulated_linear_scaling_min_radius
         return speed / ratio if self._spec.use_regulated_linear_velocity_scaling and ratio > 1.0 else speed
 
     def for_path_ahead(self, speed: float, regulated: float, tracker: PathTracker, costmap: CostmapView) -> float:
-        """Return the speed, at most `regulated`, from which the robot can brake for the path ahead.
+        """Return the speed, at most `regulated`, from which the robot can brake in time for the path ahead.
 
-        `speed` is the speed limit that applies at each point before it is regulated.
+        `speed` is the speed at points of the path where nothing requires regulation.
         """
         if not self._spec.slow_down_ahead:
             return regulated

@@ -1,4 +1,4 @@
-"""Global costmap for planning and local costmap for control, as in Nav2."""
+"""The global costmap for planning and the local costmap for control, as in Nav2, with their update schedules."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,7 @@ from simscen.stack.protocols import Surroundings
 MIN_LOCAL_SIZE_M = 3.0
 """Size of Nav2's local costmap, and the default minimum size of this one."""
 ZONE_TOLERANCE_M = 0.02
-"""Displacement of keepout zones in the odom frame above which the local costmap is updated with their new position."""
+"""Keepout zones are moved in the local costmap when their position in the odom frame has changed by more than this."""
 
 
 class Costmaps:
@@ -33,7 +33,7 @@ class Costmaps:
     ) -> None:
         """Create both costmaps.
 
-        `lookahead_distance` in m is how far the controller looks ahead; `latency` is the time of an update in ticks.
+        The local costmap contains at least `lookahead_distance` m ahead of the robot; an update takes `latency` ticks.
         """
         self.global_costmap = LayeredCostmap(spec.costmap, surroundings)
         local_spec = spec.local_costmap.with_defaults_from(spec.costmap)
@@ -50,16 +50,16 @@ class Costmaps:
         self._odom_from_map: Pose2 | None = None
         self._has_zones = False
         self.next: float = 0
-        """The tick of the next update."""
+        """The tick from which `update` has something to do."""
 
     def add_reading(self, reading: Scan | Image) -> None:
-        """Store a reading for the next update of each costmap."""
+        """Store a reading for the next update of each costmap; it replaces an earlier one of the same sensor."""
         for schedule in (self._global_schedule, self._local_schedule):
             schedule.readings[reading.sensor] = reading
 
-    def due(self, tick: int) -> bool:
+    def is_global_due(self, tick: int) -> bool:
         """Return whether it is time for an update of the global costmap."""
-        return self._global_schedule.due(tick)
+        return self._global_schedule.is_due(tick)
 
     def set_zones(self, zones: Zones) -> None:
         """Replace all keepout zones."""
@@ -67,7 +67,7 @@ class Costmaps:
         self.global_costmap.set_zones(zones)
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
-        """Update the costmaps that are due with the newest reading of each sensor, at the pose where it was taken."""
+        """Update the costmaps that are due with the newest reading of each sensor, at the pose of its time."""
         if tick >= self._global_schedule.next:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)
@@ -85,14 +85,13 @@ class Costmaps:
     def clear_around(self) -> None:
         """Clear both costmaps within the range of the local costmap (Nav2's ClearCostmapAroundRobot).
 
-        Obstacles that are farther away do not stop the controller, and without them the robot would drive into the same
-        dead end again.
+        Obstacles farther away do not stop the controller. Without them, the robot could plan into the same dead end.
         """
         self.global_costmap.clear(self._local_range)
         self.clear_local()
 
     def clear_local(self) -> None:
-        """Clear the local costmap, except for cells out of view of all lidars, which backing up relies on."""
+        """Clear the local costmap, except for cells that no lidar can see now: the robot may back up into them."""
         self.local_costmap.clear(unseen=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
@@ -104,7 +103,7 @@ class Costmaps:
         mask, previous = self._zones.masks.keepout, self._odom_from_map
         if not self._zones.keepout and mask is None and not self._has_zones:
             return
-        if previous is not None and frames.moved(previous, self._local_range) <= ZONE_TOLERANCE_M:
+        if previous is not None and frames.shift_since(previous, self._local_range) <= ZONE_TOLERANCE_M:
             return
         odom_from_map, self._has_zones = frames.odom_from_map, True
         self._odom_from_map = odom_from_map
@@ -114,7 +113,7 @@ class Costmaps:
 
 
 class _Update(NamedTuple):
-    """A reading, the pose of the robot when it was taken, and the frames when the update started."""
+    """A reading, the pose `base` of the robot at the time of the reading, and the frames at the start of the update."""
 
     base: Pose2
     reading: Scan | Image
@@ -122,25 +121,25 @@ class _Update(NamedTuple):
 
 
 class _UpdateSchedule:
-    """Update times of a costmap, and the readings for its next update."""
+    """Update times of one costmap, and the readings for its next update."""
 
     def __init__(self, period: int, latency: int) -> None:
         """Take the time between updates and the time that an update takes, in ticks."""
         self._period, self._updated_at = max(period, latency), -period
         self._updates = LatencyQueue[_Update](latency)
         self.next: float = 0
-        """The tick of the next update."""
+        """The tick of the next start or end of an update."""
         self.readings: dict[str, Scan | Image] = {}
 
-    def due(self, tick: int) -> bool:
+    def is_due(self, tick: int) -> bool:
         return tick - self._updated_at >= self._period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
-        """Return the updates that are complete at this tick, for a robot that is at `base` now.
+        """Start an update if it is due and there are readings. Return the updates that are complete at this tick.
 
-        Start an update if it is due and there is a reading.
+        `base` is the current pose of the robot in the frame of the costmap.
         """
-        if self.readings and self.due(tick):
+        if self.readings and self.is_due(tick):
             self._updated_at = tick
             for reading in self.readings.values():
                 if isinstance(reading, Image) or not _is_blind(reading):
@@ -154,6 +153,6 @@ class _UpdateSchedule:
 
 
 def _is_blind(scan: Scan) -> bool:
-    """Return whether all beams of a scan are invalid or too close, so that none measured free space or a hit."""
+    """Return whether all ranges of a scan are invalid or too short, so that it shows neither hits nor free space."""
     ranges, nearest = scan.ranges, scan.range_min
     return not len(ranges) or not (ranges.item(0) >= nearest or bool((ranges >= nearest).any()))

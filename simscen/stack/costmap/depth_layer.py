@@ -1,10 +1,10 @@
-"""Obstacles seen by a depth camera (Nav2's voxel layer, without voxels), and detection of sloping ground.
+"""Obstacles and ground seen by a depth camera (like Nav2's voxel layer, but without voxels).
 
-Each cell stores the height of the obstacle point. It is cleared when the camera sees through that point. Looking over
-a low box or below a table top therefore clears neither.
+Each obstacle cell stores the height of the observed point. The cell is cleared only when the camera sees through that
+point. Looking over a low box or below a table top therefore does not clear it.
 
-In each image column, the ground is followed from the robot upward. Points that rise no steeper than the configured
-slope are ground; steeper faces and edges are obstacles.
+Ground can be sloping. Each image column is traced from its lowest row upward: points that rise no steeper than the
+configured slope are ground; steeper faces and edges are obstacles.
 """
 
 import math
@@ -32,9 +32,12 @@ class DepthObservation(NamedTuple):
 
 
 def project_depth_image(
-    image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known: Mask
+    image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known_ground: Mask
 ) -> DepthObservation:
-    """Return what the camera sees from a robot at `base`; `known` are cells already detected as ground."""
+    """Return the obstacles and the ground that an image shows, taken by a robot at `base`.
+
+    `known_ground` (rows, columns) are the cells that earlier images showed as ground.
+    """
     across, up = _slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
     depth[~((depth <= spec.obstacle_max_range) & (depth > 0.0))] = np.nan
@@ -44,7 +47,7 @@ def project_depth_image(
     inside = frame.inside(cells) & np.isfinite(heights).reshape(-1)
     cells[~inside] = 0
     if spec.max_ground_slope > 0.0:
-        was_ground = (known[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
+        was_ground = (known_ground[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
         above, level = above_ground(away, heights, spec.max_ground_slope, spec.min_obstacle_height, was_ground)
     else:
         above, level = heights, np.zeros(heights.shape, dtype=bool)
@@ -59,7 +62,7 @@ def project_depth_image(
 def seen_through(
     cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
 ) -> Mask:
-    """Return which of the cells (n, 2) the camera sees through at their heights (n,), to something farther away."""
+    """Return whether the camera sees through cells (n, 2) at their heights (n,) in m to something farther away."""
     in_base = base.inverse().apply(frame.centers(cells))
     points = image.mount.inverse().apply(np.column_stack((in_base, heights.astype(np.float64))))
     is_ahead = points[:, 0] > 0.0
@@ -82,30 +85,28 @@ def _focal_length(columns: int, field_of_view: float) -> float:
 
 @lru_cache(maxsize=8)
 def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
-    """Return the offset of the ray of each pixel (rows, columns) to the left and up, in m per m of depth."""
+    """Return how far the ray of each pixel (rows, columns) goes to the left and up, in m per m of depth."""
     rows, columns = shape
     focal = _focal_length(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
     return np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape)
 
 
-Pixels = npt.NDArray[np.bool_]
 GROUND_STEP_M = 0.05
-"""Minimum distance in m between two ground points of a column; the slope to the next point starts at the last one."""
+"""Minimum horizontal distance between two points of a column from which a ground slope is computed."""
 MAX_RISE_RATIO = 1.0
-"""Rise per meter above which points belong to an upright face."""
+"""Rise in m per m above which points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
-"""The slope at the lowest visible point is measured over the number of image rows divided by this."""
+"""The slope at the lowest point of a column is measured over this fraction (one eighth) of the image rows."""
 
 
-def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
-    """Return the heights of points (rows, columns) above the ground in m, and which of them are ground.
+def above_ground(away: Array, heights: Array, slope: float, low: float, known: Mask) -> tuple[Array, Mask]:
+    """Return the heights in m above the ground of the points of an image (rows, columns), and which of them are ground.
 
-    away:     horizontal distances of the points from the camera, top row first
-    heights:  above the plane on which the robot stands; nan for pixels without a point
-    slope:    maximum angle of the ground in rad
-    low:      height in m; a column whose lowest point is higher begins on a step, not on ground, unless the slope at
-              that point leads down to the robot
+    away:     horizontal distances of the points from the camera in m, top row first
+    heights:  heights in m above the plane on which the robot stands; nan for pixels without a point
+    slope:    maximum slope angle of the ground in rad
+    low:      maximum height in m of ground at the lowest point of a column, unless its slope leads down to the robot
     known:    points on cells that earlier images showed as ground
     """
     max_rise, upright = math.tan(slope), _upright(away, heights)
@@ -124,31 +125,31 @@ def above_ground(away: Array, heights: Array, slope: float, low: float, known: P
     return above, level
 
 
-def _upright(away: Array, heights: Array) -> Pixels:
-    """Return which points belong to an upright face: the point in an adjacent row is nearly straight above or below."""
-    steep: Pixels = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
+def _upright(away: Array, heights: Array) -> Mask:
+    """Return which points belong to an upright face: they are steeply above or below the point in an adjacent row."""
+    steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
     upright[:-1] |= steep
     return upright
 
 
-def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixels:
-    """Return in which columns the lowest point is on a step whose edge the image does not show.
+def _on_a_step(away: Array, heights: Array, upright: Mask, low: float) -> Mask:
+    """Return in which columns the lowest point is on a step whose edge is below the image.
 
-    Such a point is higher than `low`, and is on an upright face, or the slope there, extended down to the robot, ends
-    higher than `low`.
+    Such a point is higher than `low`. Besides, it is on an upright face, or the slope at this point, extended to the
+    robot, ends higher than `low`.
     """
     rows, columns = heights.shape
     all_columns, lowest = np.arange(columns), _lowest(heights)
     upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)
     r, z = away[lowest, all_columns], heights[lowest, all_columns]
     rise = (heights[upper, all_columns] - z) / np.maximum(away[upper, all_columns] - r, GROUND_STEP_M)
-    step: Pixels = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
+    step: Mask = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
     return step
 
 
 def _lowest(heights: Array) -> npt.NDArray[np.intp]:
-    """Return the lowest row with a point in each column, or the last row."""
+    """Return the lowest row with a point for each column, or the last row if it has no point."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

@@ -10,16 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 ROWS_PER_BLOCK = 64
-"""Number of rows that are processed at once."""
+"""Number of rows of a block of `squared_distance_blocks`."""
 MAX_INT32_EDGE_CELLS = 30_000
 """Longest edge of a grid for which squared distances fit into 32 bits."""
 
 MAX_REACH_CELLS = 180
-"""Longest distance for which the sum of two squares fits into 16 bits."""
+"""Largest supported `reach` in cells: the sum of two squares must fit into 16 bits."""
 OUT_OF_REACH = 65535
-"""A value larger than any squared distance in 16 bits."""
+"""Value for cells beyond the maximum distance, larger than any squared distance within it."""
 MAX_COMPARED_CELLS = 60
-"""Longest distance up to which comparing neighbors is faster than scipy's transform."""
+"""Maximum distance in cells up to which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
 """Number of values that are compared at once: about the size of a processor cache."""
 
@@ -36,13 +36,13 @@ def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squar
 
 
 class SquaredDistanceTransform:
-    """The same transform for several grids of one shape, with its buffers allocated once.
+    """Transform of `squared_distances_within` for several grids of the same shape, with buffers allocated once.
 
-    It is separable: first the nearest marked cell in each row, then the minimum over the rows.
+    It is separable: it computes first the distance to the nearest marked cell in each row, then minima over the rows.
     """
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:
-        """Allocate buffers for grids of a shape (rows, columns). `reuse`: optimize for more than one grid."""
+        """Allocate buffers for grids of a shape (rows, columns). `reuse` optimizes for more than one grid."""
         self._reach, self._beyond = reach, reach * reach + 1
         if reach > MAX_COMPARED_CELLS:
             return
@@ -75,7 +75,7 @@ class SquaredDistanceTransform:
 
 
 class _AxisPass:
-    """One pass along the rows axis: minimum over all offsets up to `reach` of a value plus the squared offset."""
+    """One pass along the first axis: each result is the minimum of value + offset² over all offsets up to `reach`."""
 
     def __init__(self, height: int, width: int, reach: int, buffer: Squares, reuse: bool) -> None:
         padded = np.full((height + 2 * reach, width), reach * reach + 1, dtype=np.uint16)

@@ -1,4 +1,4 @@
-"""Grid geometry of a costmap: the position of its cells, and the window of a rolling costmap."""
+"""Grid geometry of a costmap: positions of its cells, and when and how the window of a rolling costmap moves."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ MAX_CACHED_CELLS = 10_000
 
 @dataclass(frozen=True)
 class GridFrame:
-    """An unrotated grid: `origin` is the corner of cell (0, 0) in the map frame, `shape` is (rows, columns)."""
+    """An unrotated grid in the frame of its costmap: `origin` is the corner of cell (0, 0), `shape` (rows, columns)."""
 
     origin: tuple[float, float]
     resolution: float
@@ -50,9 +50,9 @@ class GridFrame:
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
     def indices_of(self, points: Plane, center: complex, reach: float) -> CellIndices:
-        """Return the flat indices of the cells at those points (n,) that are on the grid.
+        """Return the flat indices of the cells at those of the points x + iy (n,) that are on the grid.
 
-        All points are within `reach` m of `center`. If that circle is on the grid, single points are not checked.
+        All points must be within `reach` m of `center`. If this circle is on the grid, single points are not checked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
@@ -74,11 +74,11 @@ class GridFrame:
 
     @cached_property
     def _index_factors(self) -> CellIndices:
-        """Factors of the column and row of a cell in its flat index."""
+        """Factors by which (column, row) of a cell are multiplied in its flat index."""
         return np.array((1, self.shape[1]))
 
     def points(self, indices: CellIndices) -> Plane:
-        """Return the centers x + iy (n,) of cells."""
+        """Return the centers x + iy (n,) of the cells with these flat indices (n,)."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
             return _cell_centers(indices, columns, self.resolution, corner)
@@ -87,7 +87,7 @@ class GridFrame:
         return points
 
     def extent(self, indices: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Return the lowest and the highest row and column of at least one cell."""
+        """Return the lowest (row, column) and the highest (row, column) of cells; at least one is required."""
         width = self.shape[1]
         first, last, columns = int(_minimum(indices)), int(_maximum(indices)), indices % width
         return (first // width, int(_minimum(columns))), (last // width, int(_maximum(columns)))
@@ -98,7 +98,7 @@ class GridFrame:
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
     def from_window(self, window: tuple[slice, slice], indices: CellIndices) -> CellIndices:
-        """Return the flat indices in the grid of cells with these flat indices in a window."""
+        """Return the flat indices in the grid of cells that are given by their flat indices in a window."""
         (rows, columns), width = window, self.shape[1]
         window_width = max(1, columns.stop - columns.start)
         cells: CellIndices = (
@@ -107,7 +107,10 @@ class GridFrame:
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
-        """Return the cells from `low` to `high` (inclusive) with `margin` more on each side, clipped to the grid."""
+        """Return the window (rows, columns) from cell `low` to cell `high`, with `margin` more cells on each side.
+
+        The window is clipped to the grid.
+        """
         return (
             slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
             slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
@@ -115,7 +118,7 @@ class GridFrame:
 
 
 def _cell_centers(indices: CellIndices, columns: int, size: float, corner: complex = 0j) -> Plane:
-    """Return the centers x + iy (n,) of cells with size `size` in m of a grid with this corner."""
+    """Return the centers x + iy (n,) of cells of `size` m in a grid with this number of columns and corner."""
     up, across = np.divmod(indices, columns)
     centers: Plane = up * (1j * size) + (across * size + (corner + (0.5 + 0.5j) * size))
     return centers
@@ -130,23 +133,22 @@ def _all_cell_centers(shape: tuple[int, int], size: float) -> Plane:
 Cell = TypeVar("Cell", bound=np.generic)
 
 GOAL_EDGE_MARGIN_M = 0.6
-"""Distance inside the edge of the window of the intermediate goal for a goal beyond it."""
+"""If the goal is outside the window, the plan ends this far inside the edge."""
 ROLL_RATIO = 1 / 8
-"""A window is moved when the distance of the robot from its center exceeds this ratio of its size."""
+"""A window is moved when the distance of the robot from its center exceeds this fraction of its size."""
 MAX_ROLL_OFFSET_M = 0.25
-"""Distance of the robot from the center after which a local costmap is moved at the latest. Nav2 moves it at each
-update."""
+"""Largest distance of the robot from the center of a local costmap before it is moved (in Nav2, at each update)."""
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:
-    """Return a window of this size in m around a point, aligned with a fixed grid in the plane."""
+    """Return a window of this size (x, y) in m around a point, whose cells align with those of all other windows."""
     columns, rows = (math.ceil(length / resolution) for length in size)
     column, row = round(center.x / resolution) - columns // 2, round(center.y / resolution) - rows // 2
     return GridFrame((column * resolution, row * resolution), resolution, (rows, columns))
 
 
 def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> bool:
-    """Return whether the robot is so far from the center that the window should follow, at most `max_offset` m."""
+    """Return whether the robot is farther from the center than ROLL_RATIO of the size, or than `max_offset` m."""
     rows, columns = frame.shape
     across, up = columns * frame.resolution, rows * frame.resolution
     offset = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)
@@ -154,7 +156,7 @@ def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> 
 
 
 def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, fill: float) -> npt.NDArray[Cell]:
-    """Return the layer copied to another window of the same size; cells without a source get the value `fill`."""
+    """Return a copy of the layer for another window of the same size; cells new in this window get the value `fill`."""
     shifted = np.full(after.shape, fill, dtype=layer.dtype)
     steps = [round((after.origin[axis] - before.origin[axis]) / after.resolution) for axis in (1, 0)]
     remaining = [_remaining(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
@@ -164,13 +166,13 @@ def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, f
 
 
 def _remaining(step: int, cells: int) -> tuple[int, int]:
-    """Return the first and one past the last of the cells in a row that remain after a shift by `step`."""
+    """Return the range (first, end) of the cells along an axis that remain in the window after a shift by `step`."""
     first = min(max(0, step), cells)
     return first, max(first, min(cells, cells + step))
 
 
 def clip_goal(frame: GridFrame, start: Pose2, goal: Pose2) -> Pose2:
-    """Return the goal; if it is beyond the window, the point of the straight line to it just inside the edge."""
+    """Return the goal; if it is outside the window, a point inside on the straight line from the start to the goal."""
     if frame.covers(goal.x, goal.y):
         return goal
     across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution

@@ -1,4 +1,4 @@
-"""Layered costmap: static map and live obstacles, inflated, and updated incrementally where cells changed."""
+"""Layered costmap: static map and live obstacles (those seen by sensors), inflated, and updated where cells changed."""
 
 import math
 from collections import deque
@@ -48,23 +48,22 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 DISTANCE_MARGIN_M = 0.5
-"""Margin beyond the hull up to which distances are computed; the inflation radius if that is larger."""
+"""Distances are computed up to this far beyond the circumscribed radius, or up to the inflation radius if larger."""
 SCANS_PER_UNKNOWN_UPDATE = 5
-"""Every n-th scan updates the unknown cells: once per second at the default rate, as Nav2's global costmap. A map can
-have many unknown cells, and driving does not depend on them."""
+"""Unknown cells are updated with every n-th scan: once per second at the default rate, like Nav2's global costmap. A
+map can have many unknown cells, and driving does not depend on them."""
 MAX_REVISIONS = 16
-"""Number of latest revisions whose changes are stored."""
+"""Number of revisions for which the changed cells are stored."""
 
 
 class LayeredCostmap:
-    """Costs and distances of the cells, available as `view`.
+    """Costs of the cells and their distances to the nearest obstacle, available as `view`.
 
-    The distance field of the static map is computed once. A scan changes few cells, so that distances to live obstacles
-    are only recomputed around these. For this, distances are limited to the inflation radius, or to half a meter beyond
-    the hull if that is more; larger distances are not needed.
+    Distances to the static map are computed once. A scan changes few cells, and distances to live obstacles are only
+    recomputed around these. This works because distances are cut off (see DISTANCE_MARGIN_M).
 
-    Without a map, the costmap is a window of `size` m along x and y that rolls with the robot. Its frame, map or odom,
-    is that of the poses passed to `update`.
+    Without a map, the costmap is a window of `size` (x, y) in m that rolls with the robot, see `should_roll` for
+    `max_offset`. Its frame, map or odom, is that of the poses passed to `update`.
     """
 
     def __init__(
@@ -89,7 +88,7 @@ class LayeredCostmap:
         self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
         self.moving = NO_MOVING_OBSTACLES
         """Moving obstacles in the frame of the costmap, included in the view."""
-        layer = self._initial_layer(Pose2(0.0, 0.0))
+        layer = self._static_layer_in(window_around(Pose2(0.0, 0.0), self._size, spec.resolution))
         self._frame: GridFrame = layer.frame
         self._live = ObstacleLayer(spec, self._inscribed, layer.frame)
         self._set_static_layer(layer)
@@ -112,7 +111,7 @@ class LayeredCostmap:
     def view(self) -> CostmapView:
         """The current costmap. Its arrays are shared with this object and valid until the next update.
 
-        Changes by updates are computed here, once for all updates since the last access.
+        Costs and distances are computed here, once for all updates since the last access.
         """
         if self._changed is not None:
             self.refresh(*self._changed)
@@ -129,10 +128,7 @@ class LayeredCostmap:
         return self._revision
 
     def changed_near(self, revision: int, points: Plane, distance: float) -> bool:
-        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision.
-
-        If not, their distances from obstacles are the same, and the view does not have to be computed.
-        """
+        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision."""
         count = self._revision - revision
         if count > len(self._changes):
             return True
@@ -149,7 +145,7 @@ class LayeredCostmap:
         return self._live.count + self._keepout_change
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
-        """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
+        """Clear the cells that a sensor sees through, then mark its obstacles. `base`: robot pose of the reading."""
         if self._rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
         self._latest_readings[reading.sensor] = (base, reading)
@@ -163,10 +159,10 @@ class LayeredCostmap:
             self._update_unknown(base, reading)
 
     def clear(self, clear_within: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
-        """Clear the live obstacles within a distance in m of the robot along x and y, except those in current readings.
+        """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
 
-        As Nav2's ClearEntireCostmap or ClearCostmapAroundRobot. Obstacles up to `unseen` m beyond the hull that no
-        lidar can see are not cleared: they may still be there, and the robot may back up next.
+        Obstacles up to `unseen` m beyond the circumscribed radius that no lidar can see are kept, since they may still
+        be there and the robot may back up next. Otherwise like Nav2's ClearEntireCostmap and ClearCostmapAroundRobot.
         """
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
@@ -194,7 +190,7 @@ class LayeredCostmap:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the pose is not in a mapped wall, and the inscribed circle fits within `tolerance` m of it."""
+        """Return whether the pose is not in a mapped wall and the inscribed circle fits within `tolerance` m of it."""
         center = self._frame.cell(pose.x, pose.y)
         if self._static_squared[center] == 0:
             return False
@@ -203,8 +199,8 @@ class LayeredCostmap:
         points = self._frame.centers(np.argwhere(fits) + np.array((window[0].start, window[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
-    def aim(self, start: Pose2, goal: Pose2) -> Pose2:
-        """Return the goal; if it is outside a rolling window, a point inside in the direction of the goal."""
+    def goal_in_window(self, start: Pose2, goal: Pose2) -> Pose2:
+        """Return the goal, or a point toward it inside the rolling window if the goal is outside (see `clip_goal`)."""
         return clip_goal(self._frame, start, goal) if self._rolling else goal
 
     def _roll(self, base: Pose2) -> None:
@@ -218,11 +214,8 @@ class LayeredCostmap:
             self._unknown = shift_layer(self._unknown, before, window, True)
         self._mark_changed(*self._whole)
 
-    def _initial_layer(self, center: Pose2) -> StaticLayer:
-        return self._static_layer_in(window_around(center, self._size, self._spec.resolution))
-
     def _static_layer_in(self, window: GridFrame) -> StaticLayer:
-        """Return the static layer in this window, or on the map if there is one."""
+        """Return the static layer of the map, or of this window if there is no map."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
         unknown, threshold = self._tracks_unknown, self._spec.lethal_cost_threshold
         if grid is None:
@@ -250,7 +243,10 @@ class LayeredCostmap:
         self._has_walls = bool(layer.lethal.any())
 
     def _recompute(self, costs: Costs | None = None) -> None:
-        """Recompute all costs and distances. `costs` are those of the static layer if they are known."""
+        """Reset costs and distances to the static layer; live obstacles follow with the next view.
+
+        `costs` are the costs of the static layer if they are already computed.
+        """
         if costs is None:
             costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks_unknown else None)
         self._costs = costs
@@ -268,7 +264,7 @@ class LayeredCostmap:
         return remove_small_groups(marked, self._static_squared[window] == 0, self._spec.denoise_layer)
 
     def _update_unknown(self, base: Pose2, scan: Scan) -> None:
-        """Mark unknown cells that beams cross as known."""
+        """Mark unknown cells that beams cross as known, with every n-th scan."""
         self._scans += 1
         if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
@@ -290,7 +286,7 @@ class LayeredCostmap:
             self._mark_changed((top, left), (bottom, right))
 
     def _mark_changed(self, low: tuple[int, int], high: tuple[int, int], cells: CellIndices | None = None) -> None:
-        """Mark cells from `low` to `high` as changed. `cells` contains all whose obstacles changed, if known."""
+        """Mark the cells from `low` to `high` as changed, as a new revision with `cells` (see `_add_revision`)."""
         if self._changed is not None:
             before_low, before_high = self._changed
             low = min(low[0], before_low[0]), min(low[1], before_low[1])
@@ -299,7 +295,7 @@ class LayeredCostmap:
         self._add_revision(cells)
 
     def _add_revision(self, cells: CellIndices | None) -> None:
-        """Add a revision in which obstacles in these cells changed; None if it could be any cells."""
+        """Add a revision in which obstacles changed only in these cells, or possibly in any cell if None."""
         self._revision += 1
         self._changes.append(cells)
 
@@ -340,19 +336,19 @@ class LayeredCostmap:
 
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
-    """Return the largest distance from obstacles that is computed, in m."""
+    """Return the distance in m at which distances from obstacles are cut off."""
     return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
 
 
 def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
-    """Compute the costs of a map in advance, for a robot without keepout zones."""
+    """Compute and cache the costs of a map without keepout zones, before runs are forked."""
     tables, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
     _costs(grid, tables, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
 
 
 @cached_on_instance
 def _costs(grid: OccupancyGrid, tables: Inflation, threshold: int, margin: int, tracks_unknown: bool) -> Costs:
-    """Return the costs of the cells of a map without zones and readings, computed once for all runs."""
+    """Return the costs of a map without zones and live obstacles, computed once for all runs."""
     unknown = layer_without_zones(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
     return tables.costs(static_distances(grid, threshold, margin), unknown)
 

@@ -1,7 +1,7 @@
-"""Layers and filters of a costmap: static map with keepout zones, inflation, and speed limits by position.
+"""Static layer (map and keepout zones) and inflation of a costmap, and the speed filter.
 
 Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost. The
-largest one, OUT_OF_REACH, is that of 256 cells (12.8 m at 5 cm) and more.
+largest value, OUT_OF_REACH, stands for 256 cells (12.8 m at 5 cm) and more.
 """
 
 from dataclasses import dataclass
@@ -48,15 +48,15 @@ def squared_distances(lethal: npt.NDArray[np.bool_], reach_cells: int) -> Square
 
 @lru_cache(maxsize=8)
 def shared_inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach_m: float) -> "Inflation":
-    """Return the cached lookup tables, which both costmaps of a robot and all its runs share."""
+    """Return the cached lookup tables with these arguments of Inflation, for both costmaps and all runs of a robot."""
     return Inflation(resolution, inscribed, radius, scaling, reach_m)
 
 
 class Inflation:
-    """Tables over squared cell distances: `meters` and nav2's exponential `cost`.
+    """Lookup tables by squared distance in cells: `meters` for the distance in m, `cost` for Nav2's inflated cost.
 
     cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
-    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Distances beyond `reach_m` are given as `reach_m`.
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). `meters` is at most `reach_m`.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Inflation:
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
     def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
-        """Return the costs of cells. `unknown` cells stay unknown, except within the inscribed radius of obstacles."""
+        """Return the costs of cells with these distances. `unknown` cells stay unknown unless inscribed or lethal."""
         cost = self.cost.take(squared)
         if unknown is not None:
             cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
@@ -99,8 +99,8 @@ def static_layer(
 ) -> StaticLayer:
     """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
 
-    Cells with an occupancy of at least `threshold` percent are lethal. Without `track_unknown`, unknown cells are
-    free, as in Nav2.
+    Cells are lethal if their occupancy is at least `threshold` percent, or if `keepout` or the keepout `mask` covers
+    them. Without `track_unknown`, unknown cells are free, as in Nav2.
     """
     if abs(grid.origin.yaw) < 1e-9:
         frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -127,9 +127,9 @@ def static_distances(grid: OccupancyGrid, threshold: int, reach_cells: int) -> S
 def empty_layer(
     frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, track_unknown: bool = False
 ) -> StaticLayer:
-    """Return the layer of a robot without a map: only keepout zones and masks.
+    """Return the static layer without a map: only `keepout` and the keepout `mask` are lethal.
 
-    All other cells are unknown with `track_unknown`, and free without.
+    All other cells are unknown with `track_unknown`, otherwise free.
     """
     return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, track_unknown))
 
@@ -137,17 +137,12 @@ def empty_layer(
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
-        lethal |= inside_polygon(frame, polygon)
+        lethal |= points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
     if mask is not None:
         columns = np.arange(frame.shape[1])
         for row in range(frame.shape[0]):
             lethal[row] |= in_keepout_mask(mask, frame.centers(np.column_stack((np.full_like(columns, row), columns))))
     return lethal
-
-
-def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
-    """Return the cells whose center is inside the polygon (even-odd rule)."""
-    return points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
 
 
 def _all_centers(frame: GridFrame) -> Array:
@@ -168,17 +163,17 @@ class SpeedFilter:
     """Speed limit at a position, from the current speed zones and speed mask."""
 
     def __init__(self, surroundings: Surroundings) -> None:
-        """Start with the zones and the mask that the stack was configured with."""
+        """Take the initial zones and the initial mask."""
         self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
-        self.used = bool(self._zones) or self._mask is not None
-        """Whether there is or was a speed limit."""
+        self.is_used = bool(self._zones) or self._mask is not None
+        """Whether there is or was a zone or a mask."""
 
     def set_zones(self, zones: Zones) -> None:
         """Replace all zones and masks."""
-        self._zones, self._mask, self.used = zones.speed, zones.masks.speed, True
+        self._zones, self._mask, self.is_used = zones.speed, zones.masks.speed, True
 
     def limit(self, pose: Pose2, full_speed: float) -> float | None:
-        """Return the lowest limit in m/s at a pose, or None. `full_speed` is the controller's speed without limits."""
+        """Return the lowest limit in m/s at a pose; None without a limit. Masks can be relative to `full_speed`."""
         limits = [limit for polygon, limit in self._zones if distance_to_polygon(pose, polygon) == 0.0]
         masked = self._mask.at(pose, full_speed) if self._mask is not None else None
         return min(limits if masked is None else [*limits, masked], default=None)

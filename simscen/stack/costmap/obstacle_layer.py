@@ -1,7 +1,7 @@
-"""Obstacles measured by lidars: nav2_costmap_2d's obstacle layer, without a loop over beams or cells.
+"""Obstacle layer: cells marked and cleared by lidars and depth cameras (nav2_costmap_2d), without loops over beams.
 
-Nav2 traces every beam through the grid. Here, only marked cells are checked for beams that pass through them, which has
-the same result for a hundredth of the cells.
+Nav2 traces every beam through the grid. Here, only marked cells are checked for beams that cross them, which has the
+same result with a hundredth of the cells.
 """
 
 import cmath
@@ -22,18 +22,18 @@ from simscen.stack.costmap.layers import Mask, Squared
 from simscen.stack.localizers.beams import Plane, directions
 
 RANGE_TOLERANCE_M = 1e-9
-"""Margin before the end of the free part of a beam, within which cells are tested exactly."""
+"""Rounding margin at the end of the free part of a beam, within which the quick test does not count."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScanWithMovingHits(Scan):
-    """Scan with a mask `moving` (n,) of beams that hit moving obstacles. Their hits clear cells but do not mark any."""
+    """Scan with a mask `moving` (n,) of beams that hit moving obstacles. Such beams clear cells but do not mark any."""
 
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
 def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
-    """Return the hits x + iy (n,) of static obstacles `nearest` to `farthest` m away, and the position of the lidar."""
+    """Return the hits x + iy (n,) on static obstacles `nearest` to `farthest` m away, and the position of the lidar."""
     lidar = _lidar_position(scan, base)
     points: Plane = _hit_offsets(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
     points += lidar
@@ -42,7 +42,7 @@ def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tupl
 
 @lru_cache(maxsize=2)
 def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> Plane:
-    """Return the hits x + iy (n,) relative to the lidar, rotated like the base. Cached for the second costmap."""
+    """Return the hits x + iy (n,) relative to the lidar, in the orientation of the base. Cached for both costmaps."""
     ranges = scan.ranges
     is_valid = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanWithMovingHits):
@@ -53,15 +53,15 @@ def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> Plane:
 
 
 def _lidar_position(scan: Scan, base: Pose2) -> complex:
-    """Return the position of the lidar in the map, x + iy."""
+    """Return the position of the lidar, x + iy, in the frame of the pose `base`."""
     return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
 @lru_cache(maxsize=4)
 def _free_lengths(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
-    """Return the length in m of each beam (n,) that is free: up to its hit, at most `farthest`.
+    """Return the length in m of the free part of each beam (n,): up to its hit, at most `farthest`.
 
-    It is 0 for invalid and too close ranges, and for beams without a hit unless `inf_is_valid`.
+    It is 0 for invalid and too short ranges. Without `inf_is_valid`, it is also 0 for beams without a hit.
     """
     ranges = scan.ranges
     lengths = np.where(ranges > scan.range_max, np.inf if inf_is_valid else 0.0, ranges)
@@ -80,11 +80,11 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 def crossed_cells(
     points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[CellIndices, float]:
-    """Return the indices of the cells with centers x + iy (n,) that a beam crosses before its hit.
+    """Return which of the cells with centers x + iy (n,) a beam crosses before its hit, as indices into `points`.
 
-    Also return the distance in m of the nearest center from the lidar; there must be at least one. A line crosses a
-    square of half-width h if its distance from the center is at most h (|cos| + |sin|). Each cell is tested against the
-    beam nearest to its center, which crosses it if any does.
+    Also return the distance in m of the nearest center from the lidar. At least one cell is required. Each cell is
+    tested only against the beam nearest to its center: if any beam crosses the cell, this one does. A line crosses a
+    square of half-width h if its distance from the center is at most h (|cos| + |sin|).
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
     relative = points - _lidar_position(scan, base)
@@ -115,9 +115,9 @@ def crossed_cells(
 
 
 def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndices, Array]:
-    """Return the beams nearest to directions (n,) relative to the first beam, and their values of `values`.
+    """Return the indices of the beams nearest to directions (n,) relative to the first beam, and their `values`.
 
-    The value is nan where there is no beam.
+    The value is nan for directions outside the field of view.
     """
     step, count = scan.angle_increment, len(values)
     beams_per_turn = round(2 * math.pi / abs(step))
@@ -132,15 +132,16 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
 
 
 MAX_WALL_SQUARED_CELLS = 2
-"""Hits within one cell (squared distance 2) of a mapped wall are the wall itself and are not marked."""
+"""Hits within one cell of a mapped wall (squared distance 2) are hits of the wall itself and are not marked."""
 NO_CELLS: CellIndices = np.zeros(0, dtype=np.int64)
 EMPTY_MASK: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
+"""Rows and columns of a part of the grid."""
 WHOLE_GRID: Window = slice(None), slice(None)
 
 
 class ObstacleLayer:
-    """Marks of live obstacles. Lidars and depth cameras do not clear each other's marks."""
+    """Cells marked as live obstacles. Lidars and depth cameras do not clear each other's marks."""
 
     def __init__(self, spec: CostmapSpec, inscribed: float, frame: GridFrame) -> None:
         self._spec, self._inscribed = spec, inscribed
@@ -149,7 +150,7 @@ class ObstacleLayer:
         self.reset(frame)
 
     def reset(self, frame: GridFrame) -> None:
-        """Remove all marks, and use a grid."""
+        """Remove all marks, and use this grid from now on."""
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         self._heights: Heights | None = None
@@ -166,7 +167,10 @@ class ObstacleLayer:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
-        """Return the cells within `meters` of the robot that are marked by a lidar but out of view in these scans."""
+        """Return the cells (n, 2) within `meters` along x and y that a lidar marked but that no scan has in view.
+
+        `scans` contains (pose of the robot, scan).
+        """
         center = self._frame.cell(base.x, base.y)
         window = self._frame.window(center, center, math.ceil(meters / self._frame.resolution))
         cells: Cells = np.argwhere(self._scanned[window]) + np.array((window[0].start, window[1].start))
@@ -180,7 +184,7 @@ class ObstacleLayer:
         self._marked = np.flatnonzero(self._scanned)
 
     def roll(self, frame: GridFrame) -> None:
-        """Move to another window, with the marks that are in both."""
+        """Use another window of the same size, and keep the marks that are in both."""
         before, self._frame = self._frame, frame
         self._scanned = shift_layer(self._scanned, before, frame, False)
         self._marked = np.flatnonzero(self._scanned)
@@ -189,7 +193,7 @@ class ObstacleLayer:
             self._ground = shift_layer(self._ground, before, frame, False)
 
     def marked(self, window: Window = WHOLE_GRID) -> Mask:
-        """Return the cells with a live obstacle."""
+        """Return which cells of a window have a live obstacle."""
         if self._heights is None:
             return self._scanned[window]
         marked: Mask = self._scanned[window] | ~np.isnan(self._heights[window])
@@ -206,9 +210,9 @@ class ObstacleLayer:
         return len(set(self._marked.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
 
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> CellIndices:
-        """Clear the cells that beams cross, then mark their hits. Return the changed cells.
+        """Clear the cells that beams cross, then mark the hits of the beams. Return the changed cells.
 
-        `walls` are the squared distances to mapped walls; None if there are none.
+        `walls` (rows, columns) are the squared distances in cells to mapped walls; None if there are no walls.
         """
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
         points, lidar = hit_points(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
@@ -271,7 +275,7 @@ class ObstacleLayer:
         return np.concatenate((marked[is_cleared], cells))
 
     def window_around_robot(self, base: Pose2, mount: float) -> Window:
-        """Return the cells in range of a sensor that is mounted `mount` m from the base."""
+        """Return the cells in range of a sensor that is mounted `mount` m away from the origin of the base."""
         center = self._frame.cell(base.x, base.y)
         reach = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
         return self._frame.window(center, center, math.ceil(reach / self._frame.resolution) + 1)
@@ -290,7 +294,7 @@ def _set(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:
 
 
 def remove_small_groups(marked: Mask, walls: Mask, spec: DenoiseLayer) -> Mask:
-    """Return the marked cells (rows, columns) without groups smaller than `minimal_group_size`.
+    """Return the marked cells (rows, columns) without connected groups smaller than `minimal_group_size`.
 
     Cells of walls count as members of a group, but are not returned.
     """

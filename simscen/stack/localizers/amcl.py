@@ -1,4 +1,4 @@
-"""AMCL as a localizer: when scans update the particle filter, and the pose in between (nav2_amcl's amcl_node.cpp)."""
+"""AMCL localizer: updates the particle filter with scans, and moves the pose by odometry in between (nav2_amcl)."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,17 +13,17 @@ from simscen.model.localizers import AmclParameters
 from simscen.stack.frames import OdometryHistory
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
-from simscen.stack.localizers.particles import spread, summarize
+from simscen.stack.localizers.particles import covariance_about, summarize
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """The filter's newest estimate.
+    """Estimate after the latest update of the filter.
 
-    pose:        map_from_base at the time of the scan
-    covariance:  of the pose, (3, 3) over x, y, yaw
+    pose:        map_from_base at the time of the update
+    covariance:  (3, 3) of x, y, yaw of the pose
     odometry:    odom_from_base at the same time
-    tick:        of the newest scan that the estimate is based on
+    tick:        tick of the newest scan that the estimate is based on
     """
 
     pose: Pose2
@@ -33,7 +33,7 @@ class Correction:
 
     @cached_property
     def base_from_odom(self) -> Pose2:
-        """The odom frame as seen from the base at the time of the scan."""
+        """Pose of the odom frame in the base frame at the time of the update."""
         return self.odometry.inverse()
 
     @cached_property
@@ -45,12 +45,12 @@ class Correction:
 class AmclLocalizer:
     """Adaptive Monte Carlo localization on an occupancy grid.
 
-    The first scan of each lidar updates the filter. After that, a scan updates it when the robot has moved by
-    `update_min_d` or turned by `update_min_a` since the last update. A scan that arrives before the odometry of its own
-    tick waits for it, as tf2's message filter makes it wait. Between updates map→odom is constant: odometry moves the
-    pose, and the motion model increases the covariance.
+    The first scan of each lidar updates the filter. A later scan updates it if the robot has moved by `update_min_d` or
+    turned by `update_min_a` since the last update. A scan that arrives before the odometry of its tick has to wait, as
+    with tf2's message filter. Between updates, the transform from map to odom is constant: odometry moves the pose, and
+    the motion model increases the covariance.
 
-    Subclasses may override `reset`, `_correct` and `_propagated_covariance`.
+    Subclasses may override `reset`, `_correct`, and `_propagated_covariance`.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class AmclLocalizer:
     def reset(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
         self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
-        self._filter.begin(estimate)
+        self._filter.reset(estimate)
         self._initial_estimate = estimate
         self.__dict__.pop("_correction", None)
         self._last_update: Pose2 | None = None  # odometry at the last filter update
@@ -73,7 +73,7 @@ class AmclLocalizer:
 
     @cached_property
     def _correction(self) -> Correction:
-        """The newest correction; at first, the initial estimate. Computed lazily because global clusters take 4 ms."""
+        """The latest correction; initially computed from the initial estimate, and only if it is needed."""
         initial = self._initial_estimate
         if initial.pose is None:
             pose, covariance = summarize(self._filter.particles)
@@ -82,7 +82,7 @@ class AmclLocalizer:
         return Correction(pose, covariance, Pose2(0, 0, 0), 0)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Store the odometry, and use the scans that waited for it."""
+        """Store the odometry, and process the scans that waited for it."""
         if not self._odometry.add(odometry.tick, odometry.pose):
             return
         if not self._has_odometry:
@@ -102,7 +102,7 @@ class AmclLocalizer:
             self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
 
     def on_imu(self, imu: Imu) -> None:
-        """Ignore the IMU: AMCL predicts with odometry only, which an EKF may have fused."""
+        """Ignore the reading. AMCL predicts with odometry only, which an EKF may have fused with the IMU."""
 
     @property
     def belief(self) -> Belief:
@@ -116,11 +116,11 @@ class AmclLocalizer:
 
     @property
     def pose(self) -> Pose2:
-        """The pose of the belief, without the cost of its covariance."""
+        """The pose of the belief. Faster than `belief`, because it needs no covariance."""
         return self._correction.map_from_odom.compose(self._odometry.now)
 
     def _process(self, scan: Scan) -> None:
-        """Update the filter if the lidar of this scan is due. Enough motion makes every lidar due once."""
+        """Update the filter if an update by this lidar is due. Enough motion makes one update by each lidar due."""
         odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return
@@ -134,7 +134,7 @@ class AmclLocalizer:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by `delta`, the odometry since the last update (None at first), and weigh them."""
+        """Move the particles by `delta`, the odometry since the last update (None at first), and weight them."""
         if delta is not None:
             self._filter.move(delta)
         self._mark_updated(scan, odometry)
@@ -144,7 +144,7 @@ class AmclLocalizer:
         else:
             last = self._correction
             pose = last.map_from_odom.compose(odometry)
-            self._correction = Correction(pose, spread(self._filter.particles, pose), odometry, last.tick)
+            self._correction = Correction(pose, covariance_about(self._filter.particles, pose), odometry, last.tick)
 
     def _mark_updated(self, scan: Scan, odometry: Pose2) -> None:
         self._update_due[scan.sensor], self._last_update, self._belief = False, odometry, None

@@ -1,4 +1,4 @@
-"""Beams of a scan that a particle filter compares with the map."""
+"""Selection of the beams of a scan that a particle filter compares with the map."""
 
 import cmath
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Scan
 
 Plane = npt.NDArray[np.complex128]
-"""Points or directions as complex numbers x + iy: a product rotates, and a sum translates."""
-
+"""Points or directions as complex numbers x + iy: multiplication rotates, addition translates."""
 Cells = npt.NDArray[np.int32]
+"""Flat indices of map cells in a lookup table."""
 
 
 class Field(Protocol):
-    """Lookup table over the cells of a map."""
+    """Lookup table over the cells of a map, such as DistanceField."""
 
     def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
         """Return table indices (n, b) of `points` (b,), given in the base frame, for each of the `poses` (n, 3)."""
@@ -27,32 +27,32 @@ class Field(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """Valid beams of a scan.
+    """The b valid beams of a scan, m of which hit something.
 
-    `ranges` (b,) in m; `range_max` means that nothing was hit. `towards` (b,) are unit vectors along the beams, and
+    `ranges` (b,) are in m; beams with the range `range_max` hit nothing. `unit_vectors` (b,) point along the beams, and
     `origin` is the position of the lidar, both in the base frame.
     """
 
     ranges: Array
-    towards: Plane
+    unit_vectors: Plane
     origin: complex
     range_max: float
 
     @property
     def bearings(self) -> Array:
         """Directions (b,) of the beams in the base frame, in rad."""
-        return np.angle(self.towards)
+        return np.angle(self.unit_vectors)
 
     @cached_property
     def ends(self) -> Plane:
         """Endpoints (m,) in the base frame of the beams that hit something."""
         hit = (self.ranges < self.range_max).nonzero()[0]
-        return self.ranges.take(hit) * self.towards.take(hit) + self.origin
+        return self.ranges.take(hit) * self.unit_vectors.take(hit) + self.origin
 
     def cells(self, field: Field, poses: Array) -> Cells:
         """Return the cells (n, m) of the endpoints for each of the `poses` (n, 3).
 
-        The result is cached, because the filter needs it twice for the same poses.
+        The last result is cached, because the filter needs it twice for the same poses.
         """
         last: tuple[Field, Array, Cells] | None = self.__dict__.get("_cells")
         if last is None or last[0] is not field or last[1] is not poses:
@@ -60,10 +60,10 @@ class Beams:
         return last[2]
 
     def keeping_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
-        """Return the beams without those that hit something and are not `chosen` (m,)."""
+        """Return the beams that hit nothing, and of those that hit something the `chosen` (m,) ones."""
         is_kept = self.ranges >= self.range_max
         is_kept[(~is_kept).nonzero()[0][chosen]] = True
-        return Beams(self.ranges[is_kept], self.towards[is_kept], self.origin, self.range_max)
+        return Beams(self.ranges[is_kept], self.unit_vectors[is_kept], self.origin, self.range_max)
 
 
 def directions(scan: Scan) -> Plane:
@@ -81,23 +81,23 @@ def evenly_spaced(count: int, chosen_count: int) -> npt.NDArray[np.int64]:
 
 @lru_cache(maxsize=8)
 def _directions(first: float, increment: float, count: int, turn: float) -> Plane:
-    """Return the directions of all beams; cached, since they are the same in all scans of a lidar."""
+    """Return the unit vectors along all beams; cached, since they are the same in all scans of a lidar."""
     angles = first + increment * np.arange(count, dtype=np.float64)
-    towards: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
-    towards.flags.writeable = False
-    return towards
+    unit_vectors: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
+    unit_vectors.flags.writeable = False
+    return unit_vectors
 
 
 def select_beams(scan: Scan, count: int, min_range: float, max_range: float) -> Beams:
-    """Return every k-th beam, so that there are at most `count`, without invalid (nan) ones.
+    """Return at most `count` evenly spaced beams of a scan, without invalid (nan) ones.
 
-    Ranges are limited to `max_range` and the lidar's maximum. As in nav2_amcl, ranges that are not above `min_range`
-    and the lidar's minimum, including -inf, count as the maximum.
+    Ranges are limited to `max_range` and the lidar's maximum. As in nav2_amcl, ranges up to `min_range` or the lidar's
+    minimum, including -inf, count as the maximum.
     """
     step = -(-len(scan.ranges) // count) or 1
-    ranges, towards = scan.ranges[::step], directions(scan)[::step]
+    ranges, unit_vectors = scan.ranges[::step], directions(scan)[::step]
     range_max, range_min = min(scan.range_max, max_range), max(scan.range_min, min_range)
     if np.count_nonzero(is_invalid := np.isnan(ranges)):
-        ranges, towards = ranges[~is_invalid], towards[~is_invalid]
+        ranges, unit_vectors = ranges[~is_invalid], unit_vectors[~is_invalid]
     ranges = np.where((ranges > range_min) & (ranges < range_max), ranges, range_max)
-    return Beams(ranges, towards, complex(scan.mount.x, scan.mount.y), range_max)
+    return Beams(ranges, unit_vectors, complex(scan.mount.x, scan.mount.y), range_max)

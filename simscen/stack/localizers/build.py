@@ -1,4 +1,4 @@
-"""Factories of the reference localizers, named by the `component` of their specifications."""
+"""Factories of the reference localizers, to which the `component` of their specifications refers."""
 
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
 
 
 def ekf(spec: model.Ekf, setting: Setting) -> Localizer:
-    """Return an extended Kalman filter of odometry and gyroscope."""
+    """Return an extended Kalman filter that fuses odometry and gyroscope."""
     from simscen.stack.localizers.ekf import EkfLocalizer
 
     return EkfLocalizer(spec, setting.estimate, setting.surroundings.tick_rate)
@@ -53,7 +53,7 @@ def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Everything that AMCL computes from a map. Independent of the run, so all runs share it."""
+    """Everything that AMCL computes from a map, cached for all runs."""
 
     sensor: SensorModel
     free_space: FreeSpace
@@ -61,19 +61,19 @@ class MapModels:
 
 @cached_on_instance
 def map_models(grid: OccupancyGrid, spec: model.Amcl) -> MapModels:
-    """Return the models of a map; cached with the map."""
+    """Return the models of a map, cached together with it."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field = obstacle_field(grid, spec.laser_likelihood_max_dist)
     return MapModels(sensor_model(spec, grid, field), FreeSpace(grid))
 
 
 def precompute(spec: model.Amcl, grid: OccupancyGrid) -> None:
-    """Compute the models of a map before runs are forked."""
+    """Compute and cache the models of a map before runs are forked."""
     map_models(grid, spec)
 
 
 def motion_model(spec: model.AmclParameters, holonomic: bool) -> MotionModel:
-    """Return the motion model that the parameters name, by default the one of the robot's drive."""
+    """Return the motion model `robot_model`, or the one that fits a holonomic or non-holonomic robot."""
     alpha = (spec.alpha1, spec.alpha2, spec.alpha3, spec.alpha4)
     if (spec.robot_model or ("omni" if holonomic else "differential")) == "omni":
         return OmniMotionModel((*alpha, spec.alpha5))

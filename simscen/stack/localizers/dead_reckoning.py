@@ -1,7 +1,7 @@
-"""Dead reckoning from odometry, and the growth of the covariance of a planar pose along a step.
+"""Dead reckoning from odometry, and propagation of the covariance of a planar pose.
 
-Source: Probabilistic Robotics, section 5.4. The errors of steps are independent, so their covariances add up. The
-functions compute with floats, because numpy is slower for nine numbers.
+Source: Probabilistic Robotics, section 5.4. The errors of motion steps are independent, so their covariances add up.
+The functions compute with floats, because numpy is slower for nine numbers.
 """
 
 import math
@@ -15,11 +15,11 @@ from simscen.model.localizers import Ekf
 from simscen.stack.frames import is_plausible
 
 Noise = tuple[float, float, float, float, float, float]
-"""The upper triangle of a covariance by rows: xx, xy, xa, yy, ya, aa (a: heading)."""
+"""Upper triangle of a covariance of x, y, and heading a, row by row: xx, xy, xa, yy, ya, aa."""
 
 
 def propagate_covariance(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
-    """Return the covariance (3, 3) after a motion by (dx, dy) in the map frame with this noise.
+    """Return the covariance (3, 3) of the pose after a motion by (dx, dy) in the map frame, which adds `noise`.
 
     An error of the heading before the motion becomes an error of the position after it.
     """
@@ -40,7 +40,7 @@ def rotation_matrix(yaw: float) -> Array:
 
 
 def rotate_covariance(covariance: Array, yaw: float) -> Noise:
-    """Return a covariance (3, 3) of a frame at heading `yaw` in its parent frame, as an upper triangle."""
+    """Return a covariance (3, 3), given in a frame at heading `yaw`, in the parent frame as an upper triangle."""
     c, s = math.cos(yaw), math.sin(yaw)
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     return (
@@ -52,9 +52,9 @@ def rotate_covariance(covariance: Array, yaw: float) -> Noise:
 def grow_covariance(
     covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float
 ) -> Array:
-    """Return the covariance (3, 3) after `step` in the base frame, which starts at heading `yaw`.
+    """Return the covariance (3, 3) of the pose after `step` in the base frame, which starts at heading `yaw`.
 
-    `translation_noise` is the standard deviation along the path in m after one meter, `rotation_noise` that of the
+    `translation_noise` is the standard deviation along the path in m after one meter; `rotation_noise` is that of the
     heading in rad after one meter or one rad.
     """
     c, s = math.cos(yaw), math.sin(yaw)
@@ -66,7 +66,7 @@ def grow_covariance(
 
 
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
-"""Standard deviations of an unknown pose: 100 m, and any heading."""
+"""Standard deviations of an unknown pose: 100 m for x and y, and a uniform distribution of the heading."""
 _NOISE = Ekf(type="ekf")
 
 
@@ -78,7 +78,7 @@ def initial_pose(estimate: Estimate) -> tuple[Pose2, Array]:
 
 
 class DeadReckoning:
-    """Integrates odometry from the initial estimate. The covariance grows with the default noise of `ekf`."""
+    """Localizer that adds odometry to the initial estimate. Its covariance grows with the default noise of `ekf`."""
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)

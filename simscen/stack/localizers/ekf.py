@@ -12,16 +12,17 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.frames import is_plausible
+from simscen.stack.kinematics import mean_velocity
 from simscen.stack.localizers.dead_reckoning import initial_pose
 
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
-"""State: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
+"""Indices of the state: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
 VELOCITY_VARIANCE = 1e6
-"""Process noise of the velocity in (m/s)² and (rad/s)²: each step's velocity is known from its measurements only."""
+"""Process noise of the velocity in (m/s)² and (rad/s)²: large, so that only the measurements of a step count."""
 MIN_YAW_RATE_STD_RADPS = 0.002
-"""Encoders count whole ticks, so that wheels at rest do not exclude a slow rotation."""
+"""Standard deviation of the yaw rate by wheels at rest: encoders are too coarse to detect a slow rotation."""
 MAX_YAW_RATE_RADPS = 100.0
-"""A gyroscope that measures more is broken."""
+"""Gyroscope readings above this are ignored as broken."""
 
 _WHEELS = np.zeros((3, 7))
 _WHEELS[[0, 1, 2], [VX, VY, VYAW]] = 1.0
@@ -30,10 +31,10 @@ _GYROSCOPE[0, [VYAW, BIAS]] = 1.0
 
 
 class EkfLocalizer:
-    """Planar EKF of odometry and gyroscope. Uses no map, so that its error grows with the distance.
+    """Localizer with a planar EKF of odometry and gyroscope. It uses no map, so that its error grows with the distance.
 
-    Each odometry reading is a measurement of the velocity since the previous one, whose noise follows from the error
-    model of the wheels. The gyroscope measures the yaw rate plus a bias, which robot_localization does not estimate.
+    Each odometry reading measures the velocity since the previous one, with noise that grows with the distance driven.
+    The gyroscope measures the yaw rate plus a bias. Unlike robot_localization, the filter estimates this bias.
     """
 
     def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
@@ -56,7 +57,7 @@ class EkfLocalizer:
         self._map_from_odom = pose
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Measure the velocity since the last reading, and move the pose by it."""
+        """Update the velocity with the motion since the last reading, and move the pose by this velocity."""
         last = self._last
         if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
@@ -72,14 +73,14 @@ class EkfLocalizer:
         """Ignore scans."""
 
     def on_imu(self, imu: Imu) -> None:
-        """Store the yaw rate until the next odometry."""
+        """Store the yaw rate until the next odometry reading."""
         rate = imu.angular_velocity[2]
         if abs(rate) < MAX_YAW_RATE_RADPS:
             self._yaw_rates.append(rate)
 
     @property
     def belief(self) -> Belief:
-        """The state at the newest odometry."""
+        """The pose at the newest odometry reading, with its covariance."""
         covariance: Array = self._filter.P[:VX, :VX]
         tick = self._last.tick if self._last is not None else 0
         return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
@@ -97,9 +98,7 @@ class EkfLocalizer:
         transition[velocities, velocities], noise[velocities, velocities] = 0.0, VELOCITY_VARIANCE
         noise[BIAS, BIAS] = self._spec.gyro_bias_walk**2 * seconds
         self._predict(transition @ self._filter.x, transition, noise)
-        # A step along an arc has its chord at half the turn.
-        c, s = math.cos(step.yaw / 2), math.sin(step.yaw / 2)
-        velocity = np.array([c * step.x + s * step.y, c * step.y - s * step.x, step.yaw]) / seconds
+        velocity = np.array(mean_velocity(step, seconds))
         self._update(velocity, _WHEELS, self._wheel_noise(step, velocity, seconds))
         if self._yaw_rates:
             mean = sum(self._yaw_rates) / len(self._yaw_rates)
@@ -107,7 +106,7 @@ class EkfLocalizer:
             self._update(np.array([mean]), _GYROSCOPE, np.array([[variance]]))
 
     def _wheel_noise(self, step: Pose2, velocity: Array, seconds: float) -> Array:
-        """Return the covariance (3, 3) of the velocity by the wheels: errors grow with the distance driven."""
+        """Return the covariance (3, 3) of the velocity that the wheels measured."""
         length = math.hypot(step.x, step.y)
         along = velocity[:2] * seconds
         noise = np.zeros((3, 3))
@@ -139,7 +138,7 @@ class EkfLocalizer:
         self._filter.predict(state)
 
     def _set_state(self, state: Array) -> None:
-        """Replace filterpy's linear prediction of the state, as it provides for nonlinear motion."""
+        """Set the predicted state. Replaces filterpy's `predict_x`, which would predict linear motion."""
         self._filter.x = state
 
     def _update(self, measurement: Array, matrix: Array, noise: Array) -> None:

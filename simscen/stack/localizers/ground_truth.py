@@ -9,17 +9,16 @@ from simscen.stack.frames import is_plausible
 from simscen.stack.localizers.dead_reckoning import initial_pose
 
 TRUTH = "ground_truth"
-"""The name of the sensor whose odometry readings are true poses in the map frame."""
+"""Name of the sensor whose odometry readings are true poses in the map frame."""
 
 _COVARIANCE = np.diag([1e-6, 1e-6, 1e-6])
-"""1 mm and 1 mrad, so that the covariance can be inverted."""
+"""Covariance of a true pose: standard deviations of 1 mm and 1 mrad, so that it can be inverted."""
 
 
 class GroundTruthLocalizer:
-    """Reports the pose of the sensor `ground_truth`, so that localization errors are excluded.
+    """Localizer without errors: reports the true pose, which the sensor TRUTH measures.
 
-    The true pose arrives as odometry readings of a sensor called "ground_truth", in the map frame. Other odometry moves
-    the pose in between. Without such readings the localizer is dead reckoning.
+    Odometry of other sensors moves the pose in between. Without any true pose, this localizer is dead reckoning.
     """
 
     def __init__(self, estimate: Estimate) -> None:

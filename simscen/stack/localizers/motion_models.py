@@ -1,4 +1,4 @@
-"""Motion models of nav2_amcl: move particles by odometry, with noise.
+"""Motion models of nav2_amcl, which move particles by odometry, with noise.
 
 Source: the odometry motion model of Probabilistic Robotics, section 5.4 and table 5.6, with the variances of nav2_amcl:
 the alphas multiply squared motions, backward motion is as noisy as forward motion, and the direction of a translation
@@ -13,7 +13,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.stack.localizers.dead_reckoning import propagate_covariance
-from simscen.stack.localizers.particles import columns, wrapped
+from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 MIN_BEARING_DISTANCE_M = 0.01
 """Shortest translation whose direction is used."""
@@ -33,7 +33,7 @@ class MotionModel(Protocol):
 
 @dataclass(frozen=True)
 class DifferentialMotionModel:
-    """Rotation, translation, rotation (table 5.6), for robots that cannot move sideways. `alpha`: alpha1 … alpha4."""
+    """Rotates, translates, and rotates (table 5.6); for robots that cannot move sideways. `alpha`: alpha1 … alpha4."""
 
     alpha: tuple[float, float, float, float]
 
@@ -43,10 +43,10 @@ class DifferentialMotionModel:
         std = [math.sqrt(variance) for variance in variances]
         turn, drive, turn_again = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         heading = poses[:, 2] + turn
-        moved = columns(len(poses))
+        moved = empty_poses(len(poses))
         moved[:, 0] = poses[:, 0] + drive * np.cos(heading)
         moved[:, 1] = poses[:, 1] + drive * np.sin(heading)
-        moved[:, 2] = wrapped(heading + turn_again)
+        moved[:, 2] = wrap_headings(heading + turn_again)
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
@@ -61,7 +61,7 @@ class DifferentialMotionModel:
         ))  # fmt: skip
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return the first rotation, the translation and the second rotation, and the variances of their noise."""
+        """Return (first rotation, translation, second rotation) and the variances of their noise in the same order."""
         drive = math.hypot(delta.x, delta.y)
         turn = math.atan2(delta.y, delta.x) if drive >= MIN_BEARING_DISTANCE_M else 0.0
         again = wrap(delta.yaw - turn)
@@ -75,7 +75,7 @@ class DifferentialMotionModel:
 
 @dataclass(frozen=True)
 class OmniMotionModel:
-    """Drive, strafe, and turn at once, for holonomic robots (nav2_amcl::OmniMotionModel). `alpha`: alpha1 … alpha5."""
+    """Drives, strafes, and turns at once (nav2_amcl::OmniMotionModel), if holonomic. `alpha`: alpha1 … alpha5."""
 
     alpha: tuple[float, float, float, float, float]
 
@@ -85,10 +85,10 @@ class OmniMotionModel:
         drive, strafe, turn = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         bearing = poses[:, 2] + math.atan2(delta.y, delta.x)
         c, s = np.cos(bearing), np.sin(bearing)
-        moved = columns(len(poses))
+        moved = empty_poses(len(poses))
         moved[:, 0] = poses[:, 0] + drive * c + strafe * s
         moved[:, 1] = poses[:, 1] + drive * s - strafe * c
-        moved[:, 2] = wrapped(poses[:, 2] + turn)
+        moved[:, 2] = wrap_headings(poses[:, 2] + turn)
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
@@ -103,7 +103,7 @@ class OmniMotionModel:
         ))  # fmt: skip
 
     def _noise(self, delta: Pose2) -> tuple[float, float, float]:
-        """Return the standard deviations of driving, strafing, and turning."""
+        """Return the standard deviations (drive, strafe, turn) of the noise."""
         driven, turned = delta.x**2 + delta.y**2, delta.yaw**2
         a1, a2, a3, a4, a5 = self.alpha
         drive = math.sqrt(a3 * driven + a4 * turned)
@@ -111,6 +111,6 @@ class OmniMotionModel:
 
 
 def _fold_backward(angle: float) -> float:
-    """Return the absolute value of a rotation, where driving backward counts as driving forward."""
+    """Return the absolute value of a rotation, or of its difference to half a turn (driving backward) if smaller."""
     size = abs(angle)
     return min(size, math.pi - size)

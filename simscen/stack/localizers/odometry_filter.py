@@ -1,10 +1,10 @@
-"""Extended Kalman filter of wheel odometry and gyroscope for the odom frame, as robot_localization's ekf_node.
+"""Extended Kalman filter that fuses wheel odometry and gyroscope in the odom frame (robot_localization's ekf_node).
 
 Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014), in its
-planar mode (`two_d_mode`). The velocity is predicted and updated by filterpy's KalmanFilter (Labbe).
-The pose follows from it as in the prediction of an extended Kalman filter.
+planar mode (`two_d_mode`). filterpy's KalmanFilter (Labbe) predicts and updates the velocity. The pose is predicted
+from the velocity as in an extended Kalman filter.
 
-Import this module only where there is a filter: filterpy imports scipy.stats, which takes half a second.
+Import this module only if a filter is used: filterpy imports scipy.stats, which takes half a second.
 """
 
 import math
@@ -18,15 +18,15 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model import localizers as model
 from simscen.stack.frames import is_plausible
+from simscen.stack.kinematics import mean_velocity
+from simscen.stack.localizers.ekf import MAX_YAW_RATE_RADPS
 
 VX, VY, VYAW, BIAS = range(4)
-"""State: the velocity of the base in its own frame (m/s, m/s, rad/s) and the bias of the gyroscope (rad/s)."""
+"""Indices of the state: velocity in the base frame (m/s, m/s, rad/s), and bias of the gyroscope (rad/s)."""
 MIN_VARIANCE = 1e-9
-"""Variance of a measurement without a covariance, in (m/s)² or (rad/s)²; the same as in robot_localization."""
+"""Minimum variance of a measurement in (m/s)² or (rad/s)²; the same as in robot_localization."""
 MAX_GYRO_GAP_S = 0.1
-"""Longest time between two gyroscope readings that are used together, and from a reading to the odometry."""
-MAX_YAW_RATE_RADPS = 100.0
-"""A gyroscope that measures more is broken."""
+"""Longest time between successive gyroscope readings, and from a reading to the odometry, for these to be used."""
 
 _WHEELS = np.eye(3, 4)
 _WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))
@@ -37,14 +37,14 @@ _IDENTITIES = {size: np.eye(size) for size in (3, 4)}
 class OdometryFilter:
     """Fuses wheel odometry and the yaw rate of a gyroscope.
 
-    For each update, filterpy predicts and updates the mean velocity since the previous one. It is measured by the
-    wheels and, plus a bias, by the gyroscope. The covariances are those of the messages. The pose is this velocity
-    integrated and is never corrected afterwards, so that the odom frame does not jump (REP 105). Its covariance is that
-    of the integrated errors, including those that the bias causes.
+    Each update estimates the mean velocity since the previous update. The wheels measure this velocity; the gyroscope
+    measures its yaw rate plus a bias. The variances are those of the readings. The pose is the integral of the velocity
+    and is never corrected afterwards, so that the odom frame does not jump (REP 105). Its covariance is that of the
+    integrated errors, including those that the bias causes.
     """
 
     def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
-        """Take the parameters and the number of ticks per second."""
+        """Take the parameters and the tick rate in Hz."""
         self._tick_rate = tick_rate
         self._min_ticks = tick_rate / spec.frequency
         self._process_noise = np.diag([*spec.process_noise_covariance, spec.gyro_bias_walk**2])
@@ -64,13 +64,13 @@ class OdometryFilter:
         self._step_variances = (0.0, 0.0, 0.0)  # of the motion since the last update, in m², m², rad²
 
     def on_imu(self, imu: Imu) -> None:
-        """Integrate the yaw rate until the next odometry."""
+        """Add a yaw rate, which the next odometry reading uses."""
         self._gyro.add(imu.tick, imu.angular_velocity[2], imu.angular_velocity_variance)
 
     def fuse(self, odometry: Odometry) -> Odometry | None:
-        """Return the filtered odometry at the tick of a reading; None if it is unusable or no update is due.
+        """Return the filtered odometry at the tick of a reading; None if the reading is unusable or no update is due.
 
-        The first reading is returned as it is: the odom frame is that of the wheel odometry.
+        The first reading is returned unchanged, so that both odometries start in the same odom frame.
         """
         last, last_tick = self._last, self._last_tick
         if not is_plausible(odometry.pose) or (last_tick is not None and odometry.tick <= last_tick):
@@ -98,7 +98,7 @@ class OdometryFilter:
         )  # fmt: skip
 
     def _add_variances(self, odometry: Odometry, gap: float) -> None:
-        """Add the variances of a reading, `gap` seconds after the previous one.
+        """Add the variances of a reading, `gap` s after the previous one, to those of the motion since the last update.
 
         After lost messages, the gap contains the independent errors of several readings.
         """
@@ -107,7 +107,10 @@ class OdometryFilter:
         self._step_variances = x + vx * factor, y + vy * factor, yaw + wz * factor
 
     def _measure(self, wheels: Twist, turned: tuple[float, float] | None, seconds: float) -> None:
-        """Predict and update the mean velocity during the last `seconds`; `turned` is the gyroscope's measurement."""
+        """Predict and update the mean velocity during the last `seconds`.
+
+        `turned` is the angle and its variance by the gyroscope; None without a measurement.
+        """
         self._filter.Q = self._process_noise * seconds
         self._filter.predict()
         squared = seconds**2
@@ -128,7 +131,7 @@ class OdometryFilter:
         cross -= cross.dot(self._filter.K.dot(matrix).T)
 
     def _slips(self, difference: float, variance: float) -> bool:
-        """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
+        """Return whether the yaw rates of wheels and gyroscope differ by more than their errors explain."""
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
         return bool(difference**2 > limit)
@@ -150,13 +153,13 @@ class OdometryFilter:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Return the inverse of a small matrix, in a quarter of the time of numpy.linalg.inv, which also calls dgesv."""
+    """Return the inverse of a 3x3 or 4x4 matrix, in a quarter of the time of numpy.linalg.inv."""
     inverse: Array = lapack.dgesv(matrix, _IDENTITIES[len(matrix)])[2]
     return inverse
 
 
 def _diagonal_matrix(values: list[float]) -> Array:
-    """Return the diagonal matrix of some values, in a fifth of the time of numpy.diag."""
+    """Return the diagonal matrix with these values, in a fifth of the time of numpy.diag."""
     size = len(values)
     flat = np.zeros(size * size)
     flat[:: size + 1] = values
@@ -164,10 +167,10 @@ def _diagonal_matrix(values: list[float]) -> Array:
 
 
 class GyroscopeIntegral:
-    """Angle about the vertical axis by a gyroscope, between any two ticks: the trapezoidal rule.
+    """Integrates the yaw rate of a gyroscope between any two ticks, with the trapezoidal rule.
 
-    Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is taken to stay as it is. The next readings replace
-    this assumption, so that its errors do not accumulate.
+    Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is assumed to be constant. The next reading corrects
+    the angle, so that errors of this assumption do not accumulate.
     """
 
     def __init__(self, tick_rate: int) -> None:
@@ -189,10 +192,7 @@ class GyroscopeIntegral:
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
-        """Return the angle turned since the last call (rad) and the variance of its noise (rad²).
-
-        None if readings are missing.
-        """
+        """Return the angle since the last call in rad and its variance in rad²; None if readings are missing."""
         last, self._read = self._read, None
         if self._tick is None or abs(tick - self._tick) > self._max_gap:
             return None
@@ -201,10 +201,3 @@ class GyroscopeIntegral:
         if last is None:
             return None
         return angle - last[1], self._variance * (tick - last[0]) / self._tick_rate
-
-
-def mean_velocity(step: Pose2, seconds: float) -> Twist:
-    """Return the constant velocity of a step along an arc, by its chord, which has half of the turn as its heading."""
-    x, y, turn = step
-    c, s = math.cos(turn / 2), math.sin(turn / 2)
-    return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)

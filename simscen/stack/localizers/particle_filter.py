@@ -22,20 +22,19 @@ from simscen.stack.localizers.particles import (
     equal_weights,
     summarize,
 )
-from simscen.stack.localizers.resampling import PROBE_COUNT, KldBound, Recovery, adaptive, systematic
+from simscen.stack.localizers.resampling import PROBE_COUNT, AugmentedMcl, KldBound, kld_sampling, systematic_resampling
 from simscen.stack.localizers.sensor_models import SensorModel
 
 CONVERGED_WITHIN_M = 0.5
-"""All particles are this near to their mean when the filter has converged (nav2_amcl's pf.dist_threshold)."""
-
+"""The filter has converged if all particles are within this distance of their mean (nav2_amcl's pf.dist_threshold)."""
 _DESCENDANT, _RANDOM = 1.0, 2.0
-"""Marks in the fourth column of drawn particles: descendant of a random particle of the recovery; random particle."""
+"""Marks in the fourth column of drawn particles: descendant of a random particle, and random particle."""
 
 
 class ParticleFilter:
-    """Particles in the map frame that odometry moves and scans weigh. Independent of time and of the odom frame.
+    """Particles in the map frame that odometry moves and scans weight. Independent of time and of the odom frame.
 
-    Subclasses may override `begin`, `_trusted_beams` and `_resample`.
+    Subclasses may override `reset`, `_trusted_beams`, and `_resample`.
     """
 
     def __init__(
@@ -47,13 +46,13 @@ class ParticleFilter:
         )  # fmt: skip
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
         self._has_small_bound = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.min_samples)
-        self.begin(Estimate(None))
+        self.reset(Estimate(None))
 
-    def begin(self, estimate: Estimate) -> None:
+    def reset(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
-        self.particles = self._free_space.begin(estimate, self._bound.max_samples, self._rng)
-        self._recovery = Recovery(
-            self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_share
+        self.particles = self._free_space.initial_particles(estimate, self._bound.max_samples, self._rng)
+        self._augmented_mcl = AugmentedMcl(
+            self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_fraction
         )
         self._random: npt.NDArray[np.bool_] | None = None  # (n,) drawn at random after the last scan
         self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and descendants of earlier ones
@@ -64,22 +63,22 @@ class ParticleFilter:
         return select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.max_used_range)
 
     def move(self, delta: Pose2) -> None:
-        """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
+        """Move each particle by a sample of the motion model. `delta` is the odometry in the base frame."""
         poses = self._motion.sample(self.particles.poses, delta, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
-        """Weigh the particles by a scan and resample. Return the estimated pose and its covariance (3, 3).
+        """Weight the particles by a scan and resample. Return the estimated pose and its covariance (3, 3).
 
-        Return None if the scan carries no information: no beam hit anything, or no particle can explain the scan. The
-        latter leaves the particles equally likely, as in nav2_amcl, and counts as likelihood zero for the recovery. The
+        Return None if the scan says nothing about the pose: it fits all particles equally well, or none at all. If it
+        fits none, the particles get equal weights, as in nav2_amcl, and the likelihood is zero for Augmented MCL. The
         estimate is computed before resampling, which would only add noise (Probabilistic Robotics, section 4.3.4).
         """
         spec, poses = self._spec, self.particles.poses
         exponent, beams = self._trusted_beams(self.beams(scan))
         if exponent == 0:
             return None
-        converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN_M)
+        converged = spec.do_beamskip and self.particles.are_within(CONVERGED_WITHIN_M)
         logarithm = exponent * self._sensor.log_likelihood(poses, beams, converged)
         best, worst = logarithm.item(logarithm.argmax()), logarithm.item(logarithm.argmin())
         if best == worst and best > -np.inf:
@@ -87,20 +86,20 @@ class ParticleFilter:
         shift = best if best > -np.inf else 0.0
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(np.add.reduce(weights))
-        if self._recovery.is_enabled:
-            self._update_recovery(beams, weights, shift, exponent)
+        if self._augmented_mcl.is_enabled:
+            self._observe_likelihood(beams, weights, shift, exponent)
         weights = weights / total if total > 0 else equal_weights(len(poses))
-        self.particles = self.particles.weighted(weights)
+        self.particles = self.particles.with_weights(weights)
         estimate = summarize(self.particles, self._sensor.peak_power) if total > 0 else None
         self._resample()
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return the exponent of the scan's likelihood, 0 … 1, and the beams that count. Here: 1, and all of them."""
+        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use. Here: 1, and all beams."""
         return 1.0, beams
 
-    def _update_recovery(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
-        """Pass to the recovery how well the particles explain a scan, without those that were random one scan ago.
+    def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
+        """Pass to Augmented MCL how well a scan fits the particles, except those that the last scan drew at random.
 
         `weights` (n,) are not normalized; `shift` was subtracted from their logarithms.
         """
@@ -109,43 +108,43 @@ class ParticleFilter:
         log_likelihood = math.log(likelihood) + shift if likelihood > 0 else -math.inf
         probes = self._free_space.draw(PROBE_COUNT, self._rng)
         anywhere = exponent * self._sensor.log_likelihood(probes, beams, False)
-        scale = self._sensor.tempering(beams)
-        self._recovery.observe(log_likelihood * scale, anywhere * scale)
+        scale = self._sensor.tempering_exponent(beams)
+        self._augmented_mcl.observe(log_likelihood * scale, anywhere * scale)
 
     def _resample(self) -> None:
-        """Resample on every `resample_interval`-th scan and, if selective, only when few particles carry weight."""
+        """Resample with every `resample_interval`-th scan. If selective, only when few particles carry the weight."""
         self._corrections += 1
         self._random = None
         if self._corrections % self._spec.resample_interval:
             return
-        if self._spec.selective_resampling and self.particles.effective > len(self.particles.weights) / 2:
+        if self._spec.selective_resampling and self.particles.effective_count > len(self.particles.weights) / 2:
             return
-        if self._has_small_bound and self._recovery.share == 0 and are_compact(self.particles):
-            chosen = systematic(self.particles.weights, self._bound.min_samples, self._rng)
-            self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
+        if self._has_small_bound and self._augmented_mcl.random_fraction == 0 and are_compact(self.particles):
+            chosen = systematic_resampling(self.particles.weights, self._bound.min_samples, self._rng)
+            self.particles = Particles.with_equal_weights(self.particles.poses.T.take(chosen, axis=1).T)
             self._descendants = None
             return
-        if self._recovery.share == 0:
+        if self._augmented_mcl.random_fraction == 0:
             self._descendants = None
         if self._descendants is not None:
             weights = self.particles.weights.copy()
-            weights[self._descendants] *= self._recovery.kept_share(float(weights[self._descendants].sum()))
-            self.particles = self.particles.weighted(weights / weights.sum())
-        drawn = adaptive(self._draw, self._bound).T.copy()
+            weights[self._descendants] *= self._augmented_mcl.kept_fraction(float(weights[self._descendants].sum()))
+            self.particles = self.particles.with_weights(weights / weights.sum())
+        drawn = kld_sampling(self._draw, self._bound).T.copy()
         self._random, self._descendants = drawn[3] == _RANDOM, drawn[3] > 0
-        self.particles = Particles.equal(drawn[:3].T)
+        self.particles = Particles.with_equal_weights(drawn[:3].T)
 
     def _draw(self, count: int) -> Array:
-        """Draw poses in random order: most from the particles, the recovery's share from anywhere.
+        """Return poses in random order, drawn from the particles or, for Augmented MCL, from the free space.
 
-        Rows (count, 4): x, y, yaw, and _RANDOM, _DESCENDANT or 0.
+        Rows (count, 4): x, y, yaw, and _RANDOM, _DESCENDANT, or 0.
         """
         drawn = np.zeros((count, 4))
-        chosen = systematic(self.particles.weights, count, self._rng)
+        chosen = systematic_resampling(self.particles.weights, count, self._rng)
         drawn[:, :3] = self.particles.poses[chosen]
         if self._descendants is not None:
             drawn[self._descendants[chosen], 3] = _DESCENDANT
-        if (share := self._recovery.share) > 0:
+        if (share := self._augmented_mcl.random_fraction) > 0:
             is_random = self._rng.random(count) < share
             drawn[is_random, :3] = self._free_space.draw(int(is_random.sum()), self._rng)
             drawn[is_random, 3] = _RANDOM

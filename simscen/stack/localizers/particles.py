@@ -1,4 +1,4 @@
-"""Weighted particles: their initialization, and the pose estimate and covariance of their clusters."""
+"""Weighted particles: their initial distribution, their clusters, and the pose estimate with its covariance."""
 
 import math
 from dataclasses import dataclass
@@ -10,31 +10,31 @@ import numpy.typing as npt
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.core.messages.navigation import Estimate
-from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Keys, bins, join, split
+from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Keys, bin_keys, decode_bins, encode_bins
 
 
 @dataclass(frozen=True, eq=False)
 class Particles:
     """Poses (n, 3) x, y, yaw in the map frame and their weights (n,), which add up to one.
 
-    Sums are ten times as fast if each column is contiguous, see `columns`.
+    Sums are ten times as fast if each column of `poses` is contiguous, see `empty_poses`.
     """
 
     poses: Array
     weights: Array
 
     @classmethod
-    def equal(cls, poses: Array) -> "Particles":
+    def with_equal_weights(cls, poses: Array) -> "Particles":
         """Return particles with these poses and equal weights."""
         return cls(poses, equal_weights(len(poses)))
 
     @property
-    def effective(self) -> float:
+    def effective_count(self) -> float:
         """Effective number of particles: 1 / Σ w² (Liu 1996)."""
         return float(1 / (self.weights @ self.weights))
 
-    def weighted(self, weights: Array) -> "Particles":
-        """Return the same poses with other weights (n,)."""
+    def with_weights(self, weights: Array) -> "Particles":
+        """Return particles with the same poses and these weights (n,)."""
         other = Particles(self.poses, weights)
         if "extent" in self.__dict__:
             other.__dict__["extent"] = self.extent
@@ -42,7 +42,7 @@ class Particles:
 
     @cached_property
     def extent(self) -> tuple[float, float, float]:
-        """Extent in x, y, and yaw. Headings on both sides of ±π are close to each other."""
+        """Extent of the poses in x, y (m), and yaw (rad, across ±π if that is shorter)."""
         dx, dy, turned = [values.item(values.argmax()) - values.item(values.argmin()) for values in self.poses.T]
         if turned > math.pi:
             turned = min(turned, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
@@ -55,7 +55,7 @@ class Particles:
         table.flags.writeable = False
         return table
 
-    def within(self, distance: float) -> bool:
+    def are_within(self, distance: float) -> bool:
         """Return whether each particle is at most this far from their mean, in x and in y."""
         if max(self.extent[:2]) <= distance:
             return True
@@ -65,20 +65,20 @@ class Particles:
 
 def sample_around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
     """Return poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
-    poses = columns(count)
+    poses = empty_poses(count)
     poses[:] = rng.normal(pose, std, (count, 3))
     poses[:, 2] = wrap_array(poses[:, 2])
     return poses
 
 
-def columns(count: int) -> Array:
+def empty_poses(count: int) -> Array:
     """Return an empty array for poses (count, 3) with contiguous columns."""
     poses: Array = np.empty((3, count)).T
     return poses
 
 
-def wrapped(headings: Array) -> Array:
-    """Return the headings (n,) in [-π, π). Fast if they already are."""
+def wrap_headings(headings: Array) -> Array:
+    """Return the headings (n,) wrapped to [-π, π). Fast if they already are in this interval."""
     if not len(headings):
         return headings
     # argmax takes a fifth of the time of max.
@@ -103,23 +103,23 @@ class FreeSpace:
 
     @cached_property
     def _cells(self) -> npt.NDArray[np.int32]:
-        """Indices of the cells to draw from. Computed when first needed, because large maps have many."""
+        """Indices of the cells to draw from. Computed only if needed, because large maps have many."""
         free = np.flatnonzero(self._grid.cells == FREE)
         return (free if len(free) else np.arange(self._grid.cells.size)).astype(np.int32)
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Return poses (count, 3) in the map frame."""
+        """Return random poses (count, 3) in the map frame."""
         row, column = np.divmod(self._cells[rng.integers(len(self._cells), size=count)], self._grid.shape[1])
         local = (np.column_stack((column, row)) + rng.random((count, 2))) * self._grid.resolution
-        poses = columns(count)
+        poses = empty_poses(count)
         poses[:, :2], poses[:, 2] = self._grid.origin.apply(local), rng.uniform(-np.pi, np.pi, count)
         return poses
 
-    def begin(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
+    def initial_particles(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
         """Return particles around the estimate's pose, or over all free space if it has none."""
         if estimate.pose is None:
-            return Particles.equal(self.draw(count, rng))
-        return Particles.equal(sample_around(estimate.pose, estimate.std, count, rng))
+            return Particles.with_equal_weights(self.draw(count, rng))
+        return Particles.with_equal_weights(sample_around(estimate.pose, estimate.std, count, rng))
 
 
 MAX_COMPACT_BINS = 8
@@ -128,15 +128,15 @@ _NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a i
 
 
 def cluster_labels(keys: Keys) -> Keys:
-    """Return the labels (n,) of clusters: groups of particles whose histogram bins `keys` (n,) touch.
+    """Return the cluster label (n,) of each particle: particles whose histogram bins `keys` (n,) touch are one cluster.
 
-    Bins also touch at corners, and from 350° to 0°, in contrast to nav2_amcl's pf_kdtree_cluster. A label is the rank
-    of the lowest bin of its cluster. For the few bins of a localized robot, scipy's connected_components is three times
-    as slow.
+    Unlike in nav2_amcl's pf_kdtree_cluster, bins also touch at corners, and across ±180° of the heading. A label is the
+    rank of the lowest bin of its cluster. For the few bins of a localized robot, this is three times as fast as scipy's
+    connected_components.
     """
     occupied, bin_index = np.unique(keys, return_inverse=True)
-    x, y, yaw = split(occupied)
-    neighbor_keys = join(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
+    x, y, yaw = decode_bins(occupied)
+    neighbor_keys = encode_bins(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
     found = np.minimum(np.searchsorted(occupied, neighbor_keys), len(occupied) - 1)
     own = np.arange(len(occupied))
     neighbors, labels = np.where(occupied[found] == neighbor_keys, found, own), own
@@ -148,42 +148,41 @@ def cluster_labels(keys: Keys) -> Keys:
 
 
 def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Array]:
-    """Return the estimated pose and the covariance (3, 3) of all particles about it.
+    """Return the pose of the heaviest cluster, and the covariance (3, 3) of all particles about this pose.
 
-    The pose is that of the heaviest cluster. nav2_amcl uses the mean of the cluster, which lags behind a moving robot
-    if the sensor model has flat weights. The best particle does not lag, but jumps when another particle becomes the
-    best. Here, the mean with the weights to the power `peak_power` (of the sensor model; 1 changes nothing) is combined
-    with the plain mean, in inverse proportion to their variances. docs/reference/localizers.md has the measurements.
+    nav2_amcl uses the mean of the cluster, which lags behind a moving robot if the sensor model has flat weights. The
+    best particle does not lag, but jumps when another particle becomes the best. Here, two means are combined, weighted
+    by the inverse of their variances: the plain one, and one with the weights to the power `peak_power` (1: no effect).
+    docs/reference/localizers.md has the measurements.
 
-    The covariance includes all particles, as in nav2_amcl, so that it shows a second cluster. It refers to the returned
-    pose, so that it is the expected squared error of this pose, and it includes the products of position and heading,
-    which are zero in nav2_amcl. Headings are averaged on the circle.
+    The covariance is the expected squared error of the pose. As in nav2_amcl, it includes all particles, so that it
+    shows a second cluster. Unlike there, it includes the correlation of position and heading.
     """
     poses, weights = particles.poses, particles.weights
     if not are_compact(particles):
-        labels = cluster_labels(bins(poses))
+        labels = cluster_labels(bin_keys(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
         poses, weights = poses[heaviest], weights[heaviest]
     elif peak_power == 1.0:
         return _summarize_compact(particles)
     mean = _mean(poses, weights)
     if peak_power == 1.0:
-        return mean, spread(particles, mean)
+        return mean, covariance_about(particles, mean)
     peaked = (weights / weights.max()) ** peak_power
     best = _mean(poses, peaked)
     variance, peak_variance = _position_variance(poses, weights, mean), _position_variance(poses, peaked, best)
     share = variance / (variance + peak_variance) if peak_variance > 0 else 1.0
     yaw = wrap(mean.yaw + share * wrap(best.yaw - mean.yaw))
     pose = Pose2(mean.x + share * (best.x - mean.x), mean.y + share * (best.y - mean.y), yaw)
-    return pose, spread(particles, pose)
+    return pose, covariance_about(particles, pose)
 
 
 def _summarize_compact(particles: Particles) -> tuple[Pose2, Array]:
-    """Return the same for compact particles, in one matrix product. Their headings need no average on the circle."""
+    """Return the same as `summarize` for compact particles with `peak_power` 1, in one matrix product."""
     first: tuple[float, float, float] = tuple(particles.poses[0].tolist())
     offsets = np.ones((4, len(particles.weights)))
     np.subtract(particles.poses.T, np.array([first]).T, offsets[:3])
-    offsets[2] = wrapped(offsets[2])
+    offsets[2] = wrap_headings(offsets[2])
     (xx, xy, xa, x), (_, yy, ya, y), (_, _, aa, a), (*_, total) = np.dot(
         offsets * particles.weights, offsets.T
     ).tolist()
@@ -194,7 +193,7 @@ def _summarize_compact(particles: Particles) -> tuple[Pose2, Array]:
 
 
 def are_compact(particles: Particles) -> bool:
-    """Return whether the extent of the particles is less than one bin, so that they are one cluster."""
+    """Return whether the extent of the particles is less than one bin, so that they certainly are one cluster."""
     x, y, yaw = particles.extent
     return x < BIN_SIZE_M and y < BIN_SIZE_M and yaw < 2 * math.pi / YAW_BINS
 
@@ -211,7 +210,7 @@ def _position_variance(poses: Array, weights: Array, mean: Pose2) -> float:
     return float(weights @ np.square(poses[:, :2] - mean[:2]).sum(axis=1) / weights.sum())
 
 
-def spread(particles: Particles, pose: Pose2) -> Array:
+def covariance_about(particles: Particles, pose: Pose2) -> Array:
     """Return the covariance (3, 3) of the particles about `pose`: the expected squared error of this pose."""
     error = pose_errors(np.array(pose), particles.poses).T
     covariance: Array = (error * particles.weights) @ error.T
@@ -221,5 +220,5 @@ def spread(particles: Particles, pose: Pose2) -> Array:
 def pose_errors(pose: Array, poses: Array) -> Array:
     """Return the differences (n, 3) of `poses` from `pose` (3,), with wrapped headings."""
     error = poses - pose
-    error[:, 2] = wrapped(error[:, 2])
+    error[:, 2] = wrap_headings(error[:, 2])
     return error

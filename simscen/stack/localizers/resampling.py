@@ -1,6 +1,6 @@
-"""Resampling of particles: KLD sampling adapts their number to their spread, and random ones recover a lost filter.
+"""Resampling of particles: KLD sampling adapts their number, and Augmented MCL adds random ones to find a lost robot.
 
-KLD-sampling: Fox, Adapting the Sample Size in Particle Filters Through KLD-Sampling, IJRR 22 (2003), equation 7;
+KLD sampling: Fox, Adapting the Sample Size in Particle Filters Through KLD-Sampling, IJRR 22 (2003), equation 7;
 Probabilistic Robotics, table 8.4. The histogram is nav2_amcl's (pf_kdtree.c): bins of 0.5 m x 0.5 m x 10°.
 
 Augmented MCL: Thrun, Burgard & Fox, Probabilistic Robotics, section 8.3.5 and table 8.3.
@@ -18,10 +18,11 @@ from simscen.core.geometry import Array
 Indices = npt.NDArray[np.int64]
 
 
-def systematic(weights: Array, count: int, rng: np.random.Generator) -> Indices:
+def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) -> Indices:
     """Return indices (count,), ascending, drawn in proportion to `weights` (n,) with minimum variance.
 
-    The low-variance sampler of Probabilistic Robotics, table 4.4: an index is drawn ⌊count·w⌋ or ⌈count·w⌉ times.
+    Low-variance sampler of Probabilistic Robotics, table 4.4: an index with weight w is drawn ⌊count·w⌋ or ⌈count·w⌉
+    times.
     """
     cumulative = weights.cumsum()
     positions = (np.arange(count) + rng.random()) * (cumulative[-1] / count)
@@ -32,27 +33,28 @@ def systematic(weights: Array, count: int, rng: np.random.Generator) -> Indices:
 
 
 BIN_SIZE_M = 0.5
-"""Edge length of a bin of KLD sampling; not a parameter of nav2_amcl either (pf_kdtree.c)."""
+"""Edge length of a histogram bin; fixed in nav2_amcl, too (pf_kdtree.c)."""
 YAW_BINS = 36
 """Number of bins of the heading: 10° each, as in pf_kdtree.c."""
 _OFFSET = 1 << 21
-"""Number added to the x and y of a bin so that both are positive in its key."""
+"""Added to the coordinates x and y of a bin, so that both are positive in its key."""
 Keys = npt.NDArray[np.int64]
+"""Keys of histogram bins, each of which encodes the integer coordinates x, y, yaw of a bin."""
 
 
-def bins(poses: Array) -> Keys:
-    """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
+def bin_keys(poses: Array) -> Keys:
+    """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings may be outside of ±π."""
     cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_OFFSET + 2, _OFFSET - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
-    return join(cells[:, 0], cells[:, 1], yaw)
+    return encode_bins(cells[:, 0], cells[:, 1], yaw)
 
 
-def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
+def encode_bins(x: Keys, y: Keys, yaw: Keys) -> Keys:
     """Return the keys of bins with these integer coordinates."""
     return ((x + _OFFSET) * (2 * _OFFSET) + (y + _OFFSET)) * YAW_BINS + yaw
 
 
-def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
+def decode_bins(keys: Keys) -> tuple[Keys, Keys, Keys]:
     """Return the integer coordinates x, y, yaw of bins."""
     cells, yaw = np.divmod(keys, YAW_BINS)
     x, y = np.divmod(cells, 2 * _OFFSET)
@@ -61,10 +63,10 @@ def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
 
 @dataclass(frozen=True)
 class KldBound:
-    """Number of samples that keep the sampled distribution within `error` of the true one.
+    """Number of samples for which the sampled distribution probably differs from the true one by at most `error`.
 
-    `z` is an upper quantile of the standard normal distribution. nav2_amcl uses its parameter pf_z = 0.99 as this
-    quantile itself, not as the probability 0.99 (whose quantile is 2.33), and so does this.
+    `z` is the quantile of the standard normal distribution for this probability. Like nav2_amcl, simscen uses pf_z =
+    0.99 as the quantile itself, not as the probability 0.99 (whose quantile is 2.33).
     """
 
     error: float
@@ -73,10 +75,10 @@ class KldBound:
     max_samples: int
 
     def samples(self, occupied: npt.ArrayLike) -> Keys:
-        """Return the samples needed for a number of occupied bins, between `min_samples` and `max_samples`.
+        """Return the samples needed for numbers of occupied bins, between `min_samples` and `max_samples`.
 
-        For a single bin, Fox's bound is zero, so this returns `min_samples`: one bin means that the pose is certain.
-        nav2_amcl uses `max_samples` there.
+        A single bin means that the pose is certain: Fox's bound is zero, and this returns `min_samples`. nav2_amcl
+        returns `max_samples` instead.
         """
         degrees = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
         spread = 2 / (9 * degrees)
@@ -84,7 +86,7 @@ class KldBound:
         return np.clip(np.ceil(needed), self.min_samples, self.max_samples).astype(np.int64)
 
     def sufficient_count(self, keys: Keys) -> int | None:
-        """Return the first sufficient number of samples, given their bins (n,) in order; None if there is none."""
+        """Return how many of n samples are sufficient, given their bins (n,) in order; None if n are not sufficient."""
         if len(keys) == self.min_samples:  # no smaller number can be sufficient
             return self.min_samples if self.min_samples >= self.samples(len(np.unique(keys))) else None
         is_new = np.zeros(len(keys), dtype=np.int64)
@@ -94,79 +96,78 @@ class KldBound:
         return int(counts[satisfied.argmax()]) if satisfied.any() else None
 
 
-def adaptive(draw: Callable[[int], Array], bound: KldBound) -> Array:
+def kld_sampling(draw: Callable[[int], Array], bound: KldBound) -> Array:
     """Draw poses (n, 3) with `draw(count)` until the KLD bound is satisfied. Rows may have more than three columns.
 
-    Fox (2003), table 3, in blocks instead of one by one: the sequence of draws is cut where it first satisfies the
-    bound. `draw` must return its poses in an order that does not matter.
+    Fox (2003), table 3, but in blocks instead of one by one: the sequence of poses is cut where it first satisfies the
+    bound. For this, `draw` must return its poses in random order.
     """
     poses = draw(bound.min_samples)
-    while (count := bound.sufficient_count(bins(poses))) is None:
+    while (count := bound.sufficient_count(bin_keys(poses))) is None:
         poses = np.concatenate((poses, draw(min(len(poses), bound.max_samples - len(poses)))))
     return poses[:count]
 
 
 PROBE_COUNT = 200
 """Number of random poses at which each scan is evaluated."""
-MIN_BETTER_SHARE = 0.1
-"""Minimum share of random poses that explain recent scans better than the particles if the filter is lost."""
+MIN_BETTER_FRACTION = 0.1
+"""The filter is lost only if at least this fraction of random poses fits recent scans better than the particles."""
 MAX_STRAY_SCANS = 4.0
-"""Limit of random particles and their descendants: as many as this number of scans may add."""
+"""Random particles and their descendants ("strays") are limited to the number that this many scans may add."""
 _MAX_LOG_RATIO = 50.0
 """Maximum logarithm of a likelihood ratio, so that its exponential stays finite."""
 
 
-class Recovery:
+class AugmentedMcl:
     """Decides how many random particles to add, from a fast and a slow running average of how well scans fit.
 
-    The book and nav2_amcl average the likelihood of the scans. It depends on the scene as much as on the pose: people,
-    glass, and an outdated map lower it although the pose is right, and then good particles are replaced. Here, each
-    scan is also evaluated at PROBE_COUNT random poses, and the average is that of the ratio of its likelihood at the
-    particles to that at the random poses.
+    The book and nav2_amcl average the likelihood of the scans. It depends not only on the pose: people, glass, and an
+    outdated map lower it although the pose is right, and then good particles are replaced. Here, each scan is also
+    evaluated at PROBE_COUNT random poses. The averages are those of a ratio: the likelihood of a scan at the particles,
+    divided by its likelihood at the random poses.
 
-    Random particles are added while the fast average is below the slow one and at least MIN_BETTER_SHARE of the random
-    poses explain the recent scans better than the particles. One scan adds at most the share `max_share`, because with
-    flat weights it takes many scans to remove wrong particles. For the same reason, random particles and their
-    descendants are limited as a whole; older ones make room for new ones.
+    Random particles are added while the fast average is below the slow one and at least MIN_BETTER_FRACTION of the
+    random poses fit the recent scans better than the particles. If the sensor model has flat weights, it takes many
+    scans to remove wrong particles. Therefore one scan adds at most the fraction `max_fraction`, and random particles
+    and their descendants are limited in total; older ones make room for new ones.
 
-    nav2_amcl resets both averages after it has added random particles, which ends a recovery after a few dozen
-    particles. This is not necessary here, because particles that the last scan added at random are not part of the
-    ratio. The averages are normalized from the first scan on.
+    nav2_amcl resets both averages after it has added random particles, so that it stops after a few dozen particles.
+    This is not necessary here, because the random particles of the last scan are not part of the ratio.
     """
 
-    def __init__(self, alpha_slow: float, alpha_fast: float, max_share: float = 1.0) -> None:
-        self.is_enabled, self._max_share = alpha_fast > 0, max_share
+    def __init__(self, alpha_slow: float, alpha_fast: float, max_fraction: float = 1.0) -> None:
+        self.is_enabled, self._max_fraction = alpha_fast > 0, max_fraction
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
-        self._better_share = RunningAverage(alpha_fast)
+        self._better_fraction = RunningAverage(alpha_fast)
 
     def observe(self, tracked: float, anywhere: Array) -> None:
-        """Add a scan, by the log likelihoods of the mean over the particles (`tracked`) and at random poses (n,).
+        """Add a scan by its log likelihoods: the mean over the particles (`tracked`), and those at random poses (n,).
 
-        The scale must be the same for all scans, see SensorModel.tempering.
+        The scale must be the same for all scans, see SensorModel.tempering_exponent.
         """
         best = float(anywhere.max())
         average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf
         ratio = math.exp(min(tracked - average, _MAX_LOG_RATIO)) if tracked > -np.inf else 0.0
         self._slow.add(ratio)
         self._fast.add(ratio)
-        self._better_share.add(float(np.mean(anywhere > tracked)))
+        self._better_fraction.add(float(np.mean(anywhere > tracked)))
 
     @property
-    def share(self) -> float:
-        """Share of new particles to draw at random: 1 - fast / slow, limited to the maximum; 0 if not lost."""
+    def random_fraction(self) -> float:
+        """Fraction of new particles to draw at random: 1 - fast / slow, limited to the maximum; 0 if not lost."""
         slow, fast = self._slow.value, self._fast.value
-        if slow <= 0 or self._better_share.value < MIN_BETTER_SHARE:
+        if slow <= 0 or self._better_fraction.value < MIN_BETTER_FRACTION:
             return 0.0
-        return min(self._max_share, max(0.0, 1 - fast / slow))
+        return min(self._max_fraction, max(0.0, 1 - fast / slow))
 
-    def kept_share(self, stray_weight: float) -> float:
-        """Return the share of earlier random particles and descendants to keep, given their weight (0 … 1)."""
-        allowed = min(1.0, MAX_STRAY_SCANS * self._max_share) - self.share
+    def kept_fraction(self, stray_weight: float) -> float:
+        """Return the fraction of earlier random particles and descendants to keep, given their weight (0 … 1)."""
+        allowed = min(1.0, MAX_STRAY_SCANS * self._max_fraction) - self.random_fraction
         return 1.0 if stray_weight <= allowed else max(0.0, allowed / stray_weight)
 
 
 class RunningAverage:
-    """Exponentially weighted average; with equal weights if `alpha` is zero.
+    """Average with exponentially decaying weights, or with equal weights if `alpha` is zero.
 
     The weights are normalized from the first value on (Kingma & Ba, Adam, 2015, section 3).
     """
@@ -175,7 +176,7 @@ class RunningAverage:
         self._alpha, self._sum, self._weight = alpha, 0.0, 0.0
 
     def add(self, value: float) -> None:
-        """Add a value."""
+        """Add a value, after multiplying earlier weights by 1 - `alpha`."""
         decay = 1 - self._alpha
         self._sum, self._weight = decay * self._sum + value, decay * self._weight + 1
 

@@ -1,4 +1,4 @@
-"""Sensor models of nav2_amcl: likelihood of a scan by its distance from obstacles, or by ray casting.
+"""Sensor models of nav2_amcl: likelihood of a scan by distances to obstacles (likelihood field) or by ray casting.
 
 Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and table 6.3; nav2_amcl's
 likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing are ignored.
@@ -21,9 +21,9 @@ from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, evaluate_in_blocks
 
 PEAK_POWER_OF_SUMS = 16.0
-"""`peak_power` of models with weights 1 + Σ p³: over 60 beams, one that fits makes a particle only 1 to 2 % heavier."""
-MAX_RANDOM_SHARE_OF_SUMS = 0.05
-"""`max_random_share` of these models: a random particle weighs half as much as a good one, and survives many scans."""
+"""`peak_power` of models with flat weights 1 + Σ p³: one more fitting beam of 60 adds only 1 to 2 % to the weight."""
+MAX_RANDOM_FRACTION_OF_SUMS = 0.05
+"""`max_random_fraction` of such models: a random particle has half the weight of a good one and survives many scans."""
 
 
 class SensorModel(Protocol):
@@ -31,50 +31,50 @@ class SensorModel(Protocol):
 
     @property
     def peak_power(self) -> float:
-        """Power of the weights that emphasizes the best particles: 1 if weights are the likelihood of all beams."""
+        """Power of the weights that emphasizes the best particles; 1 if the weights are not flat. See `summarize`."""
         ...
 
     @property
-    def max_random_share(self) -> float:
-        """Maximum share of random particles that recovery may add with each scan."""
+    def max_random_fraction(self) -> float:
+        """Maximum fraction of random particles that Augmented MCL may add with each scan."""
         ...
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Return the log likelihoods (n,) of the beams at each of the `poses` (n, 3); -inf if impossible, never nan.
 
-        `converged`: the particles are one narrow cluster.
+        `converged` means that the particles are one narrow cluster, so that beams may be skipped.
         """
         ...
 
-    def tempering(self, beams: Beams) -> float:
-        """Return the exponent that puts the likelihoods of scans on one scale: 1/beams for a product, 1 for a sum."""
+    def tempering_exponent(self, beams: Beams) -> float:
+        """Return the exponent that makes the likelihoods of scans comparable: 1/beams for a product, 1 for a sum."""
         ...
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Return distances to the surfaces of occupied areas; the maximum outside the map, as in nav2_amcl.
+    """Return distances to the surfaces of occupied areas; outside the map the maximum, as in nav2_amcl.
 
-    Maps from SLAM contain surfaces only. A map that was drawn from a model is filled. Beams cannot end inside of it,
-    but if they could, particles would be attracted to the inside.
+    Maps from SLAM contain only surfaces, but in drawn maps, walls are filled. If their inside counted as an obstacle,
+    particles would be attracted to it, although beams cannot end there.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return the solid cells (height, width) with a free neighbor on the map."""
+    """Return the solid cells (height, width) that have a neighbor on the map that is not solid."""
     padded = np.pad(solid, 1, constant_values=True)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return solid & ~inside
 
 
 class LikelihoodField:
-    """Default of nav2_amcl: a particle weighs 1 + Σ p³ over its beams.
+    """Default model of nav2_amcl: the weight of a particle is 1 + Σ p³, with the likelihoods p of its beams.
 
-    This is not a product of probabilities; nav2_amcl calls it an "ad-hoc weighting scheme". It tolerates beams that hit
-    something that is not on the map, and no pose is impossible.
+    nav2_amcl calls this an "ad-hoc weighting scheme", since it is not a product of probabilities. It tolerates beams
+    that hit something that is not on the map, and no pose is impossible.
     """
 
-    peak_power, max_random_share = PEAK_POWER_OF_SUMS, MAX_RANDOM_SHARE_OF_SUMS
+    peak_power, max_random_fraction = PEAK_POWER_OF_SUMS, MAX_RANDOM_FRACTION_OF_SUMS
 
     def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
         self._field, self._z_rand = field, np.float32(z_rand)
@@ -92,7 +92,7 @@ class LikelihoodField:
 
         return evaluate_in_blocks(weigh, poses)
 
-    def tempering(self, beams: Beams) -> float:
+    def tempering_exponent(self, beams: Beams) -> float:
         """Return 1: a sum of cubes has the same scale for any number of beams."""
         return 1.0
 
@@ -101,9 +101,9 @@ class LikelihoodField:
 class BeamSkipping:
     """Parameters of beam skipping, which ignores beams that hit people or other obstacles that are not on the map.
 
-    A particle explains a beam that ends less than `distance` m from an obstacle. Beams that at most the share
-    `threshold` of the particles explain are skipped. If this applies to the share `error_threshold` of the beams or
-    more, the pose is wrong, and no beam is skipped.
+    A beam fits a particle if it ends less than `distance` m from an obstacle. A beam is skipped if it fits at most the
+    fraction `threshold` of the particles. If the fraction `error_threshold` of the beams would be skipped, the pose is
+    wrong, and no beam is skipped.
     """
 
     distance: float
@@ -112,12 +112,12 @@ class BeamSkipping:
 
 
 class LikelihoodFieldProb:
-    """A particle's weight is the product of its beams' likelihoods (table 6.3), with optional beam skipping.
+    """Model in which the weight of a particle is the product of its beams' likelihoods (table 6.3).
 
     Subclasses may set `exponent` and override `_hit_likelihoods`.
     """
 
-    peak_power, max_random_share = 1.0, 1.0
+    peak_power, max_random_fraction = 1.0, 1.0
     exponent = 1.0
     """Power to which the product is raised."""
 
@@ -143,12 +143,12 @@ class LikelihoodFieldProb:
 
         return evaluate_in_blocks(weigh, poses)
 
-    def tempering(self, beams: Beams) -> float:
+    def tempering_exponent(self, beams: Beams) -> float:
         """Return the exponent of the geometric mean over the beams that hit something."""
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self.exponent
 
     def _beam_exponents(self, beams: int) -> Float32:
-        """Return `exponent` once for each beam; a matrix product sums faster than numpy's sum."""
+        """Return an array (beams,) of `exponent`: a matrix product with it is faster than numpy's sum."""
         if beams != len(self._exponents):
             self._exponents = np.full(beams, self.exponent, dtype=np.float32)
         return self._exponents
@@ -168,7 +168,7 @@ class LikelihoodFieldProb:
         return _hit_likelihoods(self._field, self._z_hit, self._sigma_hit)
 
     def _used_beams(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
-        """Return which beams enough particles can explain; all of them if too few beams are left."""
+        """Return which beams are not skipped."""
         near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
         is_pose_wrong = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
@@ -176,7 +176,7 @@ class LikelihoodFieldProb:
 
 
 def _hit_likelihoods(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
-    """Return z_hit · exp(-d² / 2σ²) of each cell's distance d to the nearest obstacle."""
+    """Return z_hit · exp(-d² / 2σ²) for the distance d of each cell from the nearest obstacle."""
     return field.tabulate(
         lambda d: np.float32(z_hit) * np.exp(np.square(d) / np.float32(-2 * sigma_hit**2)), np.float32
     )
@@ -215,10 +215,10 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """Mixture of hit, short, maximum, and random ranges for each beam; a particle weighs 1 + Σ p³ over its beams."""
+    """Model with ray casting: p of a beam is a mixture of hit, short, maximum, and random ranges; weights 1 + Σ p³."""
 
     peak_power: ClassVar[float] = PEAK_POWER_OF_SUMS
-    max_random_share: ClassVar[float] = MAX_RANDOM_SHARE_OF_SUMS
+    max_random_fraction: ClassVar[float] = MAX_RANDOM_FRACTION_OF_SUMS
 
     field: DistanceField
     z_hit: float
@@ -242,6 +242,6 @@ class BeamModel:
 
         return evaluate_in_blocks(weigh, poses)
 
-    def tempering(self, beams: Beams) -> float:
+    def tempering_exponent(self, beams: Beams) -> float:
         """Return 1: a sum of cubes has the same scale for any number of beams."""
         return 1.0

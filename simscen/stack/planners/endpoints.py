@@ -1,4 +1,4 @@
-"""Check of start and goal before a search, with Nav2's error codes."""
+"""Start and goal of a search: checked, with Nav2's error codes, and moved to free cells."""
 
 import math
 from collections.abc import Iterator
@@ -10,19 +10,19 @@ from scipy.ndimage import label
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.planners.path_postprocessing import spaced
+from simscen.stack.planners.path_postprocessing import densify
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 MAX_ESCAPE_M = 0.5
-"""Distance that a robot too close to an obstacle may drive to the start of a plan."""
+"""Maximum distance that a robot too close to an obstacle may drive until it is free."""
 
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """Start and goal of a search, moved to free cells where necessary.
+    """Start and goal (x, y) of a search, moved to free cells where necessary.
 
-    `reachable` (height, width) marks the cells that are connected with the start.
+    `reachable` (height, width) are the free cells that are connected with the start.
     """
 
     start: tuple[float, float]
@@ -33,29 +33,28 @@ class Endpoints:
 def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """Return the start and goal of the search.
 
-    A start that is too close to an obstacle is moved to the nearest free point in a straight line without obstacles. A
-    goal is moved to the nearest reachable point within `tolerance` m. Raises NavigationFailure with
-    START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED or NO_VALID_PATH.
+    A start too close to an obstacle is moved to the nearest free point to which a straight line without obstacles
+    leads. A goal that is not reachable is moved to the nearest reachable point within `tolerance` m. Raises
+    START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED, or NO_VALID_PATH.
     """
     _raise_if_blocked(costs, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _raise_if_blocked(costs, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
     free = costs.free
-    free_start = next(
-        (point for point in near(costs, free, start, MAX_ESCAPE_M) if _is_line_free(costs, start, point)), None
-    )
+    near_start = free_points(costs, free, start, MAX_ESCAPE_M)
+    free_start = next((point for point in near_start if _is_line_free(costs, start, point)), None)
     if free_start is None:
         raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free cell within {MAX_ESCAPE_M} m of the start")
-    if next(near(costs, free, goal, tolerance), None) is None:
+    if next(free_points(costs, free, goal, tolerance), None) is None:
         raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no free cell within {tolerance} m of the goal")
     reachable = reachable_cells(costs, free_start)
-    free_goal = next(near(costs, reachable, goal, tolerance), None)
+    free_goal = next(free_points(costs, reachable, goal, tolerance), None)
     if free_goal is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
     return Endpoints(free_start, free_goal, reachable)
 
 
 def reachable_cells(costs: TraversalCosts, start: tuple[float, float]) -> npt.NDArray[np.bool_]:
-    """Return the cells (height, width) that are connected with a free start."""
+    """Return the free cells (height, width) that are connected with `start`, which must be free."""
     regions, _ = label(costs.free)
     return np.asarray(regions == regions[costs.cell(start)])
 
@@ -68,10 +67,13 @@ def _raise_if_blocked(costs: TraversalCosts, pose: Pose2, outside: ErrorCode, oc
         raise NavigationFailure(occupied, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is in an obstacle")
 
 
-def near(
+def free_points(
     costs: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, max_distance: float
 ) -> Iterator[tuple[float, float]]:
-    """Yield the point itself if its cell is free, then centers of free cells at most `max_distance` m away."""
+    """Yield the position of `pose` if its cell is free, then the centers of free cells, the nearest first.
+
+    `free` (height, width) are the free cells; their centers are at most `max_distance` m away.
+    """
     row, column = costs.cell((pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y
@@ -89,7 +91,7 @@ def near(
 
 def _is_line_free(costs: TraversalCosts, start: Pose2, point: tuple[float, float]) -> bool:
     """Return whether no obstacle is on the line from the start to a point."""
-    line = spaced(np.array([(start.x, start.y), point]), 0.5 * costs.resolution)
+    line = densify(np.array([(start.x, start.y), point]), 0.5 * costs.resolution)
     columns, rows = np.floor((line - costs.origin) / costs.resolution).astype(np.int64).T
     return bool((costs.costmap.distance[rows, columns] > 0.0).all())
 

@@ -1,4 +1,4 @@
-"""Grid planners: Nav2's NavFn and SmacPlanner2D, which find the cheapest path for a disc on the cells."""
+"""Grid planners: Nav2's NavFn and SmacPlanner2D, which find the cheapest path from cell to cell for a round robot."""
 
 import numpy as np
 
@@ -6,17 +6,18 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
+from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
-from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, smoothed, spaced, with_headings
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, smoothed, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
-from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE, TraversalCosts
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
-"""nav2_navfn_planner/navfn.hpp: a cell costs 50 + 0.8 times its cost."""
+"""NavFn counts 50 + 0.8 · cost for each cell (nav2_navfn_planner/navfn.hpp)."""
 BORDER_CELLS = 2
-"""Width of the border of blocked cells around the costmap that the graph needs."""
+"""Width of the border of blocked cells that GridGraph needs around the costmap."""
 
 
 def navfn(spec: Navfn, setting: Setting) -> Planner:
@@ -38,7 +39,7 @@ def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
 
 
 class GridPlanner:
-    """Dijkstra's algorithm on the cells. The path does not depend on the seed."""
+    """Plans with Dijkstra's algorithm on the cells, with these (row, column) `moves`. The seed has no effect."""
 
     def __init__(
         self,
@@ -53,20 +54,20 @@ class GridPlanner:
         self._moves, self._smooth, self._robot = moves, smooth, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, 5 cm apart."""
+        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none."""
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
         costs = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
         ends = find_endpoints(costs, start, goal, self._tolerance)
         path = self._postprocessed(costs, ends, self._search(costs, ends))
-        return Path(with_headings(spaced(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
+        return Path(with_headings(densify(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
     def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
-        """Return the path (n, 2) from start to goal, smoothed if possible, and led around blocked corners."""
+        """Return the path (n, 2) from start to goal through cells, smoothed if possible, without cutting corners."""
         raw = np.vstack((ends.start, cells[1:-1], ends.goal))
         for points in (smoothed(costs, raw), raw) if self._smooth else (raw,):
-            path = avoid_cell_corners(costs, spaced(points, SPACING_M))
+            path = avoid_cell_corners(costs, densify(points, SPACING_M))
             if path is not None:
                 return path
         return np.vstack((ends.start, cells, ends.goal))  # no move between cell centers cuts a corner

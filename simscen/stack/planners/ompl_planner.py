@@ -1,4 +1,4 @@
-"""The planner of the reference stack: a search by OMPL over the costs of the costmap, in the plane or over poses."""
+"""OMPL planners of the reference stack: OmplPlanner searches over positions, PosePlanner over poses."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -11,49 +11,57 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplParameters, StateSpace
 from simscen.model.planners import OmplPlanner as PlannerSpec
+from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import cusps
-from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near, reachable_bounds, reachable_cells
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, free_points, reachable_bounds, reachable_cells
 from simscen.stack.planners.ompl_search import OmplSearch, Problem, set_parameters
-from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
-from simscen.stack.planners.pose_search import POSE_SPACING_M, DistanceLookup, Space, Valid, escape_arcs, search_poses
-from simscen.stack.planners.traversal_costs import NO_INFORMATION, TraversalCosts
+from simscen.stack.planners.pose_search import (
+    POSE_SPACING_M,
+    DistanceLookup,
+    PoseCheck,
+    Space,
+    escape_arcs,
+    search_poses,
+)
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 PLANE_ONLY = ("bit_star", "aorrtc", "medial_axis")
-"""Planners that are replaced by RRT-Connect over poses, where e.g. OMPL's AORRTC (2.0.1) returns only the goal."""
+"""Types of planners that PosePlanner replaces by RRT-Connect; OMPL's AORRTC (2.0.1), for example, fails over poses."""
 MIN_RADIUS_M = 0.2
-"""Radius of the arcs of a long robot that could turn in place, but should not have to."""
+"""Planned turning radius of a long robot that can turn in place, so that it rarely has to."""
 RADIUS_RATIO = 1.15
 """Ratio of the planned turning radius of a car to its minimum, so that the controller can correct to both sides."""
-FINAL_CHECKS = 50
-"""Number of poses per step of the path at which the hull is finally checked."""
+FINAL_CHECKS_PER_STEP = 50
+"""Number of poses per step of a found path at which the footprint is finally checked."""
 MAX_DEEPER_M = 0.01
-"""Distance by which a hull may penetrate an obstacle deeper while it escapes from it."""
+"""Distance by which a footprint in collision may get deeper into the obstacle while it leaves it."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt to find a path in a region.
+    """Parameters of one attempt of PosePlanner to find a path in a region.
 
-    bounds:     of the region: (min x, min y, max x, max y) in m
-    contains:   returns whether a point is in the region
-    clearance:  in m beyond the hull
-    share:      of the iterations
-    spacing:    between the collision checks, in m
+    bounds:              bounding box of the region (min x, min y, max x, max y) in m
+    contains:            returns whether a point (x, y) is in the region
+    clearance:           clearance in m around the footprint
+    iteration_fraction:  fraction of `max_iterations`
+    spacing:             distance in m between two collision checks
     """
 
     bounds: tuple[float, float, float, float]
     contains: Callable[[float, float], bool]
     clearance: float
-    share: float
+    iteration_fraction: float
     spacing: float
 
 
 class PosePlanner:
-    """Plans with the whole hull, which is checked at each pose as a row of discs."""
+    """Searches over poses and checks the footprint at each pose, for cars and long robots."""
 
     def __init__(self, spec: OmplParameters, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
@@ -62,16 +70,16 @@ class PosePlanner:
         self._turning_radius = spec.minimum_turning_radius or max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, 5 cm apart: the cheapest of a few searches."""
+        """Return the cheapest path of `pose_searches` searches: poses in the map frame, at most 5 cm apart."""
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         field = DistanceLookup(costmap if self._spec.allow_unknown else self._block_unknown(costmap))
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
-        goal = self._move_goal_to_fit(costmap, goal, near(costs, ends.reachable, goal, self._spec.tolerance))
+        goal = self._move_goal_to_fit(costmap, goal, free_points(costs, ends.reachable, goal, self._spec.tolerance))
         escape = self._escape_path(costs, start)
         free_start = Pose2(*escape[-1].tolist())
         for attempt in self._attempts(costs, ends, free_start, goal):
             valid = self._validity_check(field, attempt, (free_start, goal))
-            iterations = max(1, round(attempt.share * self._spec.max_iterations))
+            iterations = max(1, round(attempt.iteration_fraction * self._spec.max_iterations))
             found: list[Array] = []
             for _ in range(self._spec.pose_searches):
                 seed += 1
@@ -94,19 +102,15 @@ class PosePlanner:
             set_parameters(planner, self._spec)
 
     def _cost(self, costs: TraversalCosts, poses: Array) -> float:
-        """Return the cost of a path, including that of changes of direction."""
+        """Return the cost of a path (n, 3), including `cusp_penalty` for each change of direction."""
         steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
         midpoints = 0.5 * (poses[1:, :2] + poses[:-1, :2])
         return float((steps * costs.at(midpoints)).sum()) + self._spec.cusp_penalty * int(cusps(poses).size)
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield the attempts: with decreasing clearance, finally with finer checks."""
-        bounds, reachable, size, (x0, y0) = (
-            reachable_bounds(costs, ends),
-            ends.reachable,
-            costs.resolution,
-            costs.origin,
-        )
+        """Yield the attempts in order: with less and less clearance, and finally with finer collision checks."""
+        bounds, reachable = reachable_bounds(costs, ends), ends.reachable
+        size, (x0, y0) = costs.resolution, costs.origin
         rows, columns = reachable.shape
 
         def contains(x: float, y: float) -> bool:
@@ -114,17 +118,17 @@ class PosePlanner:
             return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
 
         preferred = self._spec.hull_clearance
-        for clearance, share, spacing in (
+        for clearance, fraction, spacing in (
             (preferred, 0.2, POSE_SPACING_M),
             (0.5 * preferred, 0.2, POSE_SPACING_M),
             (0.0, 0.3, POSE_SPACING_M),
             (0.0, 0.3, POSE_SPACING_M / 10),
         ):
-            yield Attempt(bounds, contains, clearance, share, spacing)
+            yield Attempt(bounds, contains, clearance, fraction, spacing)
 
     def _is_collision_free(self, costs: TraversalCosts, poses: Array) -> bool:
-        """Return whether the whole hull is free of collisions along the path, also between the checks of the search."""
-        fractions = np.arange(FINAL_CHECKS) / FINAL_CHECKS
+        """Return whether the footprint is free of collisions along the path, also between the checks of the search."""
+        fractions = np.arange(FINAL_CHECKS_PER_STEP) / FINAL_CHECKS_PER_STEP
         yaw = np.unwrap(poses[:, 2])
         unwrapped = np.column_stack((poses[:, :2], yaw))
         between = unwrapped[:-1, None] + fractions[:, None] * np.diff(unwrapped, axis=0)[:, None]
@@ -132,12 +136,12 @@ class PosePlanner:
         return bool(self._footprint.free(costs.costmap, checked).all() and np.isfinite(costs.at(checked[:, :2])).all())
 
     def _block_unknown(self, costmap: CostmapView) -> CostmapView:
-        """Return the costmap with distances so small in unknown cells that the robot does not fit there."""
+        """Return a copy of the costmap in which the robot does not fit in unknown cells."""
         limited = np.minimum(costmap.distance, np.float32(self._inscribed))
         return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, limited, costmap.distance))
 
     def _move_goal_to_fit(self, costmap: CostmapView, goal: Pose2, points: Iterable[tuple[float, float]]) -> Pose2:
-        """Return the goal moved to the first of the points where the whole hull fits, with the same heading."""
+        """Return the goal moved to the first of the points where the footprint fits with the heading of the goal."""
         poses = np.array([(*point, goal.yaw) for point in points])
         free = self._footprint.free(costmap, poses)
         if not free.any():
@@ -146,9 +150,10 @@ class PosePlanner:
         return Pose2(*poses[free.argmax()].tolist())
 
     def _escape_path(self, costs: TraversalCosts, start: Pose2) -> Array:
-        """Return poses (n, 3) from the start to the nearest one where the whole hull fits.
+        """Return poses (n, 3) from the start to the nearest pose where the footprint fits.
 
-        A start in collision is left on the shortest arc that does not lead deeper into the obstacle.
+        Out of a collision, they follow the shortest arc that does not lead deeper into the obstacle. Raises
+        START_OCCUPIED if there is none.
         """
         costmap, best = costs.costmap, None
         for arc in escape_arcs(self._space, self._turning_radius, start):
@@ -164,8 +169,8 @@ class PosePlanner:
             raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
         return best
 
-    def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
-        """Return a check of poses: in the region and free of collisions, with the clearance except near the ends."""
+    def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
+        """Return a check of poses: in the region, and free of collisions with the clearance, except near the `ends`."""
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance
         # The distances are those between cell centers, which are wrong by up to a cell diagonal.
@@ -185,22 +190,22 @@ class PosePlanner:
         return valid
 
 
-FINE_CELLS = 0.125
-"""Spacing of the collision checks of the next search, if the path of the first one is blocked between its checks."""
-SEARCHES = 4
+FINE_SPACING_CELLS = 0.125
+"""Spacing of the collision checks, in cells, after a search whose path was blocked between its checks."""
+MAX_SEARCHES = 4
 """Number of searches with different seeds before planning fails, because a search may miss a narrow gap."""
 REPEATED_REWIRE_FACTOR = 1.6
-"""Default of `rewire_factor` in all searches but the first: longer motions find narrow gaps, but take more time."""
+"""Default `rewire_factor` after a search without a path: longer motions find narrow gaps, but take more time."""
 
 
 class OmplPlanner:
-    """Plans in the plane for a disc of the robot's inscribed radius."""
+    """Searches over positions, for a disc with the inscribed radius of the robot."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, 5 cm apart. Raises NavigationFailure if there is none."""
+        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none."""
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
@@ -208,11 +213,11 @@ class OmplPlanner:
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         costs, ends = self._avoid_narrow_gaps(costs, ends)
         points = np.array([ends.start]) if ends.start == ends.goal else self._search(costs, ends, seed)
-        points = spaced(np.vstack(((start.x, start.y), points)), SPACING_M)
+        points = densify(np.vstack(((start.x, start.y), points)), SPACING_M)
         return Path(with_headings(points, goal))
 
     def _avoid_narrow_gaps(self, costs: TraversalCosts, ends: Endpoints) -> tuple[TraversalCosts, Endpoints]:
-        """Return costs with narrow gaps blocked, if start and goal are connected without them."""
+        """Return costs and endpoints with narrow gaps blocked, unless these gaps are the only way to the goal."""
         if self._spec.gap_clearance == 0.0:
             return costs, ends
         wide = costs.without_narrow_gaps(self._spec.gap_clearance, (ends.start, ends.goal))
@@ -220,33 +225,33 @@ class OmplPlanner:
         return (wide, replace(ends, reachable=reachable)) if reachable[wide.cell(ends.goal)] else (costs, ends)
 
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
-        """Return the points (n, 2) of a path without blocked cells."""
-        spec, problem = self._spec, whole_problem(costs, ends)
+        """Return the points (n, 2) of a path that crosses no blocked cell. Raises NO_VALID_PATH."""
+        spec, problem = self._spec, make_problem(costs, ends)
         repeated = spec if spec.rewire_factor else spec.model_copy(update={"rewire_factor": REPEATED_REWIRE_FACTOR})
-        for number in range(SEARCHES):
+        for number in range(MAX_SEARCHES):
             points = OmplSearch(spec, problem, seed + number).solve(simplify=spec.simplify)
             if points is None:
                 spec = repeated
                 continue
-            path = avoid_cell_corners(costs, spaced(np.array(points), SPACING_M))
+            path = avoid_cell_corners(costs, densify(np.array(points), SPACING_M))
             if path is not None:
                 return path
-            costs.stride = FINE_CELLS * costs.resolution
-        message = f"{spec.type}: no path in {SEARCHES} searches of {spec.max_iterations} iterations"
+            costs.stride = FINE_SPACING_CELLS * costs.resolution
+        message = f"{spec.type}: no path in {MAX_SEARCHES} searches of {spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
 
-def whole_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
-    """Return the problem in the bounding box of the cells that are reachable from the start."""
+def make_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
+    """Return the search problem, bounded by the cells that are reachable from the start."""
     return Problem(ends.start, ends.goal, reachable_bounds(costs, ends), costs.between)
 
 
 LONG_HULL_RATIO = 2.0
-"""Ratio of circumscribed to inscribed radius above which the planner considers the heading of the robot."""
+"""Ratio of circumscribed to inscribed radius above which the planner takes the heading of the robot into account."""
 
 
 def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Build a planner in the requested state space, or in the one that fits the robot."""
+    """Build the planner for the requested state space, or for the one that fits the robot."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return OmplPlanner(spec, setting.robot)
@@ -256,8 +261,8 @@ def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
 def state_space_for(requested: StateSpace, robot: RobotModel) -> Literal["holonomic", "se2", "dubins", "reeds_shepp"]:
     """Return the state space to plan in.
 
-    auto: Reeds-Shepp for a base with a turning radius, otherwise "se2" for a long hull, otherwise the plane. For a base
-    that cannot move sideways, "se2" becomes Dubins paths with tight arcs: its heading is that of its path.
+    "auto" means "reeds_shepp" for a car, "se2" for a long robot, and otherwise "holonomic" (positions only). "se2" is
+    replaced by "dubins" with tight arcs if the robot cannot move sideways, because its heading is that of its path.
     """
     space = requested
     if space == "auto":

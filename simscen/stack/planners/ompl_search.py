@@ -1,7 +1,7 @@
-"""Search with OMPL's planners in the plane, over the costs of a costmap. Seeded, and limited by iterations.
+"""OMPL search over positions in the plane, with the costs of a costmap. Seeded, and limited by iterations.
 
-The random generator of OMPL is global to the process. It is seeded anew for each plan, before any other object of OMPL
-is made. OMPL logs a warning about the repeated seed, although the seed takes effect; this is why its log is silenced.
+OMPL has one random generator for the whole process. It is seeded again for each search, before any other object of OMPL
+is created. The log of OMPL is silenced, because it warns about the repeated seed, although the seed takes effect.
 """
 
 import math
@@ -18,9 +18,9 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 
 Point = tuple[float, float]
 Motion = Callable[[float, float, float, float], float]
-"""Cost of a straight motion from (x, y) to (x, y), at least its length in m; inf if it is not possible."""
+"""Returns the cost of a straight motion from (x, y) to (x, y): at least its length in m; inf if blocked."""
 Termination = Callable[[], bool]
-"""Condition that OMPL evaluates once per iteration. The search stops when it returns True."""
+"""Function that OMPL calls in each iteration. The search stops when it returns True."""
 
 PLANNERS: dict[str, Callable[[Any], Any]] = {
     "rrt_connect": og.RRTConnect,
@@ -30,22 +30,23 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
     "aorrtc": og.AORRTC,
     "kpiece": og.KPIECE1,
 }
+"""OMPL planners by the `type` in the specification; called with the space information."""
 FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
-"""Planners that stop at their first path. The others continue to improve it."""
+"""Planners that stop at their first path. The others continue to improve the path."""
 DEFAULT_RANGE_M = 1.0
-"""Default of the parameter `range` in the plane."""
+"""Default of the parameter `range`."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 """Default of the parameter `rewire_factor` of BIT*."""
 CHECK_PERIOD = 16
-"""Iterations between two evaluations of the condition that ends a search."""
+"""Number of iterations between two evaluations of the condition that ends a search."""
 PERTURBATIONS_M = (0.5, 0.15)
-"""Distances by which states are moved to reduce the cost of the path, one pass each."""
+"""Distances by which the simplification moves states to reduce the cost of the path, in one pass for each distance."""
 ou.setLogLevel(ou.LOG_NONE)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m."""
+    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m, with costs of motions."""
 
     start: Point
     goal: Point
@@ -54,7 +55,7 @@ class Problem:
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Validity of a motion by its cost, in one call instead of one call for each state along it."""
+    """Validates a motion by its cost: one call of Python instead of one for each state along the motion."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -65,33 +66,33 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no 
         return self.motion(a[0], a[1], b[0], b[1]) < math.inf
 
 
-class _CheckedByCost(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Validity of motions for BIT*, which first computes the cost of a motion and drops those that cost inf."""
+class _AcceptEveryMotion(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
+    """Accepts all motions. For BIT*, which computes the cost of a motion first and drops motions that cost inf."""
 
     def checkMotion(self, _a: Any, _b: Any) -> bool:
-        """Return True: the motion has a finite cost."""
+        """Return True."""
         return True
 
 
 class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Cost of a motion beyond its length."""
+    """Objective: the cost of a motion minus its length."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
         self.motion = motion
 
     def motionCost(self, a: Any, b: Any) -> Any:
-        """Return the cost of the straight motion, less its length."""
+        """Return the cost of the straight motion minus its length."""
         ax, ay, bx, by = a[0], a[1], b[0], b[1]
         return ob.Cost(self.motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
 
     def stateCost(self, _: Any) -> Any:
-        """Return 0: only motions cost something."""
+        """Return 0, because only motions have costs."""
         return ob.Cost(0.0)
 
 
 class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Cost of a motion as a path length objective, for which alone OMPL samples the ellipse of the informed set."""
+    """Objective: the cost of a motion. Derived from path length, because OMPL has informed sampling only for that."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -107,7 +108,7 @@ class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # o
 
 
 class StateValidity:
-    """Validity of a state: the robot is not in a blocked cell."""
+    """Checks that a state is not in a blocked cell."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -123,21 +124,20 @@ def _impossible(_ax: float, _ay: float, _bx: float, _by: float) -> float:
 
 
 class OmplSearch:
-    """One search by one of OMPL's planners. Subclasses may change where it samples and when it stops."""
+    """One search by one of OMPL's planners. Subclasses may restrict where it samples, and change when it stops."""
 
     def __init__(self, spec: PlannerSpec, problem: Problem, seed: int) -> None:
-        """Search with the planner and the parameters of a specification.
+        """Prepare a search with the planner and the parameters of a specification.
 
-        A planner that improves its path does so until it has used `improving_iterations`; BIT*, until it has processed
-        `max_batches` batches of samples.
+        A planner that improves its path stops after `improving_iterations`, BIT* after `max_batches` batches.
         """
         self.spec, self.problem, self.seed = spec, problem, seed
         self._callbacks: list[Any] = []
 
     def solve(self, *, simplify: bool) -> list[Point] | None:
-        """Return the points of a path from start to goal; None if the iterations did not suffice.
+        """Return the points of a path from start to goal; None if no exact solution was found in `max_iterations`.
 
-        `simplify` runs OMPL's path simplification on it. An approximate solution counts as none.
+        With `simplify`, the path is shortened and its states are moved to reduce its cost.
         """
         try:
             return self._solve(simplify)
@@ -159,7 +159,7 @@ class OmplSearch:
         planner = PLANNERS[self.spec.type](information)
         self._configure(planner)
         if self.spec.type == "bit_star":
-            information.setMotionValidator(_CheckedByCost(information))
+            information.setMotionValidator(_AcceptEveryMotion(information))
         planner.setProblemDefinition(definition)
         planner.setup()
         planner.solve(ob.PlannerTerminationCondition(self._make_termination(planner)))
@@ -212,7 +212,7 @@ class OmplSearch:
         return information
 
     def _make_objective(self, information: Any) -> Any:
-        """Return the cost of a path as OMPL's own length, whose heuristic needs no Python, and the cost beyond it."""
+        """Return the objective: OMPL's path length, whose heuristic is fast, plus the cost beyond the length."""
         motion = self.problem.motion
         if self.spec.type == "informed_rrt_star":
             whole = _MotionCost(information, motion)
@@ -229,7 +229,7 @@ class OmplSearch:
 
 
 def set_parameters(planner: Any, spec: PlannerSpec) -> None:
-    """Set the parameters of the specification that this planner of OMPL has; those without a value stay as they are."""
+    """Set those parameters of the specification that have a value and that this planner of OMPL supports."""
     for setter, value in (
         ("setSamplesPerBatch", spec.samples_per_batch),
         ("setRewireFactor", spec.rewire_factor),
@@ -243,7 +243,7 @@ def set_parameters(planner: Any, spec: PlannerSpec) -> None:
 def _simplify(simplifier: Any, path: Any, steps: int) -> None:
     """Shorten a path and move its states where that reduces the cost.
 
-    The `steps` of a pass are counted, because OMPL's own simplify() stops by wall-clock time.
+    Each pass has at most `steps` steps. OMPL's own simplify() is not used, because it stops by wall-clock time.
     """
     simplifier.partialShortcutPath(path, steps, steps // 2)
     for distance in PERTURBATIONS_M:
@@ -257,16 +257,16 @@ def _state(information: Any, point: Point) -> Any:
     return state
 
 
-def stop_after(iterations: int, is_done: Termination = lambda: False, least: int = 0) -> Termination:
-    """Return a termination condition: stop after so many iterations, or when it `is_done` after at least `least`.
+def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterations: int = 0) -> Termination:
+    """Return a termination condition: after `iterations`, or after `min_iterations` as soon as `is_done` returns True.
 
-    `is_done` is evaluated once per `CHECK_PERIOD` iterations. In between, itertools answers, without Python code.
+    `is_done` is called once per `CHECK_PERIOD` iterations. In between, itertools answers without running Python code.
     """
 
     def answers() -> Iterator[Iterable[bool]]:
         for start in range(0, iterations, CHECK_PERIOD):
             yield repeat(False, min(CHECK_PERIOD, iterations - start))
-            if start + CHECK_PERIOD > least and is_done():
+            if start + CHECK_PERIOD > min_iterations and is_done():
                 break
         yield repeat(True)
 

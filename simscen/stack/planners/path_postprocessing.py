@@ -11,11 +11,11 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 SPACING_M = 0.05
 """Distance between the points of a finished path."""
 SMOOTHING_PASSES, MAX_COST_RATIO = 8, 1.003
-"""Passes of the smoothing, and maximum ratio of the cost after it to the cost before."""
+"""Maximum number of smoothing passes, and maximum ratio of the cost after smoothing to the cost before."""
 
 
-def spaced(points: Array, spacing: float) -> Array:
-    """Return the polyline (n, 2) with additional points, at most `spacing` m apart."""
+def densify(points: Array, spacing: float) -> Array:
+    """Return the polyline (n, 2) with additional points, so that all points are at most `spacing` m apart."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     counts = np.maximum(1, np.ceil(lengths / spacing - 1e-9)).astype(np.int64)
@@ -27,17 +27,14 @@ def spaced(points: Array, spacing: float) -> Array:
 
 
 def with_headings(points: Array, goal: Pose2) -> Array:
-    """Return poses (n, 3): each point heads to the next, and the last one has the heading of the goal."""
+    """Return the poses (n, 3) of points (n, 2): each heads to the next point, the last one as the goal."""
     steps = np.diff(points, axis=0)
     yaw = np.append(np.arctan2(steps[:, 1], steps[:, 0]), goal.yaw)
     return np.column_stack((points, yaw))
 
 
 def smoothed(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path (n, 2) with rounded corners, as long as its cost hardly rises.
-
-    A path through a blocked cell costs inf, and is only replaced by one with a finite cost.
-    """
+    """Return the path (n, 2) with corners rounded as far as no cell on it is blocked and its cost hardly rises."""
     cost = costs.along(points)
     for _ in range(SMOOTHING_PASSES):
         other = points.copy()
@@ -50,18 +47,19 @@ def smoothed(costs: TraversalCosts, points: Array) -> Array:
 
 
 CORNER_OFFSET_CELLS = 0.02
-"""Distance in cells at which a path passes a corner that it would cut."""
+"""Distance in cells at which a path is led around the corner of a blocked cell."""
 
 
 def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path (n, 2) led around each blocked corner that it cut; None if more than a corner blocks it.
+    """Return the path (n, 2), led around the corners of blocked cells that it cuts.
 
-    If it cut any, the points of the result are at most one cell apart.
+    Return None if it crosses more of a blocked cell than a corner. If it cuts any corner, the points of the result are
+    at most one cell apart.
     """
     if not np.isfinite(costs.at(points)).all():
         return None
     steps = np.diff(points, axis=0)
-    path = points if np.hypot(*steps.T).max(initial=0.0) <= costs.resolution else spaced(points, costs.resolution)
+    path = points if np.hypot(*steps.T).max(initial=0.0) <= costs.resolution else densify(points, costs.resolution)
     positions = (path - costs.origin) / costs.resolution
     cells = np.floor(positions)
     # No step is longer than a cell, so that it crosses at most one edge per axis.
@@ -87,6 +85,6 @@ def _swap_rows(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _free(costs: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
-    """Return which cells (n, 2), given as (column, row), are not blocked."""
+    """Return which of the cells (n, 2), given as (column, row), are not blocked."""
     columns, rows = cells.astype(np.int64).T
     return np.asarray(np.isfinite(costs.rates[rows, columns]))

@@ -1,4 +1,4 @@
-"""Planning on large maps: search a window around start and goal first, and enlarge it if needed."""
+"""Planning on large costmaps: search only a window around start and goal first, and enlarge it if needed."""
 
 import contextlib
 import math
@@ -10,23 +10,24 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_FULL_SEARCH_CELLS = 1_000_000
-"""Size of the costmaps that are always searched as a whole: 50 x 50 m at 5 cm."""
+"""Costmaps up to this size are always searched completely: 50 x 50 m at 5 cm."""
 WINDOW_MARGIN_M = 10.0
-"""Margin of the first window around both ends."""
+"""Minimum margin of the first window around start and goal."""
 WINDOW_MARGIN_RATIO = 1 / 3
-"""Margin as a fraction of the distance between the ends, if that is more."""
+"""Margin of the first window as a fraction of the distance from start to goal."""
 
 Plan = Callable[[CostmapView, Pose2, Pose2, int], Path]
 
 
 def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-    """Plan in a window around both ends, then in larger ones, and at last on the whole costmap.
+    """Plan with `plan` in a window around start and goal, then in larger windows, and finally on the whole costmap.
 
-    A path from a window is returned if no path that leaves the window can be shorter. Raises NavigationFailure.
+    A path from a window is returned only if no path that leaves the window can be shorter. Raises the failure of the
+    last search.
     """
     margin = max(WINDOW_MARGIN_M, WINDOW_MARGIN_RATIO * start.distance(goal))
     while costmap.costs.size > MAX_FULL_SEARCH_CELLS:
-        part = window(costmap, start, goal, margin)
+        part = crop_costmap(costmap, start, goal, margin)
         if part is None or 2 * part.costs.size > costmap.costs.size:
             break
         with contextlib.suppress(NavigationFailure):
@@ -37,8 +38,8 @@ def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2,
     return plan(costmap, start, goal, seed)
 
 
-def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
-    """Return the costmap within `margin` m of both ends along x and y; None if an end is off the map."""
+def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
+    """Return the part of the costmap within `margin` m of start and goal along x and y; None if one is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []
     for ends, corner, cells in (
@@ -55,9 +56,9 @@ def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> Co
 
 
 def _min_length_outside(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """Return the minimum length in m of a path that leaves a part of the costmap; inf if none can.
+    """Return the minimum length in m of a path that leaves a part of the costmap; inf if no path can.
 
-    It is the distance to the mirror image of the goal behind a side of the part, except sides of the whole costmap.
+    Such a path touches a side of the part. It is at least as long as the line to the goal mirrored at this side.
     """
     shortest = math.inf
     for axis, start_coordinate, goal_coordinate, lateral in (

@@ -1,4 +1,4 @@
-"""OMPL search over poses, for cars and for hulls that fit through gaps only with some headings."""
+"""OMPL search over poses, for cars and for robots that fit through a gap only with some headings."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -16,36 +16,39 @@ from simscen.stack.planners.ompl_search import PLANNERS, stop_after
 from simscen.stack.protocols import CostmapView
 
 Space = Literal["se2", "dubins", "reeds_shepp"]
-Valid = Callable[[float, float, float], bool]
+"""State spaces of OMPL over poses."""
+PoseCheck = Callable[[float, float, float], bool]
+"""Function that returns whether a pose (x, y, yaw) is valid."""
 POSE_SPACING_M = 0.05
-"""Distance between the poses of a path."""
+"""Maximum distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Minimum ratio of chord to length of a step on an arc of 0.2 m radius. A step with a cusp has a smaller ratio."""
+"""A step whose chord is shorter than this fraction of its length contains a cusp. Arcs have larger ratios."""
 CUSP_TOLERANCE_M = 1e-4
 """Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60
-"""Attempts to remove states of the path. Counted, because OMPL's own simplify() stops by wall-clock time."""
+"""Attempts to shorten the path by removing states. OMPL's own simplify() would stop by wall-clock time."""
 
 
 def search_poses(
-    kind: str,
+    planner_type: str,
     space: Space,
     turning_radius: float,
     bounds: tuple[float, float, float, float],
     start: Pose2,
     goal: Pose2,
-    valid: Valid,
+    valid: PoseCheck,
     seed: int,
     iterations: int,
     check_spacing: float = POSE_SPACING_M,
     configure: Callable[[Any], None] = lambda _: None,
 ) -> list[Pose2] | None:
-    """Return poses from start to goal, `POSE_SPACING_M` apart; None if the iterations did not suffice.
+    """Return poses from start to goal, `POSE_SPACING_M` apart; None if no path was found in `iterations`.
 
-    `valid` is evaluated every `check_spacing` m. `configure` sets the parameters of OMPL's planner.
+    `planner_type` is a key of PLANNERS. `bounds` are (min x, min y, max x, max y) in m. `valid` is evaluated every
+    `check_spacing` m. `configure` sets the parameters of OMPL's planner.
 
-    "dubins" drives forward only, "reeds_shepp" also backward, both on arcs of at least `turning_radius`; "se2" moves
-    in any direction.
+    "dubins" drives only forward and "reeds_shepp" also backward, both on arcs of at least `turning_radius` m; "se2"
+    moves in any direction.
     """
     ou.RNG.setSeed(seed)
     states = _space(space, turning_radius)
@@ -63,7 +66,7 @@ def search_poses(
         return None  # a planner would wait for a better goal, 5 ms per iteration
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(*ends)
-    planner = PLANNERS[kind](information)
+    planner = PLANNERS[planner_type](information)
     configure(planner)
     planner.setProblemDefinition(problem)
     planner.setup()
@@ -79,12 +82,12 @@ def search_poses(
 
 
 def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
-    """Return the Reeds-Shepp paths between stops, at most `POSE_SPACING_M` apart, with the poses of all cusps.
+    """Return poses on the Reeds-Shepp paths between waypoints, at most `POSE_SPACING_M` apart, including all cusps.
 
-    Without the cusps, the path would be shorter than the motion of the robot. OMPL's bindings (2.0.1) do not return the
-    arcs of a path, so that a cusp is found by a chord that is shorter than the length of its step.
+    Without its cusps, a path would be shorter than the motion of the robot. OMPL's bindings (2.0.1) do not return the
+    arcs of a path, so that cusps are found by comparing chord and length of each step.
     """
-    between, poses = states.allocState(), [_pose(waypoints[0])]
+    state, poses = states.allocState(), [_pose(waypoints[0])]
     for first, last in pairwise(waypoints):
         length = states.distance(first, last)
         if length == 0.0:
@@ -92,8 +95,8 @@ def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
         count = max(1, math.ceil(length / POSE_SPACING_M))
 
         def pose_at(length_along: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
-            states.interpolate(first, last, length_along / length, between)
-            return _pose(between)
+            states.interpolate(first, last, length_along / length, state)
+            return _pose(state)
 
         stations = [length * k / count for k in range(count + 1)]
         for low, high in pairwise(stations):
@@ -103,7 +106,7 @@ def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
 
 
 def _cusps(pose_at: Callable[[float], Pose2], low: float, high: float) -> list[float]:
-    """Return the positions in m along a path between `low` and `high` at which the direction changes."""
+    """Return the lengths along a path, between `low` and `high` in m, at which the driving direction changes."""
     first_pose, last_pose = pose_at(low), pose_at(high)
     if math.hypot(last_pose.x - first_pose.x, last_pose.y - first_pose.y) > MIN_CHORD_RATIO * (high - low):
         return []
@@ -134,16 +137,13 @@ def _state(information: Any, pose: Pose2) -> Any:
 
 
 ESCAPE_DIRECTIONS = 16
-"""Number of escape directions of a holonomic base."""
+"""Number of directions in which a holonomic base may leave a collision."""
 ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Curvatures of a car's escape arcs, relative to its tightest one."""
+"""Curvatures of the arcs on which other bases may leave a collision, relative to the maximum curvature."""
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
-    """Yield arcs of poses (n, 3) from the start, `POSE_SPACING_M` apart and `MAX_ESCAPE_M` long.
-
-    "dubins" only drives forward.
-    """
+    """Yield arcs on which the robot may leave a collision: poses (n, 3) over `MAX_ESCAPE_M`, "dubins" only forward."""
     length_along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
     if space == "se2":
         for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
@@ -155,7 +155,7 @@ def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[A
 
 
 def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) -> Array:
-    """Return poses (n, 3) at lengths (n,) in m along an arc in direction `heading` relative to the base."""
+    """Return poses (n, 3) at lengths (n,) in m along an arc that leaves the base in the direction `heading`."""
     turned = curvature * length_along
     chord = length_along * np.sinc(turned / (2.0 * math.pi))
     direction = start.yaw + heading + 0.5 * turned
@@ -165,7 +165,7 @@ def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) ->
 
 
 class DistanceLookup:
-    """Lookup of single distances of a costmap by a memoryview, in a tenth of numpy's time."""
+    """Looks up single distances of a costmap in a memoryview, in a tenth of numpy's time."""
 
     def __init__(self, costmap: CostmapView) -> None:
         self.costmap = costmap

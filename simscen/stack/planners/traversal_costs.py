@@ -1,4 +1,4 @@
-"""Cost per meter of path on a costmap, as Nav2's planners count it."""
+"""Traversal costs: cost per meter of path on a costmap, as in Nav2's planners."""
 
 import copy
 import math
@@ -10,29 +10,28 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.stack.costmap.distance_transform import squared_distances_within
+from simscen.stack.costmap.layers import MAX_NON_OBSTACLE, NO_INFORMATION
 from simscen.stack.protocols import CostmapView, RobotModel
 
-MAX_NON_OBSTACLE, NO_INFORMATION = 252, 255
-"""Costs of nav2_costmap_2d: of the most expensive free cell, and of an unknown cell."""
 UNKNOWN_COSTS = 253
-"""Cost of an unknown cell: a little more than that of the most expensive free cell, as in nav2_navfn_planner."""
+"""Cost that is assumed for an unknown cell: just above that of the most expensive free cell (nav2_navfn_planner)."""
 NO_ROTATION_COST_FACTOR = 4.0
-"""Factor on the cost where a robot that is not round fits but could not turn in place, so that it may get stuck."""
+"""Factor on costs where a robot that is not round cannot turn in place, because it may get stuck there."""
 EXEMPT_RADIUS_M = 0.5
-"""Half side of the square around start and goal in which a plan may have less clearance than elsewhere."""
+"""Half the edge length of the square around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
-"""Distance in cells between two samples of the costs along a path."""
+"""Minimum distance in cells between two samples of the costs along a line."""
 SAMPLE_SPACING_RATIO = 0.6
-"""Distance between two samples along a motion of a search, relative to the inscribed radius. Each obstacle blocks at
-least a disc of that radius, which a line enters by at most 5 % of the radius between two samples."""
+"""Distance between two samples along a motion of a search, relative to the inscribed radius. An obstacle blocks at
+least a disc of this radius; between two samples, a line can enter the disc by at most 5 % of the radius."""
 
 
 class TraversalCosts:
     """Traversal costs per meter on a costmap, `rates` (height, width): 1 in free space, inf in blocked cells.
 
-    These are the costs of nav2_smac_planner, 1 + `multiplier` · cost / 252, integrated along a path instead of from
-    cell to cell. A cell is blocked if the robot's inscribed circle does not fit there, or if it is unknown and not
-    `allow_unknown`. `stride` is the distance in m between two samples of `between`.
+    The costs are those of nav2_smac_planner, 1 + `multiplier` · cost / 252, but integrated along a path instead of from
+    cell to cell. A cell is blocked if the inscribed circle of the robot does not fit there, or if the cell is unknown
+    and `allow_unknown` is False. `stride` is the distance in m between two samples of `between`.
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
@@ -59,7 +58,7 @@ class TraversalCosts:
         self._last_cost = 0.0
 
     def without_narrow_gaps(self, clearance: float, exempt: Sequence[tuple[float, float]]) -> "TraversalCosts":
-        """Return these costs with all gaps blocked in which the robot has less than `clearance` m on each side.
+        """Return a copy in which all gaps are blocked where the robot has less than `clearance` m on each side.
 
         A cell is part of such a gap if no cell within `clearance` has more clearance. Cells near one of the `exempt`
         points keep their costs.
@@ -77,7 +76,7 @@ class TraversalCosts:
         return costs
 
     def reusing_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
-        """Return these costs, with the cache of the previous plan if its costs are the same."""
+        """Return this object, with the cache of `previous` (of the previous plan) if the costs are the same."""
         if previous is not None and np.array_equal(previous.rates, self.rates):
             self.cache = previous.cache
         return self
@@ -105,7 +104,7 @@ class TraversalCosts:
     def between(self, ax: float, ay: float, bx: float, by: float) -> float:
         """Return the cost of the straight motion from a to b, both on the map; inf if it is blocked.
 
-        The last result is cached, because OMPL checks cost and validity of a motion one after the other.
+        The last result is cached, because OMPL asks for cost and validity of a motion one after the other.
         """
         motion = (ax, ay, bx, by)
         if motion == self._last_motion:
@@ -142,6 +141,6 @@ class TraversalCosts:
 
 
 def _padded_view(rates: npt.NDArray[np.float32]) -> Any:
-    """Return the cells as a flat memoryview, padded with inf. Indexing it takes a tenth of numpy's time."""
+    """Return the cells as a flat memoryview, padded with inf. Indexing takes a tenth of numpy's time."""
     padded: Any = np.append(rates.reshape(-1), np.full(rates.shape[1] + 1, np.inf, dtype=np.float32))
     return memoryview(padded)

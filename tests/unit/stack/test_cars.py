@@ -33,9 +33,9 @@ def test_a_plan_is_missed_beside_it_and_at_its_end() -> None:
     plan = FollowedPlan(Path(line(0, 1, 0.0)), 0.2, OPEN)
     for pose, missed in ((Pose2(0.2, 0.1), False), (Pose2(0.4, 0.3), True), (Pose2(0.9, 0.0), False)):
         plan.locate(pose)
-        assert plan.missed(pose) is missed
+        assert plan.is_missed(pose) is missed
     plan.locate(Pose2(1.0, 0.0))
-    assert plan.missed(Pose2(1.0, 0.0))
+    assert plan.is_missed(Pose2(1.0, 0.0))
 
 
 def test_the_smoother_keeps_a_car_on_its_curve_while_it_speeds_up() -> None:

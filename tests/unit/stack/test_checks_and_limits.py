@@ -76,18 +76,18 @@ def test_a_stateful_goal_checker_lets_the_robot_turn_without_losing_its_place() 
 
 def test_progress_means_the_radius_within_the_allowance() -> None:
     checker = ProgressChecker(ProgressSpec(required_movement_radius=0.5, movement_time_allowance=10.0))
-    assert not checker.stuck(Pose2(0, 0), 0.0)
-    assert not checker.stuck(Pose2(0.49, 0), 10.0)
-    assert checker.stuck(Pose2(0.49, 0), 10.1)
-    assert not checker.stuck(Pose2(0.5, 0), 10.2)
+    assert not checker.is_stuck(Pose2(0, 0), 0.0)
+    assert not checker.is_stuck(Pose2(0.49, 0), 10.0)
+    assert checker.is_stuck(Pose2(0.49, 0), 10.1)
+    assert not checker.is_stuck(Pose2(0.5, 0), 10.2)
 
 
 def test_turning_is_progress_only_if_an_angle_is_given() -> None:
     for angle, stuck in ((None, True), (0.5, False)):
         checker = ProgressChecker(ProgressSpec(required_movement_angle=angle))
-        checker.stuck(Pose2(0, 0, 0), 0.0)
-        checker.stuck(Pose2(0, 0, 0.6), 9.0)
-        assert checker.stuck(Pose2(0, 0, 0.6), 11.0) == stuck
+        checker.is_stuck(Pose2(0, 0, 0), 0.0)
+        checker.is_stuck(Pose2(0, 0, 0.6), 9.0)
+        assert checker.is_stuck(Pose2(0, 0, 0.6), 11.0) == stuck
 
 
 def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> None:
@@ -124,8 +124,8 @@ def test_progress_of_a_meter_resets_the_retries(anew: bool, there_are: list[bool
 )
 def test_recoveries_follow_the_listed_and_unknown_codes(code: int, advanced: bool, nav2: bool) -> None:
     failure = NavigationFailure(code, "")
-    assert BehaviorSequence([], Recovery()).helps(failure) == nav2
-    assert BehaviorSequence([], StackSpec(profile="advanced").recovery).helps(failure) == advanced
+    assert BehaviorSequence([], Recovery()).can_help(failure) == nav2
+    assert BehaviorSequence([], StackSpec(profile="advanced").recovery).can_help(failure) == advanced
 
 
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:
@@ -135,7 +135,7 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
         plan.compare(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
-        assert plan.blocked() == blocked
+        assert plan.is_blocked() == blocked
     assert plan.remaining() == pytest.approx(2.95, abs=0.05)
 
 

@@ -71,23 +71,23 @@ def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(0)
     guard.on_scan(scan((2.0, 0.0)), Pose2(0, 0))
-    assert not guard.silent(72)
-    assert guard.silent(73)
+    assert not guard.is_silent(72)
+    assert guard.is_silent(73)
     guard.on_scan(scan((2.0, 0.0), tick=100), Pose2(0, 0))
-    assert not guard.silent(172)
+    assert not guard.is_silent(172)
     guard.on_scan(Scan("lidar", 180, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0))
-    assert guard.silent(181)
+    assert guard.is_silent(181)
 
 
 def test_robot_waits_for_its_first_scan() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(12)
-    assert guard.silent(12)
+    assert guard.is_silent(12)
     assert guard.silence_reason(24) == "lidar `lidar` has been silent for 0.05 s; source_timeout is 0.3 s"
     guard.on_scan(scan((2.0, 0.0), tick=10), Pose2(0, 0), 30)
-    assert not guard.silent(30)
+    assert not guard.is_silent(30)
     guard.start(60)
-    assert not guard.silent(60)
+    assert not guard.is_silent(60)
 
 
 def test_silent_lidar_has_a_reason() -> None:

@@ -123,12 +123,12 @@ def test_delayed_results_arrive_in_order_after_their_latency() -> None:
     underway.put(0, "a")
     underway.put(3, "b")
     assert underway.due == 5
-    assert underway.busy(4)
+    assert underway.is_busy(4)
     assert underway.take() == "a"
     assert underway.due == 8
     assert underway.take() == "b"
     assert underway.due == math.inf
-    assert not underway.busy(8)
+    assert not underway.is_busy(8)
 
 
 def test_readings_of_motion_that_wait_for_the_next_step_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

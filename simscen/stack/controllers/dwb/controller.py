@@ -1,4 +1,4 @@
-"""A dynamic-window controller (Fox, Burgard and Thrun 1997) with the critics of nav2_dwb_controller."""
+"""DWB: a dynamic-window controller (Fox, Burgard and Thrun 1997) with the critics of nav2_dwb_controller."""
 
 import numpy as np
 
@@ -12,33 +12,32 @@ from simscen.stack.controllers.dwb.critics import (
     RotateToGoalCritic,
     score_trajectories,
 )
-from simscen.stack.controllers.dwb.trajectory_generator import generate_trajectories, kinematics_of, velocity_window
+from simscen.stack.controllers.dwb.trajectory_generator import (
+    generate_trajectories,
+    kinematic_parameters,
+    velocity_window,
+)
 from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
 from simscen.stack.controllers.path_handler import upcoming_path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 PLAN_LENGTH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
-"""Length of the part of the plan that the critics see: relative to the distance that the robot drives in `sim_time`,
-and a length in m that is added. A shorter part would slow the robot down, and a longer one would lead it straight into
-a wall after a bend."""
+"""The critics see the next part of the plan: 1.2 times the distance that the robot drives in `sim_time`, plus 0.5 m. A
+shorter part would slow the robot down, a longer one would lead it straight into a wall after a bend."""
 
 
 class DynamicWindowController(PathFollower):
-    """Samples the velocities that can be reached within `sim_time`, and takes the one with the best score."""
+    """Samples the velocities that can be reached within `sim_time`, and selects the one with the best score."""
 
     def __init__(self, spec: DwbSpec, setting: Setting) -> None:
         robot = setting.robot
         super().__init__(spec, spec.max_vel_x, robot)
         self._spec, self._robot = spec, robot
-        self._kinematics = kinematics_of(spec, robot, self._full_speed)
+        self._kinematics = kinematic_parameters(spec, robot, self._full_speed)
         self._sample_counts = (spec.vx_samples, spec.vy_samples, spec.vtheta_samples)
         self._goal_rotation = GoalRotation(
-            robot,
-            spec.max_vel_theta,
-            robot.angular_acceleration,
-            setting.control_period,
-            spec.goal_tolerance_ratio,
+            robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period, spec.goal_tolerance_ratio
         )
         self._obstacle_critic = ObstacleCritic(setting.footprint, spec.preferred_clearance)
         self._rotate_to_goal = RotateToGoalCritic(spec.trans_stopped_velocity, spec.slowing_factor)
@@ -59,9 +58,9 @@ class DynamicWindowController(PathFollower):
         return None if self._best is None else Path(self._best)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL when every trajectory is in collision."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if every trajectory collides or is not allowed."""
         tracker = self._locate(pose)
-        is_reached = self._goal_rotation.reached(pose, twist, goal, tracker.remaining())
+        is_reached = self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining())
         if is_reached and self._robot.turning_radius > 0.0:
             return STOP
         spec, kinematics = self._spec, self._kinematics.scaled(self._speed_ratio)

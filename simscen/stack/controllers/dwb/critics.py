@@ -1,8 +1,8 @@
-"""Critics of DWB, which score and reject trajectories (dwb_critics).
+"""Critics of DWB, which score and reject trajectories (dwb_critics). Lower scores are better.
 
 Raw scores are in cells, costs, rad, or rad/s and are multiplied by the scale of the critic. As in Nav2, the scales of
-critics that count cells are multiplied by half the resolution. MapGridCritic propagates Manhattan distances through
-all cells, obstacles included; here, they are computed in closed form.
+critics that count cells are also multiplied by half the resolution. Nav2's MapGridCritic propagates Manhattan distances
+from cell to cell, through obstacles too; here, they are computed in closed form.
 """
 
 import math
@@ -16,21 +16,21 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
 from simscen.stack.controllers.dwb.trajectory_generator import Trajectories
+from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-UNKNOWN = 255
-"""Cost of an unknown cell in nav2_costmap_2d."""
+
 BATCH_TRAJECTORIES = 50
-"""Number of trajectories that are checked together. Usually one of the first is free."""
+"""Number of trajectories that are checked for collisions at once. Usually, one of the first is free."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Raw scores (n,) and scales by Nav2's names of the critics, and which trajectories (n,) are legal."""
+    """Scores of n trajectories: raw scores (n,) and scale of each critic by Nav2's name; `legal` (n,): not rejected."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -38,7 +38,7 @@ class Scores:
 
     @property
     def total(self) -> Array:
-        """Weighted sums (n,); infinite for illegal trajectories."""
+        """Sum (n,) of the scaled scores of all critics; inf for rejected trajectories."""
         total = np.zeros(len(self.legal))
         for name, raw in self.raw.items():
             total += self.scale[name] * raw
@@ -50,7 +50,7 @@ def score_trajectories(
 ) -> Scores:
     """Return the scores of trajectories with these velocities (n, 3) and final poses (n, 3).
 
-    The plan (m, 2) has at least one point. A trajectory is legal if it ends on the costmap.
+    `pose` is that of the robot. The plan (m, 2) must have a point. A trajectory is legal if it ends on the costmap.
     """
     forward_distance = spec.forward_point_distance
     forward = ends[:, :2] + forward_distance * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
@@ -82,7 +82,7 @@ def score_trajectories(
 
 
 def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Array:
-    """Return the plan with its end moved beyond the goal by a distance in m, as seen from the robot."""
+    """Return the plan with its last point moved by `distance` m, in the direction from the robot to the goal."""
     angle = np.arctan2(goal.y - pose.y, goal.x - pose.x)
     extended = plan.copy()
     extended[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
@@ -90,17 +90,17 @@ def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) 
 
 
 def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
-    """Return the cells (n, 2) as (row, column) below points (n, 2), and which of them are on the costmap."""
+    """Return the cells (n, 2), as (row, column), at points (n, 2), and which of them are on the costmap."""
     cells = np.floor((points[:, ::-1] - np.array(costmap.origin)[::-1]) / costmap.resolution).astype(np.int64)
     on_map: Mask = np.asarray(((cells >= 0) & (cells < np.array(costmap.costs.shape))).all(axis=1))
     return cells, on_map
 
 
 def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
-    """Return the cells (m, 2) of the plan (n, 2) from where it enters the known costmap to where it leaves it."""
+    """Return the cells (m, 2) of the first part of the plan (n, 2) that lies on known cells of the costmap."""
     cells, on_map = cells_of(costmap, plan)
     known = on_map.copy()
-    known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != UNKNOWN
+    known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != NO_INFORMATION
     if not known.any():
         return cells[:0]
     first = int(known.argmax())
@@ -129,7 +129,10 @@ class RotateToGoalCritic:
         self._is_rotating = False
 
     def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
-        """Return the scores (n,) of velocities (n, 3) that lead to headings (n,), and which of them are legal."""
+        """Return the scores (n,) of velocities (n, 3) with final headings (n,), and which of them are legal.
+
+        `now` is the current velocity.
+        """
         speed = math.hypot(now.vx, now.vy)
         self._is_rotating |= speed <= self._stopped_velocity
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
@@ -140,19 +143,19 @@ class RotateToGoalCritic:
 
 
 class ObstacleCritic:
-    """Selects the first trajectory without a collision (dwb_critics' ObstacleFootprint, including moving obstacles)."""
+    """Selects a trajectory without a collision, also with moving obstacles (dwb_critics' ObstacleFootprint)."""
 
     def __init__(self, footprint: Footprint, preferred_clearance: float) -> None:
-        """Take the footprint, and the clearance in m that a trajectory must have if any trajectory has it."""
+        """Take the footprint, and the clearance in m below which a trajectory is only taken if no other has more."""
         self._footprint, self._preferred_clearance = footprint, preferred_clearance
 
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """Return the first trajectory, in this order, that keeps the preferred clearance, or else one that is free.
+        """Return the index of the first trajectory, in this `order` (k,) of indices, with the preferred clearance.
 
-        A robot that is in collision takes the first one that leads out of it. If there are moving obstacles,
-        trajectories that meet none of them come first, then those that meet one as late as possible.
+        If there is none, return the first free one; in a collision, the first that leads out of it; else None. If there
+        are moving obstacles, trajectories that meet none come first, then those that meet one as late as possible.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
@@ -175,7 +178,7 @@ class ObstacleCritic:
         return int(order[int(free.argmax())]) if free.any() else None
 
     def _meeting_times(self, moving: MovingObstacles, trajectories: Trajectories, order: npt.NDArray[np.intp]) -> Array:
-        """Return the times (k,) in s at which trajectories come too close to a moving obstacle; inf if they do not."""
+        """Return the times (k,) in s at which the k trajectories come too close to a moving obstacle, or inf."""
         times = trajectories.times[:, trajectories.yaw_index[order]]
         gaps = self._footprint.gap(moving, trajectories.poses(order), times, UNCERTAINTY_SIGMAS)
         too_close = (gaps < self._preferred_clearance) & (gaps < gaps[0] - APPROACH_TOLERANCE_M)
@@ -183,7 +186,7 @@ class ObstacleCritic:
 
 
 class DirectionHistory:
-    """Sign of one velocity component over time, and the sign that is allowed after it has reversed."""
+    """Last direction of one velocity component, and the direction that is allowed since the last reversal."""
 
     def __init__(self) -> None:
         self.reset()
@@ -195,7 +198,7 @@ class DirectionHistory:
         """1 or -1 if only this sign is allowed; 0 if both are."""
 
     def update(self, velocity: float) -> bool:
-        """Record a command; return whether it reversed the direction."""
+        """Record a commanded velocity; return whether it reverses the direction."""
         if velocity == 0.0:
             return False
         sign = math.copysign(1.0, velocity)

@@ -16,28 +16,25 @@ from simscen.stack.kinematics import VelocityLimits, accumulate_rows, velocity_l
 from simscen.stack.protocols import RobotModel
 
 SAME_VELOCITY_M_S = 1e-5
-"""Nav2's EPSILON: a smaller range of velocities counts as one velocity."""
+"""Nav2's EPSILON: if the range of velocities is smaller, only one velocity is sampled."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
 """Rounding error allowed for squared speeds."""
 
 
 @dataclass(frozen=True)
-class Kinematics(VelocityLimits):
-    """Velocity limits, and limits of combinations.
-
-    These are the minimum and maximum speed in m/s in any direction, and the minimum turn rate in rad/s.
-    """
+class KinematicParameters(VelocityLimits):
+    """Velocity limits of each axis, the speed limits in m/s in any direction, and the minimum turn rate in rad/s."""
 
     min_speed_xy: float
     max_speed_xy: float
     min_speed_theta: float
 
-    def scaled(self, ratio: float) -> "Kinematics":
-        """Return the limits scaled by a speed limit. Unlike in Nav2, it also applies to reverse driving."""
+    def scaled(self, ratio: float) -> "KinematicParameters":
+        """Return limits with velocities multiplied by `ratio`. Unlike in Nav2, the reverse speed is scaled, too."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
-        """Return those of the velocities (n, 3) that the base may drive. Standing still is not one of them."""
+        """Return those of the velocities (n, 3) that are within the limits, except for standing still."""
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
         turn_rate = np.abs(velocities[:, 2])
         is_slow = (squared_speed + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
@@ -50,8 +47,8 @@ class Kinematics(VelocityLimits):
         return np.asarray(velocities[valid])
 
 
-def kinematics_of(spec: DwbSpec, robot: RobotModel, full_speed: float) -> Kinematics:
-    """Return the limits of the specification, bounded by those of the robot."""
+def kinematic_parameters(spec: DwbSpec, robot: RobotModel, full_speed: float) -> KinematicParameters:
+    """Return the limits of the specification, bounded by those of the robot. `full_speed` in m/s limits vx."""
     lateral = full_speed if spec.max_vel_y is None else spec.max_vel_y
     limits = velocity_limits(
         robot,
@@ -60,7 +57,7 @@ def kinematics_of(spec: DwbSpec, robot: RobotModel, full_speed: float) -> Kinema
         acceleration=(spec.acc_lim_x, spec.acc_lim_y, spec.acc_lim_theta),
         deceleration=(spec.decel_lim_x, spec.decel_lim_y, spec.decel_lim_theta),
     )
-    return Kinematics(
+    return KinematicParameters(
         **vars(limits),
         min_speed_xy=spec.min_speed_xy,
         max_speed_xy=full_speed if spec.max_speed_xy is None else spec.max_speed_xy,
@@ -69,7 +66,7 @@ def kinematics_of(spec: DwbSpec, robot: RobotModel, full_speed: float) -> Kinema
 
 
 def project_velocity(now: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
-    """Return the velocity after a time in s on the way to the target (dwb_plugins' projectVelocity)."""
+    """Return the velocity after `seconds` on the way from `now` to `target`; `deceleration` is negative."""
     if now < target:
         return min(target, now + acceleration * seconds)
     return max(target, now + deceleration * seconds)
@@ -78,7 +75,7 @@ def project_velocity(now: float, acceleration: float, deceleration: float, secon
 def velocity_samples(
     now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """Return `count` velocities that can be reached within a time in s, and 0 if it lies between two of them."""
+    """Return `count` velocities that can be reached within `seconds`, and 0 if it lies between two of them."""
     now = min(max(now, low), high)
     highest = project_velocity(now, acceleration, deceleration, seconds, high)
     lowest = project_velocity(now, acceleration, deceleration, seconds, low)
@@ -95,9 +92,8 @@ def velocity_samples(
     return samples
 
 
-def velocity_window(kinematics: Kinematics, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
-    """Return the velocities (n, 3) of vx, vy, and turn rate that can be reached within a time in s, in order of vx."""
-    limits = kinematics
+def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
+    """Return velocities (n, 3) that can be reached within `seconds`, in order of vx. `counts`: samples of each axis."""
     axes = [
         velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
         for velocity, low, high, acceleration, deceleration, count in zip(
@@ -109,10 +105,10 @@ def velocity_window(kinematics: Kinematics, now: Twist, seconds: float, counts: 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Positions `x` and `y` (steps, n) of trajectories, and headings `yaw` and `times` in s (steps, m).
+    """Positions `x` and `y` (steps, n) of n trajectories, and headings `yaw` (steps, m) at `times` in s (steps, m).
 
-    Many trajectories share the same headings, so that few sines are needed: `yaw_index` (n,) is the column of each
-    trajectory in `yaw` and `times`.
+    Many trajectories have the same headings, which are stored once to save sines: `yaw_index` (n,) is the column of
+    each trajectory in `yaw` and `times`.
     """
 
     x: Array
@@ -130,27 +126,27 @@ class Trajectories:
         return np.column_stack((self.x[-1], self.y[-1], self.yaw[-1, self.yaw_index]))
 
     def poses(self, indices: npt.NDArray[np.intp]) -> Array:
-        """Return the poses (steps, k, 3) of k trajectories."""
+        """Return the poses (steps, k, 3) of the k trajectories with these indices."""
         return np.stack((self.x[:, indices], self.y[:, indices], self.yaw[:, self.yaw_index[indices]]), axis=-1)
 
 
 def generate_trajectories(
-    pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, meters: float, radians: float
+    pose: Pose2, now: Twist, velocities: Array, limits: KinematicParameters, seconds: float, length: float, angle: float
 ) -> Trajectories:
-    """Return the trajectories of a base that accelerates to each of the velocities (n, 3), over a time in s.
+    """Return the trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
 
-    Each has as many steps as needed for none to be longer than `meters` or to turn by more than `radians`. Shorter
-    trajectories are padded with their end. The heading is constant within a step.
+    No step is longer than `length` m or turns by more than `angle` rad. Trajectories with fewer steps are padded with
+    their final pose. The heading is constant within a step.
     """
-    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / meters
-    turn_steps = np.abs(velocities[:, 2]) * seconds / radians
+    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / length
+    turn_steps = np.abs(velocities[:, 2]) * seconds / angle
     step_counts = np.maximum(1.0, np.ceil(np.maximum(distance_steps, turn_steps)))
     _, first, yaw_index = np.unique(velocities[:, 2] + 1j * step_counts, return_index=True, return_inverse=True)
     count, dt = step_counts[first], seconds / step_counts[first]
     step = np.arange(math.ceil(step_counts.max()) + 1)[:, None]
     times, step = np.minimum(step, count) * dt, step[1:]
     yaw_times, durations = times[1:], np.where(step <= count, dt, 0.0)
-    axes = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
+    axes = list(zip(now, limits.acceleration, limits.deceleration, strict=True))
     wz = _ramp(velocities[first, 2], *axes[2], yaw_times)
     yaw = _accumulate(pose.yaw, wz * durations)
     cosine = (np.cos(yaw[:-1]) * durations).take(yaw_index, axis=1)
@@ -165,7 +161,7 @@ def generate_trajectories(
 
 
 def _ramp(target: Array, start: float, acceleration: float, deceleration: float, times: Array) -> Array:
-    """Return the velocities (steps, n) at times in s on the way from `start` to the targets (n,)."""
+    """Return the velocities (steps, n) at `times` (steps, n) in s on the way from `start` to the targets (n,)."""
     velocities = times * np.where(start < target, acceleration, deceleration)
     velocities += start
     np.maximum(velocities, np.minimum(start, target), out=velocities)
@@ -173,7 +169,7 @@ def _ramp(target: Array, start: float, acceleration: float, deceleration: float,
 
 
 def _accumulate(start: float, steps: Array) -> Array:
-    """Return the values (m + 1, n) that result from a start and steps (m, n)."""
+    """Return `start` and the values (m + 1, n) after each of the steps (m, n)."""
     values = np.empty((len(steps) + 1, steps.shape[1]))
     values[0], values[1:] = 0.0, steps
     accumulate_rows(values[1:])

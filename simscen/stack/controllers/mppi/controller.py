@@ -1,14 +1,13 @@
-"""Model predictive path integral control (Williams et al. 2017), as nav2_mppi_controller does it.
+"""Model predictive path integral control (Williams et al. 2017), as in nav2_mppi_controller.
 
-Many noisy copies of the previous control sequence are simulated and scored. The new sequence is their average, weighted
-by exp(-cost / temperature).
+A control sequence is an array (axes, steps) of velocities. Many noisy copies (samples) of the previous sequence are
+simulated and scored. The new sequence is their average, weighted by exp(-cost / temperature).
 """
 
 import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -21,6 +20,7 @@ from simscen.stack.controllers.mppi.rollouts import (
     VX,
     VY,
     WZ,
+    Floats,
     Rollouts,
     apply_model_delay,
     axis_order,
@@ -34,25 +34,24 @@ from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-Floats = npt.NDArray[np.float32]
 SMOOTHING_KERNELS = {
     1: np.full(9, 1.0 / 9.0, np.float32),
     2: np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21], np.float32) / np.float32(231.0),
 }
-"""Savitzky-Golay filters of nine points, by their order (Savitzky and Golay 1964)."""
+"""Savitzky-Golay filters of nine points by the order of their polynomial (Savitzky and Golay 1964)."""
 MIN_SMOOTHED_STEPS = 21
-"""Shortest sequence that is smoothed."""
+"""Minimum number of steps of a sequence that is smoothed."""
 PAST_COMMANDS = 4
-"""Number of previous commands that the filter includes."""
+"""Number of previous commands that the filter includes: half of its points."""
 
 
 def sample_weights(
     costs: Array, sequence: Floats, noise: Floats, deviations: Sequence[float], gamma: float, temperature: float
 ) -> Floats:
-    """Return the weights (n,) of the samples, which are proportional to exp(-cost / temperature).
+    """Return the weights (n,) of samples with these costs (n,), proportional to exp(-cost / temperature).
 
     `gamma` weights the control cost: the product of the sequence and the `noise` (axes, steps, n) that was added to it,
-    divided by the variance of the noise.
+    divided by the variance of the noise. `deviations` are the standard deviations of the noise of each axis.
     """
     total = costs.copy()
     for axis, deviation in enumerate(deviations):
@@ -63,7 +62,10 @@ def sample_weights(
 
 
 def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
-    """Return the sequence with all steps but the last one filtered; `past` (axes, 4) are the commands before it."""
+    """Return the sequence, filtered except for its last step; `past` (axes, 4) are the commands before it.
+
+    `order` selects the kernel.
+    """
     if sequence.shape[1] < MIN_SMOOTHED_STEPS:
         return sequence
     padded = np.concatenate((past, sequence, np.repeat(sequence[:, -1:], PAST_COMMANDS, axis=1)), axis=1)
@@ -74,12 +76,13 @@ def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
 
 
 def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the sequence limited to what the base can drive. Its first step is the current velocity `now` (axes,)."""
+    """Return the sequence limited to what the base can drive, after the current velocity `now` (axes,) as first step.
+
+    `sequence` is modified. `dt` is the time step in s.
+    """
     low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
-    increase, decrease = (
-        (axis_order(limits.acceleration) * dt).tolist(),
-        (axis_order(limits.deceleration) * dt).tolist(),
-    )
+    increase = (axis_order(limits.acceleration) * dt).tolist()
+    decrease = (axis_order(limits.deceleration) * dt).tolist()
     _limit_curvature(sequence, limits)
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):
@@ -93,7 +96,7 @@ def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: floa
 def _limit_axis(
     requested: list[float], now: float, bounds: tuple[float, float], changes: tuple[float, float]
 ) -> list[float]:
-    """Return the velocities of one axis, limited to `bounds` and by the `changes` per step (up, down)."""
+    """Return the velocities of one axis, limited to `bounds` (low, high) and by `changes` per step (up, down)."""
     (low, high), (up, down) = bounds, changes
     limited, last = [now], now
     for velocity in requested[1:]:
@@ -112,20 +115,20 @@ def _limit_curvature(sequence: Floats, limits: VelocityLimits) -> None:
 
 
 def shift_sequence(sequence: Floats, steps: float) -> Floats:
-    """Return the sequence shifted forward by a number of steps, with its last value repeated."""
+    """Return the sequence without its first `steps` (also fractions of steps), with its last value repeated."""
     index = np.arange(sequence.shape[1], dtype=np.float64)
     return np.stack([np.interp(index + steps, index, row) for row in sequence]).astype(np.float32)
 
 
 PLAN_MARGIN_M = 1.0
-"""Length in m of the path beyond the reach of the rollouts, which PathFollowCritic and PathAngleCritic need."""
+"""Length of path beyond the reach of the rollouts that PathFollowCritic and PathAngleCritic need."""
 SPEED_STD_RATIO = 0.5
 """Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
-settles at about 0.5 m/s regardless of its maximum speed."""
+would drive at about 0.5 m/s even if its maximum speed is higher."""
 
 
 class MppiController(PathFollower):
-    """Keeps a control sequence and improves it in each control period."""
+    """Keeps a control sequence and optimizes it in each control period."""
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
@@ -166,7 +169,7 @@ class MppiController(PathFollower):
         self._noise = self._rng.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
     def begin(self) -> None:
-        """Reset the goal rotation for a path to another goal. The control sequence stays as the initial guess."""
+        """Reset the goal rotation for another goal. The control sequence stays as the initial guess."""
         self._goal_rotation.reset()
 
     @property
@@ -175,13 +178,13 @@ class MppiController(PathFollower):
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory of the control sequence."""
+        """Trajectory of the optimized control sequence."""
         return None if self._optimal is None else Path(self._poses(self._optimal))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """Return the velocity command. Raises NO_VALID_CONTROL if all rollouts, or their average, collide."""
         tracker, self._pose = self._locate(pose), pose
-        if self._goal_rotation.reached(pose, twist, goal, tracker.remaining()):
+        if self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining()):
             self._reset()
             command = self._goal_rotation.turn_to_goal(pose, goal, twist)
         else:
@@ -189,7 +192,7 @@ class MppiController(PathFollower):
             command = self._optimize(twist, lambda rollouts: self._critic_data(rollouts, plan, costmap, goal))
         required = self._spec.command_free_time
         free_time = self._collision_checker.free_time(costmap, pose, command, required)
-        return self._collision_checker.slowed(command, free_time, required, required)
+        return self._collision_checker.slow_down(command, free_time, required, required)
 
     def _critic_data(self, rollouts: Rollouts, plan: UpcomingPath, costmap: CostmapView, goal: Goal) -> CriticData:
         return CriticData(
@@ -198,7 +201,7 @@ class MppiController(PathFollower):
         )  # fmt: skip
 
     def _optimize(self, twist: Twist, critic_data: Callable[[Rollouts], CriticData]) -> Twist:
-        """Improve the sequence, and return its first command. After a collision, reset the sequence and retry."""
+        """Optimize the sequence, and return its first command. If it collides, reset the sequence and retry."""
         for _ in range(1 + self._spec.retry_attempt_limit):
             velocity = self._initial_velocity(twist)
             is_free = False
@@ -212,19 +215,18 @@ class MppiController(PathFollower):
         raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "every trajectory of the optimizer collides")
 
     def _initial_velocity(self, twist: Twist) -> Floats:
-        """Return the velocity (axes,) at which the new command takes effect.
+        """Return the velocity (axes,) from which the new command starts.
 
-        In open loop, it is the last command; otherwise, the velocity nearest to it that the base can have reached.
+        In open loop, this is the last command. Otherwise, it is the velocity nearest to the last command that the base
+        can reach within one period from its measured velocity.
         """
         sent, limits = self._sent[:, -1].astype(np.float64), self._limits
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        decrease, increase = (
-            axis_order(limits.deceleration) * self._period,
-            axis_order(limits.acceleration) * self._period,
-        )
-        reachable = np.clip(sent, measured + decrease[: self._axes], measured + increase[: self._axes])
+        lowest = measured + (axis_order(limits.deceleration) * self._period)[: self._axes]
+        highest = measured + (axis_order(limits.acceleration) * self._period)[: self._axes]
+        reachable = np.clip(sent, lowest, highest)
         return reachable.astype(np.float32)
 
     def _iterate(self, velocity: Floats, critic_data: Callable[[Rollouts], CriticData]) -> bool:

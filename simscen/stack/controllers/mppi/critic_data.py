@@ -1,4 +1,4 @@
-"""Input of the MPPI critics: rollouts, local plan, and obstacles (nav2_mppi_controller's CriticData)."""
+"""Input of the MPPI critics: rollouts, path ahead, and obstacles (nav2_mppi_controller's CriticData)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,27 +8,26 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.controllers.mppi.rollouts import Rollouts
+from simscen.stack.controllers.mppi.rollouts import Floats, Rollouts
 from simscen.stack.controllers.path_handler import UpcomingPath
+from simscen.stack.costmap.layers import INSCRIBED, NO_INFORMATION
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 
-Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
-INSCRIBED, UNKNOWN = 253, 255
-"""Costs of nav2_costmap_2d: of a cell that the inscribed circle must not enter, and of an unknown cell."""
+
 MOVING_CLEARANCE_M = 0.25
-"""Clearance that rollouts keep from moving obstacles, in addition to a standard deviation of their position."""
+"""Clearance that rollouts should keep from moving obstacles, plus one standard deviation of their position."""
 COLLISION_DECAY_S = 1.2
-"""Time in which the weight of a predicted encounter with a moving obstacle decays by a factor of e."""
+"""Time after which a predicted collision with a moving obstacle weighs less by a factor of e."""
 ESCAPE_TOLERANCE_M = 0.01
-"""Distance by which a robot that is in collision may come nearer to the obstacle."""
+"""Distance by which a robot that is already in collision may come closer to the obstacle."""
 
 
 class CellLookup(NamedTuple):
-    """Points (…,) with the index of the costmap cell below each.
+    """Points (…,) in the frame of the rollouts, with the flat index of the costmap cell at each point.
 
     `on_map` marks the points that are on the costmap; None if all of them are.
     """
@@ -41,9 +40,11 @@ class CellLookup(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CriticData:
-    """Input of the critics. Lengths in m, in a frame with the robot at the origin and the axes of the costmap's frame.
+    """Input of the critics for n rollouts.
 
-    `dt` is the time step of the rollouts in s, `tolerance` the position tolerance of the goal in m.
+    `plan`, `pose` (of the robot), and `goal_yaw` are in the frame of the costmap; rollouts and `path` are relative to
+    the position of the robot, without rotation. `dt` is the time step of the rollouts in s, `tolerance` the position
+    tolerance of the goal in m.
     """
 
     rollouts: Rollouts
@@ -58,15 +59,15 @@ class CriticData:
 
     @cached_property
     def path(self) -> tuple[Floats, Floats, Floats]:
-        """x, y, yaw (m,) of the plan."""
+        """x, y, yaw (m,) of the plan in the frame of the rollouts."""
         return self.plan.relative_to(self.pose)
 
     @cached_property
     def furthest_point(self) -> int:
-        """Index of the furthest point of the plan that any rollout reaches: the point nearest to the rollout's end.
+        """Index of the furthest point of the plan that any rollout reaches (nav2's findPathFurthestReachedPoint).
 
-        This is findPathFurthestReachedPoint of nav2_mppi_controller. In addition, a point counts as reached only if its
-        distance along the plan is at most the length of the rollout.
+        A rollout reaches the point that is nearest to its end. Unlike in Nav2, points farther along the plan than the
+        length of the rollout do not count.
         """
         x, y, _ = self.path
         length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
@@ -82,9 +83,9 @@ class CriticData:
 
     @cached_property
     def free_points(self) -> Mask:
-        """Mask (m,) of the points of the plan at which the center of the robot can be: free or unknown cells."""
+        """Mask (m,) of the points of the plan where the center of the robot may be: free or unknown cells."""
         costs = self.costs(self.lookup(*self.path[:2]))
-        return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
+        return np.asarray((costs < INSCRIBED) | (costs == NO_INFORMATION))
 
     @cached_property
     def moving(self) -> MovingObstacles:
@@ -105,7 +106,7 @@ class CriticData:
 
     @cached_property
     def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
-        """Mean squared nearness of each rollout (n,) to moving obstacles, and the weight of its first contact (or 0).
+        """For each rollout (n,): mean squared nearness to moving obstacles, and weight of its first contact (or 0).
 
         Later steps of a rollout weigh less, because moving obstacles may change their direction.
         """
@@ -129,7 +130,7 @@ class CriticData:
         return self.costmap.distance.ravel()
 
     def lookup(self, x: Floats, y: Floats) -> CellLookup:
-        """Return the cells below points (…,)."""
+        """Return the cells at points (…,)."""
         view = self.costmap
         scale, (height, width) = np.float32(1.0 / view.resolution), view.costs.shape
         column = x + np.float32(self.pose.x - view.origin[0])
@@ -153,8 +154,8 @@ class CriticData:
     def collides(self, clearance: Floats, consider_footprint: bool) -> Mask:
         """Return which rollouts (n,) collide, given their `clearance` (steps, n).
 
-        A robot that is already in collision, according to the costmap or because the discs are larger than its
-        footprint, may move unless that brings it further into the obstacle. Otherwise, it could never get out.
+        A robot may already be in collision according to the costmap, or because the discs are larger than its
+        footprint. Then only rollouts that lead deeper into the obstacle collide, so that the robot can get out.
         """
         current = self._current_clearance[consider_footprint]
         return np.asarray(clearance.min(axis=0) <= min(0.0, current - ESCAPE_TOLERANCE_M))
@@ -170,8 +171,8 @@ class CriticData:
     def clearance(self, points: CellLookup, yaw: Floats, consider_footprint: bool) -> Floats:
         """Return the distance (…,) in m from the robot at points to the nearest obstacle; negative in collision.
 
-        The robot is its inscribed circle or, with `consider_footprint`, the discs that cover its footprint. Off the
-        costmap, the distance is inf.
+        The robot is represented by its inscribed circle or, with `consider_footprint`, by discs that cover its
+        footprint. Off the costmap, the distance is inf.
         """
         discs: CoveringDiscs = self.footprint.discs
         if not consider_footprint:
@@ -191,7 +192,7 @@ class CriticData:
 
 
 def hypot_in_place(dx: Floats, dy: Floats) -> Floats:
-    """Return the lengths of vectors, and overwrite the arguments. About five times as fast as np.hypot."""
+    """Return the lengths of vectors, and overwrite the arguments. Much faster than np.hypot."""
     dx *= dx
     dy *= dy
     dx += dy

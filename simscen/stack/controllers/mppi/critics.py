@@ -1,30 +1,30 @@
-"""Critics of MPPI, which score the rollouts (nav2_mppi_controller), and the manager that adds up their costs.
+"""Critics of MPPI, which compute costs of the rollouts (nav2_mppi_controller), and the manager that adds these up.
 
-A critic takes its parameters and the critic data, and returns the weighted cost of each rollout (n,).
+A critic takes its parameters and the critic data, and returns the cost of each rollout (n,): the described value times
+`cost_weight`.
 """
 
 from typing import get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.model import mppi as model
 from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, hypot_in_place
-from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
+from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Floats
 from simscen.stack.kinematics import accumulate_rows
 
-Floats = npt.NDArray[np.float32]
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
-"""Turn rate that replaces smaller ones in the turning radius of a car, which would be infinite."""
+"""Smaller turn rates are replaced by this one, so that the turning radius of a car stays finite."""
 HALF_TURN_RAD = np.float32(np.pi)
 MAX_COST = 254.0
-"""Highest cost of a cell, by which CostCritic divides."""
+"""Highest known cost of a cell, by which CostCritic divides."""
 OPTIONAL_CRITICS = ("ObstaclesCritic", "TwirlingCritic", "VelocityDeadbandCritic")
+"""Critics that Nav2 does not enable by default."""
 NAV2_CRITICS: tuple[model.CriticName, ...] = tuple(
     name for name in get_args(model.CriticName) if name not in OPTIONAL_CRITICS
 )
-"""Default critics of Nav2."""
+"""Critics that Nav2 enables by default."""
 
 
 class CriticManager:
@@ -51,7 +51,7 @@ class CriticManager:
         return total, all_collide
 
     def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:
-        """Return the costs (n,) by a critic, None if it does not apply; and which rollouts collide, if it knows."""
+        """Return the costs (n,) by a critic or None if it does not apply, and which rollouts collide or None."""
         spec, length = self._spec, data.plan.length
         costs: Floats | None = None
         match name:
@@ -81,9 +81,9 @@ class CriticManager:
 
 
 def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Floats:
-    """Return the velocity in excess of the limits, integrated over time.
+    """Return by how much velocities exceed the limits, integrated over time.
 
-    For a car, the difference in m between the minimum turning radius and a tighter one is added.
+    For a car, the difference in m between the minimum turning radius and a smaller one is added.
     """
     velocities, limits = data.rollouts.velocities, data.limits
     vx, (low, *_), (high, lateral, _) = velocities[VX], limits.low, limits.high
@@ -116,8 +116,8 @@ def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, M
 def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return costs for the nearness of obstacles, and which rollouts collide.
 
-    Obstacles within the collision margin count by their nearness. Those within the inflation radius count relative to
-    the rollout that is farthest from them.
+    Within the collision margin, obstacles cost the more, the nearer they are. Within the inflation radius, the costs
+    are relative to those of the rollout that is farthest from obstacles.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
     consider_footprint = spec.consider_footprint is not False

@@ -1,6 +1,7 @@
-"""Motion models of MPPI: simulation of many control sequences (nav2_mppi_controller).
+"""Motion models of MPPI, which simulate n control sequences at once (nav2_mppi_controller).
 
-Controls and velocities are arrays (axes, steps, n) of float32. The axes are vx, wz, and for a holonomic base vy.
+Controls and velocities are arrays (axes, steps, n) of float32. The axes are vx, wz, and for a holonomic base vy. `dt`
+is the time step in s.
 """
 
 from dataclasses import dataclass
@@ -17,14 +18,14 @@ from simscen.stack.protocols import RobotModel
 
 Floats = npt.NDArray[np.float32]
 VX, WZ, VY = 0, 1, 2
-"""Indices of the axes."""
+"""Indices of the axes of a control sequence."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories: positions (steps, n) in m relative to the robot, headings, and velocities (axes, steps, n).
+    """Trajectories: positions (steps, n) in m, headings (steps, n), and velocities (axes, steps, n).
 
-    The axes of the frame are those of the costmap's frame, so that it is not rotated with the robot.
+    Positions are relative to that of the robot, but the axes are those of the costmap's frame.
     """
 
     x: Floats
@@ -34,16 +35,16 @@ class Rollouts:
 
     @property
     def speed(self) -> Floats:
-        """Speed (steps, n) in m/s, regardless of the direction."""
+        """Absolute speed (steps, n) in m/s."""
         if len(self.velocities) <= VY:
             return np.asarray(np.abs(self.velocities[VX]))
         return np.asarray(np.hypot(self.velocities[VX], self.velocities[VY]))
 
 
 def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the velocities: first the current velocity `now` (axes,), then each after the control of the step before.
+    """Return the velocities: at the first step `now` (axes,), at each later step the control of the step before.
 
-    They are limited by the accelerations. As in Nav2, ConstraintCritic and not this function deals with speed limits.
+    Their changes are limited by the accelerations. As in Nav2, speed limits are left to ConstraintCritic.
     """
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
@@ -78,7 +79,7 @@ def _limit_asymmetric_changes(velocities: Floats, requested: Floats, up: np.floa
 
 
 def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
-    """Return the rollouts of these velocities from a heading; each step keeps its initial heading."""
+    """Return the rollouts of these velocities from the heading `yaw`, which is constant within each step."""
     step, (steps, count) = np.float32(dt), velocities.shape[1:]
     headings = np.empty((steps + 1, count), np.float32)
     headings[0], later = 0.0, headings[1:]
@@ -95,7 +96,7 @@ def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
 
 
 def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
-    """Delay the velocities of each axis by a number of steps, in place. Until then, `sent` (axes, m) applies."""
+    """Delay the velocities of each axis by its `steps`, in place. The last commands `sent` (axes, m) precede them."""
     for axis, earlier, delay in zip(velocities, sent, steps, strict=False):
         if delay:
             axis[delay:] = axis[1 : len(axis) - delay + 1].copy()

@@ -34,7 +34,7 @@ def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[f
     """What so many beams are worth, and which of them count."""
     walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
     ends = np.concatenate((walls, np.full(in_the_open, 2.0 + 0.0j), np.full(beyond, 14.0 + 0.0j)))
-    exponent, _, counting = trust().weight(Particles.equal(poses), beams_to(ends))
+    exponent, _, counting = trust().weight(Particles.with_equal_weights(poses), beams_to(ends))
     return exponent, None if counting is None else counting.tolist()
 
 
@@ -75,7 +75,10 @@ def test_map_trust_uses_a_sample_of_many_particles(count: int) -> None:
     rng = np.random.default_rng(3)
     poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
     beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
-    worth, alone = trust().weight(Particles.equal(poses), beams), trust().weight(Particles.equal(asked_ones), beams)
+    worth, alone = (
+        trust().weight(Particles.with_equal_weights(poses), beams),
+        trust().weight(Particles.with_equal_weights(asked_ones), beams),
+    )
     assert 0.0 < worth.fitting_share < 1.0
     assert (worth.exponent, worth.fitting_share) == (alone.exponent, alone.fitting_share)
 

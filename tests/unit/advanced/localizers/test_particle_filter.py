@@ -20,7 +20,7 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     spec = ScanMatchingAmcl()
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
-    subject.begin(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    subject.reset(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     subject.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
     return subject.particles.poses
 
@@ -48,8 +48,8 @@ def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalizati
     })  # fmt: skip
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
-    subject.begin(Estimate(START, (0.05, 0.05, 0.02)))
+    subject.reset(Estimate(START, (0.05, 0.05, 0.02)))
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
     for pose in [START] * 5 + [ELSEWHERE] * 5:
         subject.correct(scan(cast(np.array([pose]), angles)[0]))
-    assert subject.particles.within(1.5) is stays
+    assert subject.particles.are_within(1.5) is stays

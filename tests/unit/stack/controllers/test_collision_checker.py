@@ -110,8 +110,8 @@ def test_discs_cover_the_hull() -> None:
 
 def test_commands_are_slowed_to_the_minimum_speed_and_no_further() -> None:
     footprint, command = Footprint(round_robot(), 0.05), Twist(0.5, 0.0, 0.2)
-    assert CollisionChecker(footprint, 0.1).slowed(command, 0.2, 1.0, 1.0) == pytest.approx(Twist(0.1, 0.0, 0.04))
-    assert CollisionChecker(footprint, 0.04).slowed(command, 0.1, 1.0, 1.0).vx == pytest.approx(0.05)
+    assert CollisionChecker(footprint, 0.1).slow_down(command, 0.2, 1.0, 1.0) == pytest.approx(Twist(0.1, 0.0, 0.04))
+    assert CollisionChecker(footprint, 0.04).slow_down(command, 0.1, 1.0, 1.0).vx == pytest.approx(0.05)
     with pytest.raises(NavigationFailure) as failed:
-        CollisionChecker(footprint, 0.1).slowed(command, 0.1, 1.0, 1.0)
+        CollisionChecker(footprint, 0.1).slow_down(command, 0.1, 1.0, 1.0)
     assert failed.value.code is ErrorCode.NO_VALID_CONTROL

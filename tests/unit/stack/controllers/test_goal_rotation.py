@@ -40,10 +40,10 @@ def test_braking_starts_no_earlier() -> None:
 
 def test_goal_is_approached_again_after_leaving_it() -> None:
     pose, goal = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, 0.45), Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
-    assert pose.reached(Pose2(0.05, 0.0), Twist(), goal, 0.05)
-    assert pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
-    assert not pose.reached(Pose2(0.25, 0.0), Twist(0.2), goal, 0.5)
-    assert not pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
+    assert pose.is_position_reached(Pose2(0.05, 0.0), Twist(), goal, 0.05)
+    assert pose.is_position_reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
+    assert not pose.is_position_reached(Pose2(0.25, 0.0), Twist(0.2), goal, 0.5)
+    assert not pose.is_position_reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.45, 1.0])
@@ -51,4 +51,4 @@ def test_the_position_is_reached_at_the_ratio_of_the_tolerance(ratio: float) -> 
     goal = Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
     for distance, expected in ((ratio * 0.2 + 0.005, False), (ratio * 0.2 - 0.005, True)):
         rotation = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, ratio)
-        assert rotation.reached(Pose2(-distance, 0.0), Twist(0.2), goal, distance) is expected
+        assert rotation.is_position_reached(Pose2(-distance, 0.0), Twist(0.2), goal, distance) is expected

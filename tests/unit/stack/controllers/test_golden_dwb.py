@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as Spec
 from simscen.stack.controllers.dwb.critics import OscillationCritic, RotateToGoalCritic, score_trajectories
 from simscen.stack.controllers.dwb.trajectory_generator import (
-    Kinematics,
+    KinematicParameters,
     generate_trajectories,
     velocity_samples,
     velocity_window,
@@ -29,10 +29,10 @@ def of(kind: str) -> Any:
     return pytest.mark.parametrize("case", found, ids=[case["name"] for case in found])
 
 
-def kinematics(acceleration: float = AT_ONCE, deceleration: float = -AT_ONCE, **given: Any) -> Kinematics:
+def kinematics(acceleration: float = AT_ONCE, deceleration: float = -AT_ONCE, **given: Any) -> KinematicParameters:
     low, high = (tuple(given.get(name, bound)) for name, bound in (("low", (-9,) * 3), ("high", (9,) * 3)))
     slow = {name: given.get(name, 0.0) for name in ("min_speed_xy", "min_speed_theta")}
-    return Kinematics(
+    return KinematicParameters(
         low, high, (acceleration,) * 3, (deceleration,) * 3, max_speed_xy=high[0], turning_radius=0, **slow
     )
 

@@ -131,7 +131,7 @@ def test_a_hull_that_is_not_round_is_as_long_as_it_is_and_turns_with_the_robot()
 def test_a_way_of_less_than_the_time_between_two_moments_is_looked_at_from_end_to_end(horizon: float) -> None:
     """Of a carrot that is all but reached."""
     free = CollisionChecker(Footprint(ROBOT, 0.05), 0.1)
-    assert free.slowed_for_moving(SPEED, among(GONE), HERE, horizon) == SPEED
+    assert free.slow_down_for_moving(SPEED, among(GONE), HERE, horizon) == SPEED
     ahead = among((HERE.x + 0.403, 0.0, 0.0, 0.0))
     expected = max(part for part in (1.0, 0.75, 0.5, 0.25, 0.0) if part * 0.5 * horizon <= 0.003)
-    assert free.slowed_for_moving(SPEED, ahead, HERE, horizon).vx == pytest.approx(expected * 0.5)
+    assert free.slow_down_for_moving(SPEED, ahead, HERE, horizon).vx == pytest.approx(expected * 0.5)

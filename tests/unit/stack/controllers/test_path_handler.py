@@ -55,9 +55,9 @@ def test_a_path_that_crosses_itself_is_followed_in_its_order() -> None:
 def test_nothing_beyond_a_cusp_is_looked_at_before_the_robot_is_there() -> None:
     track = PathTracker(there_and_back())
     track.locate(Pose2(0.8, 0.0))
-    assert track.forward
+    assert track.is_forward
     assert track.carrot(Pose2(0.8, 0.0), 0.5) == pytest.approx((1.0, 0.0))
-    assert track.to_cusp() == pytest.approx(0.2)
+    assert track.remaining_in_segment() == pytest.approx(0.2)
 
 
 def test_only_the_search_distance_ahead_is_searched_for_the_nearest_point() -> None:

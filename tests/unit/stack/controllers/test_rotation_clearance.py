@@ -49,7 +49,7 @@ def test_a_robot_that_touches_something_turns_away_from_it_and_not_into_it() -> 
 def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
     turning, view = room_of(LONG), seen(SLOT, LONG)
     assert not turning.has_room(0.5 * math.pi, HERE, view)
-    back = turning.back_out(HERE, view)
+    back = turning.backup_command(HERE, view)
     assert back is not None
     assert back.vx == pytest.approx(-0.15)
     outside = Pose2(-1.2, 0.0, 0.0)
@@ -58,7 +58,7 @@ def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_robot_that_is_blocked_behind_on_one_side_backs_out_in_a_bend_round_it(side: int) -> None:
-    back = room_of(LONG).back_out(HERE, seen(Flatland(discs=[(-0.5, side * 0.2, 0.05)]), LONG))
+    back = room_of(LONG).backup_command(HERE, seen(Flatland(discs=[(-0.5, side * 0.2, 0.05)]), LONG))
     assert back is not None
     assert back.vx < 0.0
     assert side * back.wz > 0.0
@@ -66,7 +66,7 @@ def test_a_robot_that_is_blocked_behind_on_one_side_backs_out_in_a_bend_round_it
 
 def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
     closed = Flatland([*SLOT.boxes, (-0.6, -0.5, -0.5, 0.5)])
-    assert room_of(LONG).back_out(HERE, seen(closed, LONG)) is None
+    assert room_of(LONG).backup_command(HERE, seen(closed, LONG)) is None
 
 
 def test_a_round_robot_can_always_turn() -> None:

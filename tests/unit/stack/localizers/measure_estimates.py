@@ -16,7 +16,7 @@ from estimate_drives import CIRCUMSTANCES, Case, case
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers import particle_filter
 from simscen.stack.localizers.particles import Particles, cluster_labels, pose_errors, summarize
-from simscen.stack.localizers.resampling import bins
+from simscen.stack.localizers.resampling import bin_keys
 
 TUNING_WORLDS = ("house", "corridor", "pillars", "symmetric")
 """Worlds on which the shipped estimator was tuned."""
@@ -26,7 +26,7 @@ Estimator = Callable[[Particles], Pose2]
 
 def near_the_best(particles: Particles) -> Pose2:
     """Return the mean of the particles near (0.25 m, 10°) the best one of the heaviest cluster (Rekleitis 2004)."""
-    labels = cluster_labels(bins(particles.poses))
+    labels = cluster_labels(bin_keys(particles.poses))
     heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
     center = particles.poses[np.where(heaviest, particles.weights, -1.0).argmax()]
     near = pose_errors(center, particles.poses)
@@ -38,7 +38,7 @@ def heaviest_mean(power: float) -> Estimator:
     """Return an estimator: the mean of the heaviest cluster, with weights to this power; 1 as in nav2_amcl."""
 
     def estimate(particles: Particles) -> Pose2:
-        labels = cluster_labels(bins(particles.poses))
+        labels = cluster_labels(bin_keys(particles.poses))
         kept = labels == np.bincount(labels, weights=particles.weights).argmax()
         x, y, yaw = particles.poses[kept].T
         weights = (particles.weights[kept] / particles.weights[kept].max()) ** power

@@ -6,15 +6,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.particles import Particles, cluster_labels, spread, summarize
-from simscen.stack.localizers.resampling import bins, split
+from simscen.stack.localizers.particles import Particles, cluster_labels, covariance_about, summarize
+from simscen.stack.localizers.resampling import bin_keys, decode_bins
 
 
 @pytest.mark.parametrize(("seed", "count", "width"), [(0, 40, 2.0), (1, 200, 4.0), (2, 600, 5.0), (3, 1, 1.0)])
 def test_groups_are_the_connected_components_of_touching_bins(seed: int, count: int, width: float) -> None:
     rng = np.random.default_rng(seed)
-    keys = bins(np.column_stack((rng.uniform(-width, width, (count, 2)), rng.uniform(-9, 9, count))))
-    cells = np.column_stack(split(keys))
+    keys = bin_keys(np.column_stack((rng.uniform(-width, width, (count, 2)), rng.uniform(-9, 9, count))))
+    cells = np.column_stack(decode_bins(keys))
     apart = np.abs(cells[:, None] - cells)
     apart[..., 2] = np.minimum(apart[..., 2], 36 - apart[..., 2])
     expected = connected_components(coo_array((apart <= 1).all(axis=2)))[1]
@@ -54,7 +54,7 @@ def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_othe
 def test_a_pose_is_not_averaged_across_the_cut_of_the_circle_to_its_opposite() -> None:
     poses = group(Pose2(1, 2, np.pi), 0.03, 400, 3)
     poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
-    pose, covariance = summarize(Particles.equal(poses))
+    pose, covariance = summarize(Particles.with_equal_weights(poses))
     assert abs(abs(pose.yaw) - np.pi) < 0.01
     assert covariance[2, 2] == pytest.approx(0.03**2, rel=0.15)
 
@@ -64,9 +64,9 @@ def test_the_covariance_is_the_weighted_one_about_the_pose() -> None:
     poses, weights = group(Pose2(0.2, 0.2, 0.05), 0.03, 500, 5), rng.random(500)
     particles = Particles(poses, weights / weights.sum())
     mean = Pose2(*np.average(poses, axis=0, weights=weights).tolist())
-    assert np.allclose(spread(particles, mean), np.cov(poses.T, aweights=weights, ddof=0))
+    assert np.allclose(covariance_about(particles, mean), np.cov(poses.T, aweights=weights, ddof=0))
     shift = np.array([0.3, -0.2, 0.1])
-    about = spread(particles, Pose2(*(np.array(mean) + shift)))
+    about = covariance_about(particles, Pose2(*(np.array(mean) + shift)))
     assert np.allclose(about, np.cov(poses.T, aweights=weights, ddof=0) + np.outer(shift, shift))
 
 
@@ -137,6 +137,6 @@ def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak_power:
 
 
 def test_a_single_particle_is_the_answer() -> None:
-    pose, covariance = summarize(Particles.equal(np.array([[1.0, 2.0, 3.0]])))
+    pose, covariance = summarize(Particles.with_equal_weights(np.array([[1.0, 2.0, 3.0]])))
     assert pose == pytest.approx((1, 2, 3))
     assert not covariance.any()

@@ -90,7 +90,7 @@ def test_beam_skipping_leaves_out_what_few_particles_can_explain() -> None:
     explained = (
         np.mean([np.array(probabilities(grid(), Pose2(*pose), beams)) > near for pose in poses[:9]], axis=0) > 0.3
     )
-    kept = Beams(beams.ranges[explained], beams.towards[explained], beams.origin, beams.range_max)
+    kept = Beams(beams.ranges[explained], beams.unit_vectors[explained], beams.origin, beams.range_max)
     plain = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, kept, True)
     assert 0 < len(kept.ranges) < 60
     assert np.allclose(skipped, plain)

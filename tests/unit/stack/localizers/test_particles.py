@@ -34,7 +34,7 @@ def test_a_map_without_a_free_cell_still_gives_poses_on_it() -> None:
 
 def test_particles_begin_around_the_estimate_with_its_standard_deviations() -> None:
     std = (0.5, 0.1, 0.2)
-    particles = FreeSpace(GRID).begin(Estimate(Pose2(1, 2, 3), std), 50_000, np.random.default_rng(2))
+    particles = FreeSpace(GRID).initial_particles(Estimate(Pose2(1, 2, 3), std), 50_000, np.random.default_rng(2))
     error = particles.poses - (1, 2, 3)
     error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
     assert np.allclose(error.mean(axis=0), 0, atol=0.01)
@@ -43,12 +43,12 @@ def test_particles_begin_around_the_estimate_with_its_standard_deviations() -> N
 
 
 def test_the_effective_number_is_all_of_them_when_equal_and_one_when_one_has_it_all() -> None:
-    assert Particles.equal(np.zeros((40, 3))).effective == pytest.approx(40)
-    assert Particles(np.zeros((40, 3)), np.eye(40)[3]).effective == pytest.approx(1)
+    assert Particles.with_equal_weights(np.zeros((40, 3))).effective_count == pytest.approx(40)
+    assert Particles(np.zeros((40, 3)), np.eye(40)[3]).effective_count == pytest.approx(1)
 
 
 def test_headings_on_both_sides_of_half_a_turn_are_near_to_each_other() -> None:
     poses = np.array([[0.0, 0.0, np.pi - 0.05], [0.1, 0.0, 0.02 - np.pi], [0.0, 0.3, np.pi - 0.01]])
-    assert Particles.equal(poses).extent == pytest.approx((0.1, 0.3, 0.07))
+    assert Particles.with_equal_weights(poses).extent == pytest.approx((0.1, 0.3, 0.07))
     around = np.array([[0.0, 0.0, heading] for heading in (-3.0, 0.0, 3.0)])
-    assert Particles.equal(around).extent[2] == pytest.approx(2 * np.pi - 3.0)
+    assert Particles.with_equal_weights(around).extent[2] == pytest.approx(2 * np.pi - 3.0)

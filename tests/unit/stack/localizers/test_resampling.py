@@ -6,7 +6,7 @@ from filterpy.monte_carlo import resampling as filterpy_resampling
 from scipy import stats
 
 from simscen.core.geometry import Array
-from simscen.stack.localizers.resampling import KldBound, adaptive, bins, systematic
+from simscen.stack.localizers.resampling import KldBound, bin_keys, kld_sampling, systematic_resampling
 
 
 def weights(seed: int, count: int = 300) -> Array:
@@ -20,12 +20,12 @@ def test_systematic_draws_what_filterpy_draws_from_the_same_number(seed: int, mo
     offset = np.random.default_rng(seed).random()
     monkeypatch.setattr(filterpy_resampling, "random", lambda: offset)
     expected = filterpy_resampling.systematic_resample(weights(seed))
-    assert np.array_equal(systematic(weights(seed), 300, np.random.default_rng(seed)), expected)
+    assert np.array_equal(systematic_resampling(weights(seed), 300, np.random.default_rng(seed)), expected)
 
 
 @pytest.mark.parametrize("count", [1, 7, 300, 1000])
 def test_an_index_is_drawn_as_often_as_its_weight_says_rounded_either_way(count: int) -> None:
-    drawn = np.bincount(systematic(weights(1), count, np.random.default_rng(1)), minlength=300)
+    drawn = np.bincount(systematic_resampling(weights(1), count, np.random.default_rng(1)), minlength=300)
     assert drawn.sum() == count
     assert (np.abs(drawn - count * weights(1)) < 1 + 1e-9).all()
 
@@ -33,14 +33,14 @@ def test_an_index_is_drawn_as_often_as_its_weight_says_rounded_either_way(count:
 def test_a_particle_without_weight_is_never_drawn() -> None:
     given = np.array([0.0, 0.5, 0.0, 0.5, 0.0])
     rng = np.random.default_rng(0)
-    drawn = np.concatenate([systematic(given, 9, rng) for _ in range(200)])
+    drawn = np.concatenate([systematic_resampling(given, 9, rng) for _ in range(200)])
     assert set(drawn.tolist()) == {1, 3}
 
 
 def test_draws_follow_the_weights() -> None:
     """Chi-square over single draws, which are independent of each other."""
     given, rng = weights(5, 20), np.random.default_rng(5)
-    drawn = np.bincount([int(systematic(given, 1, rng)[0]) for _ in range(20_000)], minlength=20)
+    drawn = np.bincount([int(systematic_resampling(given, 1, rng)[0]) for _ in range(20_000)], minlength=20)
     likely = given > 1e-3
     expected = given[likely] / given[likely].sum() * drawn[likely].sum()
     assert stats.chisquare(drawn[likely], expected).pvalue > 1e-3
@@ -51,9 +51,9 @@ def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
     given, bound = weights(6, 50), KldBound(0.05, 0.99, 100, 5000)
 
     def draw(count: int) -> Array:
-        return rng.permutation(poses[systematic(given, count, rng)])
+        return rng.permutation(poses[systematic_resampling(given, count, rng)])
 
-    drawn = [adaptive(draw, bound) for _ in range(400)]
+    drawn = [kld_sampling(draw, bound) for _ in range(400)]
     assert any(len(sample) % 100 for sample in drawn), "the last block was never cut"
     share = np.mean([np.mean(np.isclose(sample[:, :1], poses[:, 0]), axis=0) for sample in drawn], axis=0)
     assert np.allclose(share, given, atol=0.001, rtol=0.02)
@@ -61,12 +61,12 @@ def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
 
 def test_a_spread_out_set_keeps_more_particles_than_a_narrow_one() -> None:
     rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 2000)
-    sizes = [len(adaptive(lambda n, s=spread: rng.normal(0.2, s, (n, 3)), bound)) for spread in (0.01, 0.3, 0.8, 9)]
+    sizes = [len(kld_sampling(lambda n, s=spread: rng.normal(0.2, s, (n, 3)), bound)) for spread in (0.01, 0.3, 0.8, 9)]
     assert sizes == sorted(sizes)
     assert (sizes[0], sizes[-1]) == (100, 2000)
 
 
 def test_the_number_kept_is_the_bound_of_the_bins_they_fill() -> None:
     rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 5000)
-    kept = adaptive(lambda n: rng.normal(0, 0.5, (n, 3)), bound)
-    assert len(kept) == pytest.approx(int(bound.samples(len(np.unique(bins(kept))))), abs=1)
+    kept = kld_sampling(lambda n: rng.normal(0, 0.5, (n, 3)), bound)
+    assert len(kept) == pytest.approx(int(bound.samples(len(np.unique(bin_keys(kept))))), abs=1)

@@ -14,7 +14,7 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.ompl_search import OmplSearch
-from simscen.stack.planners.path_postprocessing import SPACING_M, spaced
+from simscen.stack.planners.path_postprocessing import SPACING_M, densify
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
@@ -83,7 +83,7 @@ def test_the_plan_is_what_the_search_by_ompl_finds(monkeypatch: pytest.MonkeyPat
     assert planner().plan(view, *ends, 1).points[:, 1].max() < 2.5
     monkeypatch.setattr(OmplSearch, "solve", lambda self, *, simplify: detour)
     points = planner().plan(view, *ends, 1).points[:, :2]
-    assert points == pytest.approx(spaced(np.array(detour), SPACING_M))
+    assert points == pytest.approx(densify(np.array(detour), SPACING_M))
 
 
 def test_a_plan_keeps_ten_centimeters_more_than_it_must_where_there_is_room() -> None:
@@ -175,9 +175,9 @@ def test_a_way_that_is_too_tight_by_a_hair_is_not_smoothed_through_walls() -> No
     view = hall((4.0, 0.0, 4.1, 6.0))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     way = np.array([(2.0, 2.0), (2.0, 6.15), (4.05, 6.15), (6.0, 6.15), (6.0, 2.0)])  # for a radius of 22 cm
-    assert np.isinf(rates.along(way)) and not struck(view, spaced(way, SPACING_M))
+    assert np.isinf(rates.along(way)) and not struck(view, densify(way, SPACING_M))
     for better in (smoothed(rates, way), refine(rates, way)):
-        assert not struck(view, spaced(better, SPACING_M))
+        assert not struck(view, densify(better, SPACING_M))
 
 
 def test_robot_near_a_wall_is_not_sent_through_it() -> None:
