@@ -70,7 +70,7 @@ class _SlippingWheels(OdometryDistortion):
         super().__init__()
         self._left, self._right, self._separation = 1 - slip.left, 1 - slip.right, separation
 
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         return self._scaled(step, 1 / self._left, 1 / self._right)
 
     def command(self, command: Twist) -> Twist | None:

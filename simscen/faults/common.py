@@ -14,7 +14,10 @@ from simscen.faults.base import FaultEffect
 
 
 def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
-    """Return the belief with the current odometry, but with `map_from_odom` as an older correction by the localizer."""
+    """Return the belief with an older correction of the localizer, `map_from_odom`, instead of its own.
+
+    The new pose is this correction applied to the odometry pose of the belief (the base in the odom frame).
+    """
     odometry = belief.map_from_odom.between(belief.pose)
     return replace(belief, pose=map_from_odom.compose(odometry), map_from_odom=map_from_odom)
 
@@ -45,15 +48,15 @@ def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
         return np.where(ranges < scan.range_min, -np.inf, ranges)
 
 
-def ranges_with_scan_errors(scan: Scan, distances: Array, nominal: Array) -> Array:
-    """Return the ranges (n,) that the lidar would have reported at other true distances, with the noise of this scan.
+def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Array) -> Array:
+    """Return the ranges (n,) that the lidar would report if the true distances were `new_distances` (n,).
 
-    `nominal` are the true distances (n,) that the scan measured. Ranges are rounded to whole millimeters, so that
-    differences in the last bits do not spread.
+    The ranges have the noise of this scan, whose true distances were `scan_distances` (n,). They are rounded to whole
+    millimeters, so that rounding errors in the last bits have no effect on the run.
     """
     with np.errstate(invalid="ignore"):
-        errors = scan.ranges - nominal
-    ranges = np.round(distances + np.where(np.isfinite(errors), errors, 0.0), 3)
+        errors = scan.ranges - scan_distances
+    ranges = np.round(new_distances + np.where(np.isfinite(errors), errors, 0.0), 3)
     return clip_to_sensor_range(scan, ranges)
 
 
@@ -70,18 +73,18 @@ class OdometryDistortion(FaultEffect):
         self._ended = False
 
     @abstractmethod
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         """Return the distorted value of a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
 
     def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         """Return the distorted increment over `ticks`, and the distorted velocity at its end.
 
-        The default distorts both with `increment`.
+        The default distorts both with `distort_twist`.
         """
-        return self.increment(step), self.increment(velocity)
+        return self.distort_twist(step), self.distort_twist(velocity)
 
-    def reading(self, reading: Reading) -> Reading | None:
-        """Return the odometry with distorted increments."""
+    def reading(self, reading: Reading) -> Reading:
+        """Return the odometry with distorted increments. Other readings are returned unchanged."""
         if not isinstance(reading, Odometry):
             return reading
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
@@ -92,7 +95,7 @@ class OdometryDistortion(FaultEffect):
         self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)
 
-    def end(self) -> FaultEffect | None:
-        """Keep the accumulated error."""
+    def end(self) -> FaultEffect:
+        """Return this effect, which remains active to keep the accumulated error in all later readings."""
         self._ended = True
         return self

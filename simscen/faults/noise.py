@@ -101,7 +101,7 @@ class _NoisyOdometry(OdometryDistortion):
         super().__init__()
         self._rng, self._noise, self._clock = rng, noise, setting.clock
 
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         driven, turned = math.hypot(step.vx, step.vy), abs(step.wz)
         along, turn = self._rng.standard_normal(2).tolist()
         return Twist(
@@ -111,7 +111,7 @@ class _NoisyOdometry(OdometryDistortion):
         )
 
     def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        noisy = self.increment(step)
+        noisy = self.distort_twist(step)
         if not ticks:
             return noisy, velocity
         seconds = self._clock.seconds(ticks)

@@ -74,7 +74,7 @@ class _BiasedOdometry(OdometryDistortion):
         super().__init__()
         self._bias = bias
 
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         turn = step.wz * self._bias.angular_scale + step.vx * self._bias.turn_per_metre
         return Twist(step.vx * self._bias.linear_scale, step.vy * self._bias.linear_scale, turn)
 
@@ -121,7 +121,7 @@ class _ScaledOdometry(OdometryDistortion):
         super().__init__()
         self._factor = factor
 
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         return Twist(*(self._factor * value for value in step))
 
 
@@ -174,13 +174,13 @@ class _DriftingOdometry(OdometryDistortion):
         super().__init__()
         self._drift, self._clock = drift, setting.clock
 
-    def increment(self, step: Twist) -> Twist:
+    def distort_twist(self, step: Twist) -> Twist:
         return Twist(step.vx + self._drift.linear, step.vy, step.wz + self._drift.angular)
 
     def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         seconds = self._clock.seconds(ticks)
         drifted = Twist(step.vx + self._drift.linear * seconds, step.vy, step.wz + self._drift.angular * seconds)
-        return drifted, self.increment(velocity)
+        return drifted, self.distort_twist(velocity)
 
 
 class _DriftingValues(FaultEffect):

@@ -1,4 +1,4 @@
-"""Conversion of the times in a real log to the ticks of a Trace, and checks for clocks that were set meanwhile."""
+"""Conversion of the times in a real log to the ticks of a Trace, and checks for clocks set during recording."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 MIN_MESSAGES_AROUND_STEP = 20
 """Smallest number of messages before and after the change of a clock, to distinguish it from delayed messages."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""Largest ratio of the lasting change of the difference of two clocks to its change at one message.
+"""Largest ratio at which a clock counts as set: lasting change of the offset / jump of the offset at one message.
 
-If a clock is set, the two are about equal. If a recorder catches up after a busy start, or loses messages, the
-difference changes by far more in total than at any single message.
+The offset is the stamp minus the time of logging. If a clock is set, both changes are about equal. If a recorder
+catches up after a busy start, or loses messages, the offset changes by far more in total than at any single message.
 """
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Largest difference in ns between the stamps of two topics at the same time. A larger one means different clocks."""
@@ -68,10 +68,10 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
     """Return where the clock of the stamps was set: the index of the first message afterwards, and the change in ns.
 
     Returns None if the clock was not set. `logged` and `stamps` are the times of the messages of one topic, in ns, in
-    the order of logging. Because no message is logged before its stamp, the difference of the two clocks is the largest
-    value of the stamp minus the time of logging. Only setting a clock changes this difference permanently and from one
-    message to the next. A delayed or repeated message, a slow recorder, and a paused simulation change it for a short
-    time, or they change the interval of logging rather than that of the stamps.
+    the order of logging. The offset of a message is its stamp minus its time of logging. Delays make it smaller, so the
+    largest offset of many messages shows the difference of the two clocks. Only setting a clock changes this maximum
+    permanently and from one message to the next. A delayed or repeated message, a slow recorder, and a paused
+    simulation change offsets for a short time, or they change the interval of logging rather than that of the stamps.
     """
     count = MIN_MESSAGES_AROUND_STEP
     if len(stamps) < 2 * count:
@@ -94,8 +94,8 @@ def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int
 
     `logged` and `stamps` are the times of the messages of one topic, in ns, in the order of the file. The clock was set
     back if the times of logging step back exactly once, to a time that the log has already covered, and the stamps
-    step back there as well or are all zero. Files may be unsorted: then there are several steps, or parts whose times
-    do not overlap.
+    step back there as well or are all zero. Several steps, or parts whose times do not overlap, are not reported: the
+    file is only unsorted.
     """
     times = np.array(logged, dtype=np.int64)
     backward = np.flatnonzero(np.diff(times) < 0)

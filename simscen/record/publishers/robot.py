@@ -1,6 +1,6 @@
-"""Publisher of the moments of one robot, and its parts that publish ground truth, the stack's output, and events.
+"""Publishes one robot's moments (the records of its beats): ground truth, output of the stack, and events.
 
-The parts that publish sensor readings and markers are in sensors.py and scene.py.
+Sensor readings and markers are published by sensors.py and scene.py.
 """
 
 from collections.abc import Iterable
@@ -158,8 +158,8 @@ class StackPublisher:
             self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, subset))
 
 
-MAX_LAYOUTS = 16
-"""Maximum number of sets of moving objects for which a writer is cached. Most runs have few such sets."""
+MAX_CACHED_WRITERS = 16
+"""Maximum number of cached writers. Each set of moving objects needs its own, and most runs have few such sets."""
 
 
 class TruthPublisher:
@@ -175,7 +175,7 @@ class TruthPublisher:
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
         self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if clock else truth
         self._without_tf = out.batch_writer(self._common_layouts)
-        self._layouts: dict[tuple[str, ...], BatchWriter] = {}
+        self._writers: dict[tuple[str, ...], BatchWriter] = {}
         self._pack_transforms, self._tf_writer = TransformsPacker(), out.topic_writer(topics.TF)
         self._precomputed: _PrecomputedBatch | None = None
 
@@ -187,14 +187,14 @@ class TruthPublisher:
             batch = self._precomputed
             if batch is None or batch.predicted is not poses.predicted:
                 batch = self._precomputed = self._precompute(poses.predicted)
-            batch.layout.write(now, stamp, *fields, batch.serialized[poses.row].tobytes())
+            batch.writer.write(now, stamp, *fields, batch.serialized[poses.row].tobytes())
             return
         names = tuple(poses)
-        layout = self._layouts.get(names)
-        if layout is None and len(self._layouts) < MAX_LAYOUTS:
-            layout = self._layouts[names] = self._layout(names)
-        if layout is not None:
-            layout.write(now, stamp, *fields, *poses.values())
+        writer = self._writers.get(names)
+        if writer is None and len(self._writers) < MAX_CACHED_WRITERS:
+            writer = self._writers[names] = self._new_writer(names)
+        if writer is not None:
+            writer.write(now, stamp, *fields, *poses.values())
             return
         self._without_tf.write(now, stamp, *fields)
         links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in poses.items()]
@@ -204,15 +204,15 @@ class TruthPublisher:
         """Serialize the transforms of all objects for all ticks for which their poses are predicted."""
         previous, names = self._precomputed, predicted.names
         if previous is not None and previous.predicted.names == names:
-            transforms, layout = previous.transforms, previous.layout
+            packer, writer = previous.packer, previous.writer
         else:
-            transforms = TransformBatchPacker([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
-            tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), transforms.size)
-            layout = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
+            packer = TransformBatchPacker([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
+            tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), packer.size)
+            writer = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
         stamps = [self._time.stamp(tick) for tick in predicted.ticks]
-        return _PrecomputedBatch(predicted, transforms, layout, transforms(stamps, predicted.table))
+        return _PrecomputedBatch(predicted, packer, writer, packer(stamps, predicted.table))
 
-    def _layout(self, names: Iterable[str]) -> BatchWriter:
+    def _new_writer(self, names: Iterable[str]) -> BatchWriter:
         """Return a writer for the messages with the poses of the robot and of these objects on /tf."""
         links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(names)]
         tf = encode.transforms([(frame_names.MAP, self._frame, "pose"), *links])
@@ -222,10 +222,10 @@ class TruthPublisher:
 class _PrecomputedBatch(NamedTuple):
     """Serialized transforms of objects whose poses are known in advance: one row of `serialized` for each tick.
 
-    `transforms` has serialized them, and `layout` writes them together with the other messages of a tick.
+    `packer` serialized them. `writer` writes the row of a tick, together with the other messages of that tick.
     """
 
     predicted: PredictedPoses
-    transforms: TransformBatchPacker
-    layout: BatchWriter
+    packer: TransformBatchPacker
+    writer: BatchWriter
     serialized: Bytes
