@@ -29,7 +29,8 @@ class ScanMatchingAmcl(AmclParameters):
     match_scans: bool = True
     """Predict the motion by matching each scan with earlier scans, with odometry as the initial guess."""
     likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Exponent of the product over the beams. Below 1 because beams err together; `likelihood_field_prob` only."""
+    """Exponent of the likelihood of a scan, which is a product over its beams. It is below 1 because the errors of
+    neighboring beams are similar. `likelihood_field_prob` only."""
     beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
     """Whether beams that end outside the map, or in unknown space next to free space, are ignored (`say_nothing`) or
     count as a miss, as in Nav2. `likelihood_field_prob` only."""
@@ -39,18 +40,20 @@ class ScanMatchingAmcl(AmclParameters):
     map_trust_full: Probability = 0.8
     """A scan has its full weight if at least this share of its beams fits the map. 0 = every scan has, as in Nav2."""
     settling_distance: NonNegativeLength = 4.0
-    """Distance from a given initial pose over which the weight of scans grows from a fifth to its full value, since one
-    room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as in Nav2."""
+    """Distance from a given initial pose over which the weight of scans grows from a fifth to its full value. Early
+    scans count less because one room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as
+    in Nav2."""
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a lost robot is found. `scan_matching`: by matching the scans of the last meters with the whole map.
-    `random`: by random particles at the start and from `recovery_alpha_*`, as in Nav2. `scan_matching` ignores
+    `random`: by random particles, which `recovery_alpha_*` adds as in Nav2. `scan_matching` ignores
     `recovery_alpha_*`, because random particles at poses that look alike would lead away from a correct pose."""
     sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
     """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
-    """Source of the covariance. `particles`: the particles, as in Nav2. `scatter`: also the differences of the last
-    estimates from the motion by scan matching, and the residuals of the beams. `scatter` needs `match_scans`."""
+    """Covariance of the pose. `particles`: that of the particles, as in Nav2. `scatter`: the same, scaled to the errors
+    that show in the residuals of the beams, and in how far recent poses, moved to the present by scan matching, differ
+    from each other. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -69,7 +72,7 @@ class SlipEkf(EkfParameters):
     wheel_slip: Probability = 0.0
     """Standard deviation of slip, as a share of the distance driven. Slip changes within about one second."""
     match_scans: bool = False
-    """Correct the distance by matching each scan with earlier scans. The covariance remains that without correction."""
+    """Correct the distance by matching each scan with earlier scans. The corrections do not change the covariance."""
 
 
 class MedialAxisPlanner(OmplParameters):

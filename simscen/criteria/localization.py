@@ -34,7 +34,7 @@ class LocalizationError(Spec, Criterion):
         the stack publishes a belief, and all the time while its newest belief is over 1 s old. The trajectories are not
         aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound.
-    Why this: with an error of half a meter, a robot reaches goals only by chance, until an obstacle is near.
+    Why this: a robot whose error is half a meter may reach goals in open space, but it collides near obstacles.
     Source: evo's APE (metrics.py) and Beluga's benchmarks.
 
     Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`
@@ -118,7 +118,7 @@ class RelocalizedWithin(Spec, Criterion):
         robot is within the tolerances again and stays there for `hold`.
     When it fails: the time is longer than `time`.
     Why this: after a wrong initial pose or a kidnapping, the robot must correct its belief. A belief that is near the
-        true pose for an instant, by chance, is not corrected.
+        true pose by chance, and only for an instant, does not count as corrected.
     Source: the kidnapped robot problem, Thrun, Burgard, Fox: Probabilistic Robotics, chapters 7 and 8.
 
     Inconclusive if the robot was never lost within `time`, or if the run ended too early for a decision.

@@ -69,7 +69,10 @@ class EndCondition:
 
 
 def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
-    """Return the event that ends the run at this tick (the time limit if it ends any robot), or None if one goes on."""
+    """Return the event that ends the run at this tick, or None if a robot is not done yet.
+
+    If some robots end at the time limit and others with their task, it is the event of the time limit.
+    """
     run_end: Event | None = None
     for condition in conditions:
         end = condition.end_event(tick)

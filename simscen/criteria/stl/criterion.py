@@ -103,7 +103,7 @@ def _untested_finding(response: ResponseRobustness, formula: str, optional: bool
 
     If `optional`, it has a line about the key `required`, which only the criterion itself has, not a nested `whenever`.
     """
-    premise = describe(response.condition)
+    premise = describe(response.premise_condition)
     if response.may_have_held:
         because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"
     else:

@@ -1,7 +1,7 @@
 """Robustness of a condition at each sample of a run: the margin by which it is true, negative if it is false.
 
-The robustness of a comparison is the distance of its signal from the bound, positive if the comparison is true. If
-signal and bound are equal, it is the smallest number with the correct sign: thus `>=` and `>` differ, and the sign
+The robustness of a comparison is the distance of its signal from the limit, positive if the comparison is true. If
+signal and limit are equal, it is the smallest number with the correct sign: thus `>=` and `>` differ, and the sign
 alone decides the verdict. The robustness of a yes-or-no signal is infinite, so that other signals determine the margin.
 
 A witness states which comparison decides the robustness, and at which sample.
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 TIE_MARGIN = sys.float_info.min
-"""Magnitude of the robustness if a signal equals its bound."""
+"""Magnitude of the robustness if a signal equals its limit."""
 
 HOLD_VIOLATED, RESPONSE_DUE = "`hold` was false", "the response was due"
 """Texts of the notes of a witness."""
 
 Bound = Literal["low", "high"]
-"""Bound of the interval in which the robustness lies."""
+"""End of the interval in which the robustness lies (see Robustness)."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class _UntilRobustness(Robustness):
     windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of `release` at the best release, or of `hold` before it if its value is lower."""
+        """Return the witness of `release` at its best sample, or of the lowest `hold` before it if that is lower."""
         end = int(self.windows.last[sample]) + 1
         first = int(self.windows.first[sample]) - sample
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
@@ -167,18 +167,19 @@ class _UntilRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class ResponseRobustness(Robustness):
-    """Robustness of `whenever … then`, which means: at all samples, the premise is false or the response is true.
+    """Robustness of `whenever … then`: at all samples of a window, the premise is false or the response is true.
 
     `premise` and `response` are the robustness of both parts, `implied` that of "the premise is false or the response
-    is true", and `condition` is the premise itself. `reach` is the slice of samples at which the premise counts. If
-    `required` and the premise was never certainly true there, nothing was tested, and the condition cannot pass.
+    is true". `reach` is the slice of samples at which the premise counts. If `required` and the premise was never
+    certainly true there, nothing was tested, and the condition cannot pass. A deadline is a part of the response:
+    `then: {eventually: {…, within: 2 s}}`.
     """
 
     premise: Robustness
     response: Robustness
     implied: Robustness
     windows: SampleWindows
-    condition: Condition
+    premise_condition: Condition
     reach: slice
     required: bool
 
@@ -193,7 +194,7 @@ class ResponseRobustness(Robustness):
         return bool((self.premise.high[self.reach] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of the worst response, with a note that states when it was due."""
+        """Return the witness of the worst response, with a note on the sample at which the premise called for it."""
         at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.windows)
         return self.implied.witness(at, bound).with_note(RESPONSE_DUE, at)
 
@@ -303,7 +304,7 @@ def response_robustness(
     begin: int = 0,
     required: bool = True,
 ) -> ResponseRobustness:
-    """Return the robustness of: each time that `premise` is true in a window, `response` is true too.
+    """Return the robustness of: at each sample of `window` at which `premise` is true, `response` is true too.
 
     A window of None is the rest of the run; `begin`: see `robustness`. If the premise is `required` to be true at least
     once, but was never certainly true, `low` is -inf, because nothing was tested.
@@ -365,7 +366,7 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """Return the distances of a signal from the bound, positive if the comparison is true, and divided by `scale`."""
+    """Return the distances of a signal from its limit, divided by `condition.scale`; negative if it is violated."""
     assert condition.value is not None
     above = condition.op in (">=", ">")
     distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)

@@ -18,7 +18,7 @@ MAX_GAP_S = 1.0
 
 
 def time_gaps(trace: Trace) -> dict[Evidence, str]:
-    """Return the evidence that the trace contains only for a part of the run, each with its first gap in words.
+    """Return the kinds of evidence that have a gap in time, each with a text that describes its first gap.
 
     The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
     """

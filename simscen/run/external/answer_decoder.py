@@ -36,7 +36,10 @@ _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 _PLANAR_DIAGONAL = (0, 7, 35)
 """Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Numbers per exact reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), pose covariance (9)."""
+"""Numbers per reading on the odometry topic with EXACT_SUFFIX, which has full precision.
+
+They are: tick (1), x, y, yaw (3), vx, vy, wz (3), the variances of these velocities (3), and the pose covariance (9).
+"""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
@@ -83,9 +86,9 @@ def decode_answer(
 ) -> Answer:
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
-    `correction` is the last received pose of the odom frame in the map frame. If it is None, because the stack never
-    sent one, it is computed from the belief and the pose of the stack's filtered odometry, or else of wheel odometry,
-    which is `dead_reckoned`.
+    `correction` is the last received pose of the odom frame in the map frame; None if the stack never sent one. Then
+    the belief's correction is computed from its pose and the odometry pose: that of the stack's filtered odometry in
+    this answer, or else `dead_reckoned`, the pose of the wheel odometry.
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
