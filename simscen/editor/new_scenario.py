@@ -17,16 +17,16 @@ from simscen.loading.loaded import LoadedWorld
 LIDAR_HEIGHT_M = 0.2
 """Height at which the map of a world is made."""
 PREFERRED_CLEARANCE_M = 0.5
-"""Minimum distance of start and goal from walls. It is halved, then 0, if no position has it."""
+"""Minimum distance of start and goal from walls. If no position has it, half of it is tried, and then none."""
 CANDIDATES = 200
 """Maximum number of free positions from which start and goal are chosen."""
 
 
 def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tuple[Path, ...], lenient: bool) -> str:
-    """Return the text of a new scenario `file` in the world of `world_file`. Raises InvalidInput if it is invalid.
+    """Return the text of a new scenario `file` in the world of `world_file`.
 
-    `world_file` is a world file, a ROS map, or an SDF file. `root` and `world_path` are the folders whose files the
-    world may refer to.
+    `world_file` is a world file, a ROS map, or an SDF file; InvalidInput is raised if it is invalid. `root` and
+    `world_path` are the folders whose files it may refer to. If `lenient`, unusable elements of SDF are left out.
     """
     from simscen.worlds.built_world import build_world_and_map
 
@@ -34,13 +34,13 @@ def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tupl
     built = build_world_and_map(world_from_file(source, root, world_path, lenient), LIDAR_HEIGHT_M)
     start, goal = _start_and_goal(built)
     name = file.name.split(".")[0].replace("_", " ")
-    written = scalar_text(Path(os.path.relpath(world_file.resolve(), file.resolve().parent)).as_posix())
+    path_text = scalar_text(Path(os.path.relpath(world_file.resolve(), file.resolve().parent)).as_posix())
     return "\n".join(
         [
             "simscen: 1",
             f"name: {scalar_text(name)}",
             "description: What this scenario tests, and why.",
-            *_world_lines(source, written),
+            *_world_lines(source, path_text),
             "robot:",
             f"  pose: {_pose_text(start)}",
             "goals:",
@@ -53,14 +53,14 @@ def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tupl
     )
 
 
-def _world_lines(source: LoadedWorld, written: str) -> list[str]:
-    """Return the lines of the key `world`; `written` is the path of the world as YAML.
+def _world_lines(source: LoadedWorld, path_text: str) -> list[str]:
+    """Return the lines of the key `world`; `path_text` is the path of the world file, quoted if YAML requires it.
 
-    For a map or an SDF file, this is an inline world, to which obstacles, objects, and regions can be added.
+    For a map or an SDF file, the lines contain an inline world, to which users can add obstacles, objects, and regions.
     """
     if source.spec is not None:
-        return [f"world: {written}"]
-    return ["world:", "  simscen: 1", f"  {'sdf' if source.sdf is not None else 'map'}: {written}"]
+        return [f"world: {path_text}"]
+    return ["world:", "  simscen: 1", f"  {'sdf' if source.sdf is not None else 'map'}: {path_text}"]
 
 
 def _pose_text(pose: Pose2) -> str:

@@ -60,7 +60,7 @@ def display_width(text: str) -> int:
 
 
 def ascii_only(text: str) -> str:
-    """Return a text for terminals without Unicode: simscen's symbols become similar ASCII, other characters escapes."""
+    """Return an ASCII version of a text: simscen's symbols become similar text, other characters backslash escapes."""
     return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")
 
 
@@ -201,7 +201,7 @@ class _LineWrapper:
     def _start_line(self, piece: StyledText, text: str, tail: int = 0) -> None:
         """Continue in the next line, and keep `tail` columns after the text.
 
-        Text that is too long for the indentation starts further to the left.
+        If the text does not fit, the indentation is reduced by as many columns as are missing.
         """
         if piece.is_shell and self._line and self._line[-1].is_shell:
             self._append(piece, _LINE_CONTINUATION)

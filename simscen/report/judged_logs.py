@@ -32,7 +32,7 @@ def short_log_line(run: RunFinished, name: str) -> StyledLine:
 
 
 def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine]:
-    """Yield a table with a row per log and a column per criterion that contains margins.
+    """Yield the lines of a table of margins, with a row per log and a column per criterion.
 
     Lines with the reasons for missing margins follow. `runs` are pairs of the name of a log and its result.
     """

@@ -13,6 +13,7 @@ PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulato
     f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
 )
 COMPARISON_HEAD = ("with minus without --stack", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
+"""Columns of the comparison. SCT is success weighted by completion time, and score is the BARN score."""
 TABLE_HEAD = (
     "experiment",
     "runs",
@@ -64,7 +65,7 @@ def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> 
 
 
 def _changes(pair: DriveComparison) -> tuple[str, ...]:
-    """Return the cells for the effect of the other stack parameters on the same drives."""
+    """Return the cells of a row that compares the same drives with the parameters of --stack and without."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
     changes = (_change(difference, form) for difference, form in forms)
     return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
@@ -99,8 +100,8 @@ def _or_none(value: float | None, form: str, unit: str = "") -> str:
     return "-" if value is None else f"{value:{form}}{unit}"
 
 
-def _localization_lines(case: str, localized: LocalizationAccuracy) -> list[str]:
+def _localization_lines(experiment: str, localized: LocalizationAccuracy) -> list[str]:
     low, high = localized.bounds
     moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
     errors = f"{_or_none(localized.rmse, '.3f', ' m')} RMSE, worst run {_or_none(localized.worst_rmse, '.3f', ' m')}"
-    return [f"{case}: {errors}", f"  ANEES {moments}; a consistent belief lies in {low:.2f} … {high:.2f} (95 %)"]
+    return [f"{experiment}: {errors}", f"  ANEES {moments}; a consistent belief lies in {low:.2f} … {high:.2f} (95 %)"]

@@ -54,8 +54,8 @@ def command(
     """Write a page that plays a recorded run, or two runs side by side.
 
     The page shows what the robot saw, believed, and did at any time, the events, the signals, the verdicts, and the
-    text of the scenario. It starts at the time of the failure. It is a single file that needs no network. Of the log of
-    a real robot, it shows the data that the log contains.
+    text of the scenario. It starts at the time of the failure, or at 0 s without one. It is a single file that needs no
+    network. The page of a real robot's log lacks what was not recorded, such as the true pose.
 
     Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """

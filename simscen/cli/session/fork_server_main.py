@@ -126,7 +126,7 @@ def _warm_up(job: Job) -> None:
 
 
 def _used_memory() -> int:
-    """Return the address space in use in bytes (Linux: field 1 of /proc/self/statm, in pages)."""
+    """Return the size of the address space of this process in bytes, which Linux states in /proc/self/statm."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 

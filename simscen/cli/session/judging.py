@@ -1,4 +1,4 @@
-"""Evaluates recorded logs with the criteria that they contain, or with the criteria of a file."""
+"""Evaluates recorded logs with the criteria that they contain, or with those of a criteria file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,7 +31,7 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 class LogJudge:
-    """Evaluates logs, each with its own criteria or all with the criteria of `scenario`.
+    """Evaluates logs with their own criteria or, if `scenario` is given, with those of this criteria file.
 
     `options` say how to read logs that simscen did not write. `root` and `world_path` apply to the files of `scenario`.
     `notes` collects remarks about the logs; `foreign_count` is the number of logs that simscen did not write.
@@ -201,9 +201,12 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the folder and the result of each run without a log in output folders, so that it is counted as well."""
+    """Return the runs of sessions that left no log, so that they are counted as well; pairs of run folder and result.
+
+    `folders` are output folders of sessions. The results are from their journals, as errors unless a run was skipped.
+    """
     return [
-        (str(run_folder(folder, run.key)), _without_log(run))
+        (str(run_folder(folder, run.key)), _as_error(run))
         for folder in folders
         if (folder / JOURNAL_FILE).is_file()
         for run in read_journal(folder).runs
@@ -211,7 +214,7 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
     ]
 
 
-def _without_log(run: RunFinished) -> RunFinished:
+def _as_error(run: RunFinished) -> RunFinished:
     if run.outcome is Outcome.SKIPPED:
         return run
     error = run.result.error

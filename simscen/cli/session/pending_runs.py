@@ -1,7 +1,7 @@
 """Determines which planned runs a session must execute, and which results of earlier sessions it can reuse."""
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from simscen.core.records.session_events import RunFinished, SessionStarted, ses
 from simscen.core.version import __version__
 from simscen.judge.result_json import result_data
 from simscen.loading.loaded import LoadedScenario
+from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun, read_journal
 from simscen.report.session_history import last_failed
@@ -21,7 +22,7 @@ from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
-"""Keys of result.json that the log and the journal both contain. If their values differ, the log is of another run."""
+"""Keys of a result that are compared between journal and log. If values differ, the log is from another run."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
     """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
 
     A result of an earlier session is reused if its scenario has not changed and it is not an error. The two runs that
-    --check-determinism compares are reused together or not at all.
+    --check-determinism compares are reused together or not at all. `shard` (i, n): `jobs` are part i of n (from 1).
     """
     planned = plan_runs(jobs)
     remaining, reused = divide_runs(jobs, planned, previous_results(journal))
@@ -105,9 +106,9 @@ def _planned_run(job: Job, digests: ScenarioDigests) -> PlannedRun:
 
 
 def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
-    """Return the results in the folder of the journal by planned run.
+    """Return the results that the journal of an earlier session in the same folder contains, by planned run.
 
-    Errors are left out, and results that differ from their log.
+    Results that are errors are left out, as are results that differ from those in their log.
     """
     try:
         past = read_journal(journal.folder)
@@ -122,7 +123,7 @@ def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
 
 
 def _has_matching_log(finished: RunFinished) -> bool:
-    """Return whether the log of a run exists and has the same verdicts; True if none was written."""
+    """Return whether the log of the run still exists and contains this result; True if the run wrote no log."""
     if not finished.artifacts.mcap:
         return True
     from simscen.record.mcap_reader import attached_result  # only a resumed session needs the library
@@ -168,18 +169,13 @@ def failed_runs(
     selected = {(scenario.title, scenario.stack_name): scenario for scenario in scenarios if scenario.spec.skip is None}
     found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
     missing = len(last.runs) - len(found)
+    text = f"{number_with_noun(len(last.runs), 'run')} failed in the last session"
     if not found:
-        return None, f"{_runs(last.runs)} failed in the last session, but none is selected: {RUN_ALL}"
-    return found, f"{_runs(last.runs)} failed in the last session" + (
-        f": {len(found)} selected, {missing} not" if missing else ""
-    )
+        return None, f"{text}, but none is selected: {RUN_ALL}"
+    return found, text + (f": {len(found)} selected, {missing} not" if missing else "")
 
 
 def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
     if scenario is None:
         return False
     return (options.seed is None and options.repeat == 1) or key.seed in scenario_seeds(scenario, options)
-
-
-def _runs(runs: Collection[RunKey]) -> str:
-    return f"{len(runs)} run{'' if len(runs) == 1 else 's'}"

@@ -145,18 +145,19 @@ def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
     diagonal_and_trace = np.array([*np.diag(rotation), np.trace(rotation)])
     k = int(np.argmax(diagonal_and_trace))
     if k == 3:
-        q = np.array([*_skew(rotation), 1 + diagonal_and_trace[3]])
+        q = np.array([*_scaled_axis(rotation), 1 + diagonal_and_trace[3]])
     else:
         i, j = (k + 1) % 3, (k + 2) % 3
         q = np.empty(4)
         q[k] = 1 - diagonal_and_trace[3] + 2 * rotation[k, k]
         q[i], q[j] = rotation[i, k] + rotation[k, i], rotation[j, k] + rotation[k, j]
-        q[3] = _skew(rotation)[k]
+        q[3] = _scaled_axis(rotation)[k]
     x, y, z, w = (q / np.linalg.norm(q)).tolist()
     return x, y, z, w
 
 
-def _skew(rotation: Array) -> Vector:
+def _scaled_axis(rotation: Array) -> Vector:
+    """Return the axis of a rotation matrix, with the length 2 sin(angle)."""
     return (
         float(rotation[2, 1] - rotation[1, 2]),
         float(rotation[0, 2] - rotation[2, 0]),

@@ -68,8 +68,8 @@ def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
     corners = np.maximum(before, after)
     reached = (corners - positions[diagonal]) / (positions[diagonal + 1] - positions[diagonal])
     is_vertical_first = (reached[:, 0] < reached[:, 1])[:, None]  # crosses the vertical edge before the horizontal one
-    crossed = np.where(is_vertical_first, *_swap_rows(after, before))
-    opposite = np.where(is_vertical_first, *_swap_rows(before, after))
+    beside = _cells_beside(before, after)
+    crossed, opposite = np.where(is_vertical_first, *beside), np.where(is_vertical_first, *reversed(beside))
     cut = ~_free(costs, crossed)
     if not (np.isfinite(costs.at(path)).all() and _free(costs, opposite[cut]).all()):
         return None
@@ -79,9 +79,12 @@ def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
     return np.insert(path, diagonal[cut] + 1, detours * costs.resolution + np.array(costs.origin), axis=0)
 
 
-def _swap_rows(a: Array, b: Array) -> tuple[Array, Array]:
-    """Return the columns of `a` with the rows of `b`, and the columns of `b` with the rows of `a`."""
-    return np.column_stack((a[:, 0], b[:, 1])), np.column_stack((b[:, 0], a[:, 1]))
+def _cells_beside(before: Array, after: Array) -> tuple[Array, Array]:
+    """Return the two cells between which each diagonal step from `before` to `after` passes; all as (column, row).
+
+    The first ones (n, 2) are in the column of `after`, the second ones in the column of `before`.
+    """
+    return np.column_stack((after[:, 0], before[:, 1])), np.column_stack((before[:, 0], after[:, 1]))
 
 
 def _free(costs: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:

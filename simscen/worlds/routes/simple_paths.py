@@ -23,7 +23,7 @@ Bucket = tuple[int, int]
 STEP_M = 0.2
 """Distance between neighboring points of the search grid, along x and y."""
 HALF_DIAGONAL_STEP_M = STEP_M * math.sqrt(0.5)
-"""Half of the length of a diagonal move: no point of a move is farther from the nearer end of the move."""
+"""Half of the length of a diagonal move. Every point of a move is at most this far from one end of the move."""
 SAMPLING_MARGIN_M = 0.02
 """Additional clearance, because straight lines are checked at single points."""
 MAX_POINTS = 4000
@@ -76,7 +76,7 @@ class SimplePaths:
     def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
         """Return the length in m of a path found by A* over a grid around the start; inf if none was found.
 
-        `last_leg` returns the length of a straight line from a point to the goal, inf if the search must go on.
+        `last_leg` returns the length of the rest of the path from a point; inf if the search must go on from there.
         """
         lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]

@@ -24,7 +24,7 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_FRACTION = 0.05
-"""Fraction of the models (rounded down, plus one) that may be outliers. With more, the world is regarded as large."""
+"""Fraction of the models that may be outliers, and always one more model. With more, the world is regarded as large."""
 
 Placed = TypeVar("Placed", Solid, Body)
 """A solid or a body: both have a pose."""
@@ -175,10 +175,11 @@ def _lower(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
 
 
 def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
-    """Return the models to leave out so that the others fit on a map, with their distances in m from the median.
+    """Return the models to leave out so that the others fit on a map, with their distances in m.
 
-    `extents` are the bounding rectangles of the models by name. The result is empty if all models fit, if more than
-    MAX_OUTLIER_FRACTION of them would have to be left out, or if one of these is large instead of far away.
+    Distances are from the median of the centers of all models. `extents` are the bounding rectangles of the models by
+    name. The result is empty if all models fit, or if more than MAX_OUTLIER_FRACTION would have to be left out. It is
+    also empty if one of the models to leave out overlaps the area of the others: it is then large, not far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:
