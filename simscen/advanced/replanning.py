@@ -1,8 +1,8 @@
 """Decisions of the advanced stack about when to replan, how to plan around moving obstacles, and what to clear.
 
 Plans pass behind moving obstacles. For each cell, the obstacles are predicted for the time at which the robot would
-arrive there in a straight line at full speed. Of the path of a crossing obstacle, only the part where both would meet
-gets a cost.
+arrive there in a straight line at full speed. Only the part of a crossing obstacle's path where both would
+meet gets a cost.
 """
 
 import contextlib

@@ -77,7 +77,7 @@ class _DelayedMessages(FaultEffect):
         return apply_correction(belief, self._correction)
 
     def end(self) -> FaultEffect | None:
-        """Deliver the messages in transit."""
+        """Return this effect if it still has to deliver messages in transit, otherwise None."""
         self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 

@@ -34,8 +34,8 @@ def missing_disturbances(
 ) -> tuple[tuple[Verdict, int], ...]:
     """Return a verdict for each required disturbance that did not happen, with its line in the scenario.
 
-    The verdict is inconclusive if the log is truncated, because the disturbance might have happened later. Of a
-    sequence, only the first missing step gets a verdict. The ID of the verdict is the name of the disturbance, with a
+    The verdict is inconclusive if the log is truncated, because the disturbance might have happened later. Only
+    the first missing step of a sequence gets a verdict. The ID of the verdict is the name of the disturbance, with a
     number if another verdict, also one of `others`, has this name.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]

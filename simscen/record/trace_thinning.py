@@ -18,9 +18,9 @@ class Thinning:
     """Selects the samples to keep. The clock has `rate` ticks per second.
 
     A command is kept if it differs from the previous one, and otherwise 20 times a second. The pose of an object is
-    kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading
-    counts as the robot's odometry. Repeated calls for the same tick return the same result, so that the recorder and
-    the TraceBuilder can use the same Thinning.
+    kept if it has changed, and otherwise once a second. If there are several odometry sensors, the first one
+    with a reading counts as the robot's odometry. Repeated calls for the same tick return the same result, so that the
+    recorder and the TraceBuilder can use the same Thinning.
     """
 
     def __init__(self, rate: int) -> None:

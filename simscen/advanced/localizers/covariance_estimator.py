@@ -39,7 +39,7 @@ MIN_COVARIANCE = np.diag(np.square((1e-3, 1e-3, 1e-3)))
 
 
 class CovarianceEstimator:
-    """Scales the covariance of the particles to the errors that they really have.
+    """Scales the covariance of the particles to the real errors of the estimated pose.
 
     A particle filter treats the errors of all beams and scans as independent. But furniture that was moved, or a map
     that is half a cell off, shifts the pose in the same direction for as long as it is in sight, so that the

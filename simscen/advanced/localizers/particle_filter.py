@@ -33,7 +33,7 @@ MAX_WALL_THICKNESS_M = 1.0
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
-    """`likelihood_field_prob` with the likelihood raised to a power below 1, because neighboring beams err together."""
+    """`likelihood_field_prob` raised to a power below 1, because the errors of neighboring beams are similar."""
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,

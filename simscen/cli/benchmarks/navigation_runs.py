@@ -106,8 +106,8 @@ ExperimentDrive = tuple[int, Drive]
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
     """Return a job for each run, and the experiment and drive of each run.
 
-    Only the first scenario of each experiment is validated. The others are generated in the same way, and their goals
-    were checked for reachability then. Raises InvalidInput, and ValueError for two runs with the same key.
+    Only the first scenario of each experiment is validated. The others are generated in the same way, with
+    reachable goals. Raises InvalidInput, and ValueError for two runs with the same key.
     """
     jobs: list[Job] = []
     drives: dict[RunKey, ExperimentDrive] = {}

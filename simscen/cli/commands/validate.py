@@ -50,7 +50,7 @@ def command(
     *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack, and
     parameters that simscen does not use are listed. Base files and defaults.yaml may be incomplete. Scenarios are also
     checked in their worlds: whether start and goals are free, the robot can arrive in time, all events can take place,
-    and all criteria can both pass and fail. Of a study, the first 20 variations are checked.
+    and all criteria can both pass and fail. Only the first 20 variations of a study are checked.
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """

@@ -165,7 +165,7 @@ def _relative(file: Path, out: Path) -> str:
 MAX_SOLIDS = 20
 """Number of solids that are listed without --all."""
 MAX_NAME_LENGTH = 44
-"""Number of characters of a name that are printed. Of a longer name, only the end is printed."""
+"""Number of characters of a name that are printed; a longer name is cut at its start."""
 
 
 def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:

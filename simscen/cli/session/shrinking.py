@@ -37,10 +37,11 @@ FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 
 
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
-    """Return a subset of the parts that still fails, but passes if any single part is removed. All parts together fail.
+    """Return a subset of the parts that still fails, but passes if any single part is removed.
 
-    `first_failing` receives candidates, each a subset of the parts in their original order. (Delta debugging, with
-    complements only: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input, 2002.)
+    All parts together must fail. `first_failing` receives candidates, each a subset of the parts in their original
+    order. (Delta debugging, with complements only: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing
+    Input, 2002.)
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:

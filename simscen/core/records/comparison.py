@@ -83,8 +83,8 @@ class BaselineComparison:
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
         unpaired_runs: Number of runs without a partner.
-        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Of the metrics, only
-            `collisions` is compared in these pairs.
+        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. The only
+            metric that is compared in these pairs is `collisions`.
         flips: Pairs in which only one run passed.
         p: P-value of the sign test of the flips.
         differences: Difference of each metric.

@@ -99,7 +99,7 @@ class Study:
         effects: Association of parameters with margins, strongest first.
         worst: Smallest margin of each criterion that has margins: the run, the margin, and its unit.
         values: Values of the varied parameters by run, and by YAML path.
-        coverage: Of all pairs of values of two parameters, the fraction that occurred in a run; None for random values.
+        coverage: Fraction of all pairs of values of two parameters that occurred in a run; None for random values.
         accepted: Fraction of the drawn values that met the condition `require`; None if the scenario has none.
     """
 

@@ -20,7 +20,7 @@ _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
 def describe(condition: Condition) -> str:
     """Return a condition in words, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
     if condition.signal is not None:
-        return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
+        return f"{describe_signal(condition)} {_limit(condition)}".rstrip()
     if condition.all is not None:
         return " and ".join(_grouped(part) for part in condition.all)
     if condition.any is not None:
@@ -80,7 +80,7 @@ def describe_value(witness: Witness) -> str:
 
 
 def describe_limit(witness: Witness) -> str:
-    """Return the bound that the decisive value must meet, e.g. "≥ 0.50 m"; the opposite below a `not`."""
+    """Return the limit that the decisive value must meet, e.g. "≥ 0.50 m"; the opposite below a `not`."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -91,8 +91,8 @@ def describe_limit(witness: Witness) -> str:
     return f"{_SIGNS[op]} {format_quantity(comparison.value, signal.unit, digits)}"
 
 
-def _bound(condition: Condition) -> str:
-    """Return the bound of a comparison, e.g. "≥ 0.5 m"; "" for a yes-or-no signal."""
+def _limit(condition: Condition) -> str:
+    """Return the limit of a comparison, e.g. "≥ 0.5 m"; "" for a yes-or-no signal."""
     signal = condition.definition
     if signal.is_boolean:
         return ""

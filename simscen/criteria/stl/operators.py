@@ -92,7 +92,7 @@ def until(hold: Array, release: Array, windows: SampleWindows, continuation: Con
 
     1. `release` becomes true in the window.
     2. `hold` is true from now to the begin of the window.
-    3. From the begin of the window on, `hold` is true until `release` becomes true, no matter whether in the window.
+    3. From the begin of the window on, `hold` is true until `release` becomes true, even if that is after the window.
     """
     count = len(hold)
     from_window = np.append(_unbounded_until(hold, release, windows, continuation), continuation.value_after_end)

@@ -182,8 +182,8 @@ def motion_path(
 def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
     """Return the ID of the object with the shortest text that contains the position of a problem.
 
-    If there is none, return the one with the shortest text that begins later in the same line, for a problem of a key,
-    or "". `source` is the syntax tree of the `text`.
+    If there is none, the problem may be at a key: then return the one with the shortest text that begins later in the
+    same line, or "" without one. `source` is the syntax tree of the `text`.
     """
     if not problem.line or source is None:
         return ""

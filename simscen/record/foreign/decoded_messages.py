@@ -29,7 +29,7 @@ _DECODERS: Mapping[str, Mapping[str, Callable[[bytes], Any]]] = {
     "tf_static": _TRANSFORM_DECODERS,
     "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
 }
-"""Decoders by role and message type. Of a scan, only the stamp is decoded."""
+"""Decoders by role and message type. Only the stamp of a scan is decoded."""
 
 
 @dataclass

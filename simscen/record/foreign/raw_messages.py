@@ -126,7 +126,7 @@ class BagMessages:
     """Iterable of the messages of a rosbag2 folder.
 
     After the iteration, `complete` is False if messages are missing, and `topics` has the message types by topic.
-    SQLite and compressed bags need the optional package rosbags. Of these, only messages on `topics` are read.
+    SQLite and compressed bags need the optional package rosbags; only their messages on `topics` are read.
     """
 
     def __init__(self, folder: Path, topics: Container[str]) -> None:

@@ -100,7 +100,7 @@ _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan
 
 
 class ForeignTraceReader:
-    """Conversion of one log, which the constructor performs.
+    """Converts the messages of one log to signals and events, in its constructor.
 
     It takes the `decoded` messages, and the message types of all `topics` of the log.
 

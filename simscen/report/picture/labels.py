@@ -16,9 +16,9 @@ _ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 1
 _LEADER_DISTANCE_PX = 16.0
 """If a label is further away, a line connects it with its object."""
 _WALL_COST, _COST_PER_PX = 0.25, 0.0015
-"""Cost of a label on walls only, and of each pixel of distance. A label on busy cells only has cost 1."""
+"""Cost of a label that is completely on walls, and of each pixel of distance. On busy cells, the cost is 1."""
 _OCCUPIED_BY_LABEL = 3.0
-"""Cost of a label on another label only."""
+"""Cost of a label that is completely on another label."""
 _MAX_OPTIONAL_COST = 0.2
 """Maximum cost of an optional label; more expensive ones are omitted."""
 

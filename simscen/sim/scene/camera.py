@@ -14,7 +14,7 @@ from simscen.sim.bullet import engine, pybullet
 NEAR_PLANE_M = 0.02
 """Distance from the camera below which nothing is rendered."""
 FACES_PER_SHAPE = 20_000
-"""Largest number of faces of a visual shape. Each has three vertices, and Bullet accepts 131072, twice as many."""
+"""Largest number of faces of a visual shape. Each has three vertices; Bullet accepts 131072, more than needed."""
 
 
 def render_image(

@@ -18,7 +18,7 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class MeshParts:
-    """Parts of a static mesh, sorted by solid: one for each solid with few faces, which may be convex, else its tiles.
+    """Parts of a static mesh, sorted by solid. A solid with few faces is one part, a larger one is split into tiles.
 
     Part k belongs to the solid with the index `solids[k]`, and consists of the faces `order[starts[k]:starts[k + 1]]`.
     `low` and `high` are the corners (n, 3) of the bounding boxes of the parts.

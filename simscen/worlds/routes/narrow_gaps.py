@@ -17,7 +17,7 @@ from simscen.worlds.routes.clearance import ClearanceField, clearance_field, sea
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall: half of a cell's diagonal."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference up to which walls count as equally thin. Of these, the wall nearest to the middle of both ends is used."""
+"""Difference up to which walls count as equally thin. Then the wall nearest to the middle of both ends is used."""
 OPPOSITE_COSINE = -0.5
 """Cosine of the angle (120°), seen from the gap, beyond which two points are on different sides of the gap."""
 
