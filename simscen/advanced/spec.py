@@ -52,8 +52,8 @@ class ScanMatchingAmcl(AmclParameters):
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
     """Covariance of the pose. `particles`: that of the particles, as in Nav2. `scatter`: the same, scaled to the errors
-    that show in the residuals of the beams, and in how far recent poses, moved to the present by scan matching, differ
-    from each other. `scatter` needs `match_scans`."""
+    that are observed in two ways: by the residuals of the beams, and by comparing recent poses, which scan matching
+    propagates to the present. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod

@@ -34,7 +34,7 @@ class LocalizationError(Spec, Criterion):
         the stack publishes a belief, and all the time while its newest belief is over 1 s old. The trajectories are not
         aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound.
-    Why this: a robot whose error is half a meter may reach goals in open space, but it collides near obstacles.
+    Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
     Source: evo's APE (metrics.py) and Beluga's benchmarks.
 
     Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`

@@ -60,7 +60,7 @@ def display_width(text: str) -> int:
 
 
 def ascii_only(text: str) -> str:
-    """Return an ASCII version of a text: simscen's symbols become similar text, other characters backslash escapes."""
+    """Return a text in ASCII: simscen's symbols are replaced by similar text, other non-ASCII characters by escapes."""
     return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")
 
 

@@ -201,9 +201,10 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the runs of sessions that left no log, so that they are counted as well; pairs of run folder and result.
+    """Return each run that left no log, so that it is counted as well, as a pair of its folder and its result.
 
-    `folders` are output folders of sessions. The results are from their journals, as errors unless a run was skipped.
+    `folders` are output folders of sessions, whose journals list the runs. The result is an error, unless the run was
+    skipped.
     """
     return [
         (str(run_folder(folder, run.key)), _as_error(run))

@@ -18,7 +18,7 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 MIN_MESSAGES_AROUND_STEP = 20
 """Smallest number of messages before and after the change of a clock, to distinguish it from delayed messages."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""Largest ratio at which a clock counts as set: lasting change of the offset / jump of the offset at one message.
+"""Largest ratio of the lasting change of the offset to its jump at one message, if a clock was set.
 
 The offset is the stamp minus the time of logging. If a clock is set, both changes are about equal. If a recorder
 catches up after a busy start, or loses messages, the offset changes by far more in total than at any single message.

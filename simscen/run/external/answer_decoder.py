@@ -87,8 +87,8 @@ def decode_answer(
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
     `correction` is the last received pose of the odom frame in the map frame; None if the stack never sent one. Then
-    the belief's correction is computed from its pose and the odometry pose: that of the stack's filtered odometry in
-    this answer, or else `dead_reckoned`, the pose of the wheel odometry.
+    `map_from_odom` of the belief is computed from the belief's pose and an odometry pose: that of the stack's filtered
+    odometry in this answer, or else `dead_reckoned`, that of the wheel odometry.
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")

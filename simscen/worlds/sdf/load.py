@@ -24,7 +24,7 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_FRACTION = 0.05
-"""Fraction of the models that may be outliers, and always one more model. With more, the world is regarded as large."""
+"""Outliers may be this fraction of the models, plus one model. With more outliers, the world is regarded as large."""
 
 Placed = TypeVar("Placed", Solid, Body)
 """A solid or a body: both have a pose."""
