@@ -26,6 +26,7 @@ class EventStatus(Spec, Condition):
     """True once another event or a fault of this scenario has started or ended, or a mark has been set.
 
     Use it for disturbances that follow each other: the lidar goes silent, and a second later a person steps in the way.
+    A mark is a name for a time in the log, which the action `mark` sets.
 
     Example: `when: {event: {name: pallet falls, status: started}}`
     """

@@ -119,7 +119,7 @@ class LocalizationLost(Spec, Condition):
     """True while the estimated pose has a large error or, with `std`, a large reported uncertainty.
 
     Use it for disturbances after kidnapping or slip: stairs, a person, or a new goal while the robot navigates with a
-    wrong pose. `localization_error` considers the position alone. False without a belief.
+    wrong pose. `localization_error` considers the position alone. False while there is no estimated pose.
 
     Example: `when: {localization_lost: {tolerance: 0.5 m, yaw_tolerance: 30 deg}, for: 1 s}`
     """

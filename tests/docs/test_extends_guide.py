@@ -1,7 +1,6 @@
 """Tests of the guide to `extends`."""
 
 import re
-import textwrap
 from pathlib import Path
 
 from simscen.loading.files.paths import PathSandbox
@@ -11,10 +10,12 @@ GUIDE = Path(__file__).parents[2] / "docs/guides/extends.md"
 
 
 def test_files_of_the_guide_are_merged_as_documented(tmp_path: Path) -> None:
-    shown = re.findall(r"^    # (\S+\.yaml)\n((?:    .*\n)+)", GUIDE.read_text(encoding="utf-8"), re.MULTILINE)
+    shown = re.findall(
+        r"^```yaml\n# (\S+\.yaml)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+    )
     assert [name for name, _ in shown] == ["defaults.yaml", "aisle.base.yaml", "slow.scenario.yaml"]
     for name, text in shown:
-        (tmp_path / name).write_text(textwrap.dedent(text))
+        (tmp_path / name).write_text(text)
     tree, problems = Library(PathSandbox.around(tmp_path)).read(tmp_path / "slow.scenario.yaml", defaults=True)
     assert problems == []
     assert tree is not None
