@@ -101,7 +101,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         super().reset(estimate)
         if self._spec.relocalization == "scan_matching":  # random particles would compete with the search
             self._augmented_mcl = AugmentedMcl(0.0, 0.0)
-        self._map_weight, self._is_one_group = 1.0, False
+        self._map_weight, self._is_one_cluster = 1.0, False
         self.fitting_share = 0.0
         """Share of the last scan's beams that fit the map at the particles, of those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
@@ -109,9 +109,9 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     @property
     def is_certain(self) -> bool:
-        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow group."""
+        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow cluster."""
         is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
-        return is_mapped and self._is_one_group and self._augmented_mcl.random_fraction == 0
+        return is_mapped and self._is_one_cluster and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
