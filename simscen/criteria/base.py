@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 class Criterion(ABC):
     """Requirement on the trace of a run. Subclasses are the specifications of the entries of `pass`.
 
+    `trace` is what the run recorded, and `case` what the scenario defines: goals, regions, footprint, time limit.
     *Given* the same trace and case *then* the findings are the same. Each bound that is checked gives a finding, so
     that no findings mean that nothing was checked.
     """
@@ -33,7 +34,7 @@ class Criterion(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence that the criterion needs from the log; None for everything that a log of simscen contains."""
+        """Evidence without which the criterion cannot be judged. By default (None) all that simscen records."""
         return None
 
     @abstractmethod
@@ -44,7 +45,7 @@ class Criterion(ABC):
 class Measure(ABC):
     """Metric of a plug-in, which a scenario requests under `metrics`. It has no bound and cannot fail a run.
 
-    *Given* the same trace and case *then* the result is the same.
+    `trace` and `case` are those of Criterion. *Given* the same trace and case *then* the result is the same.
     """
 
     unit: ClassVar[str] = ""
@@ -52,7 +53,7 @@ class Measure(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence that the metric needs from the log; None for everything that a log of simscen contains."""
+        """Evidence without which the metric cannot be computed. By default (None) all that simscen records."""
         return None
 
     @abstractmethod

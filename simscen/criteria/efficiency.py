@@ -15,7 +15,7 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
 from simscen.criteria.timeline import has_ended
-from simscen.criteria.trace_signals.ground_truth import Drive, drive
+from simscen.criteria.trace_signals.ground_truth import DrivenPath, drive
 from simscen.spec.base import Spec
 from simscen.spec.places import GoalName
 from simscen.spec.quantities import PositiveDuration, PositiveLength, Ratio
@@ -148,7 +148,7 @@ class PathLength(Spec, Criterion):
             findings.append(self._judge_ratio(trace, case, path))
         return findings
 
-    def _judge_ratio(self, trace: Trace, case: Case, path: Drive) -> Finding:
+    def _judge_ratio(self, trace: Trace, case: Case, path: DrivenPath) -> Finding:
         assert self.max_ratio is not None
         what = "path_length ratio"
         shortest, because = shortest_path_length(trace, case)
@@ -185,7 +185,7 @@ def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
     return (length, "") if length > 0 else (math.nan, "the shortest path has no length")
 
 
-def _judge_length(trace: Trace, path: Drive, what: str, limit: float, context: str = "") -> Finding:
+def _judge_length(trace: Trace, path: DrivenPath, what: str, limit: float, context: str = "") -> Finding:
     decisive = int(np.argmax(path.travelled > limit)) if path.length > limit else len(path.ticks) - 1
     at = (trace, int(path.ticks[decisive])) if len(path.ticks) else None
     return at_most(what, path.length, limit, "m", at=at, context=context)

@@ -1,4 +1,4 @@
-"""Shortest paths and clearances of the robots of a scenario, which the map shows while something is dragged."""
+"""Shortest paths and clearances of a scenario's robots, which the page shows while the user drags something."""
 
 import math
 from collections.abc import Iterator, Sequence

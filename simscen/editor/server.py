@@ -48,7 +48,7 @@ class OpenFiles:
         session = self._session(int(match[1]))
         return None if session is None else (session, rest)
 
-    def close(self) -> None:
+    def stop_runs(self) -> None:
         """Stop the runs of all sessions."""
         for session in (self.main, *self._sessions.values()):
             session.runs.close()
@@ -120,9 +120,9 @@ class EditorServer(ThreadingHTTPServer):
         """Session of the file that the command `simscen edit` names."""
         return self.open_files.main
 
-    def close_files(self) -> None:
+    def stop_runs(self) -> None:
         """Stop the runs of all sessions."""
-        self.open_files.close()
+        self.open_files.stop_runs()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore a connection that the browser closed; print other errors."""

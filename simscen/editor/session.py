@@ -1,6 +1,6 @@
-"""Requests that the editor page sends to simscen: one method for each, with JSON data as argument and result.
+"""Answers the requests of the editor page: one method for each, with JSON data as argument and result.
 
-The page holds the edited text, and sends it with each request as `text`.
+The page holds the edited text, and sends it with each request as `text`. "The map" is the page's drawing of the world.
 """
 
 import threading
@@ -48,8 +48,8 @@ class RequestRefused(Exception):
 class EditorSession:
     """Answers the requests about one edited file.
 
-    Methods without an underscore whose names are in `requests` are requests of the page. They raise RequestRefused if
-    the request cannot be answered.
+    The attribute `requests` maps the name of each request to the method that answers it. These methods raise
+    RequestRefused if the request cannot be answered.
     """
 
     def __init__(
@@ -111,10 +111,10 @@ class EditorSession:
         return self._opened_data(self._opened)
 
     def scene(self, request: Data) -> Data:
-        """Return what the map shows of a text.
+        """Return what to draw on the map for a text: the background and the objects.
 
-        The request contains the ID of the background that the page already has as `known`. If this is the background,
-        the answer has None instead of it.
+        `known` in the request is the ID of the background that the page already has. If the background is the same,
+        `background` in the answer is None.
         """
         with self._scene_lock:
             parts = scene_parts(self.file, _text(request))
@@ -127,7 +127,7 @@ class EditorSession:
         return data
 
     def problems(self, request: Data) -> Data:
-        """Return the problems of a text, each with the ID of the object on the map that contains its position."""
+        """Return the problems of a text, each with the ID of the object on the map in whose YAML it is."""
         text = _text(request)
         with self._check_lock:
             found = self._checks.problems(text)

@@ -13,7 +13,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence
 
 FORMAT = 2
-"""Version of the format; other versions are rejected."""
+"""Version of the format; other versions are rejected. Keys that were added later have defaults."""
 
 
 def to_json(result: RunResult) -> str:
@@ -88,7 +88,10 @@ def from_data(data: dict[str, Any]) -> RunResult:
 
 
 def read_key(data: dict[str, Any]) -> RunKey:
-    """Return the key of a run from the JSON data of its result. In old files, `variation` is the name of the stack."""
+    """Return the key of a run from the JSON data of its result.
+
+    Also reads old files without `stack_name`, in which `variation` is the name of the stack.
+    """
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
     return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 

@@ -43,7 +43,7 @@ CriticName = Literal[
 
 
 class MppiCritic(Spec):
-    """Base class of critics: cost = (`cost_weight` · measured value) to the power of `cost_power`."""
+    """Base class of critics: cost = (weight · measured value) to the power of `cost_power`."""
 
     enabled: bool = True
     """Whether to use the critic."""
@@ -145,17 +145,16 @@ class MppiPathFollowCritic(MppiCritic):
 
 
 class MppiPathAngleCritic(MppiCritic):
-    """Penalizes a heading at the end of a trajectory that differs from the direction of the plan."""
+    """Penalizes a heading at the end of a trajectory that does not point to the target point, which is on the plan."""
 
     cost_weight: Weight = 2.0
     """Weight of the angle in rad."""
     offset_from_furthest: PointCount = 4
-    """Number of plan points beyond the furthest point that any trajectory reaches, to the point that defines the
-    direction."""
+    """Number of plan points from the furthest point that any trajectory reaches to the target point."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
     max_angle_to_furthest: NonNegativeAngle = 1.0
-    """Angle to the point that defines the direction within which the critic is inactive."""
+    """Angle between the robot's heading and the direction to the target point below which the critic is inactive."""
     mode: Annotated[int, Field(ge=0, le=2)] = 0
     """0: forward driving is preferred; 1: forward and backward driving are equal; 2: the orientations of the plan
     decide."""

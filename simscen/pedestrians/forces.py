@@ -54,7 +54,7 @@ def social_forces(towards: Array, closing: Array, extra_radii: Array) -> Array:
 
     towards (n, 2):    vector in m from the pedestrian to the other
     closing (n, 2):    velocity of the pedestrian minus that of the other in m/s
-    extra_radii (n,):  radius of the other in m minus that of a normal pedestrian
+    extra_radii (n,):  radius of the other in m minus crowd.REFERENCE_RADIUS_M, the radius that the model assumes
     """
     separation = np.hypot(towards[:, 0], towards[:, 1])
     distance = np.maximum(separation, 1e-6)

@@ -1,4 +1,7 @@
-"""Comparison of stacks or sessions as a section of an HTML page, and as Markdown for GitHub."""
+"""Comparison of stacks or sessions as a section of an HTML page, and as Markdown for GitHub.
+
+A flip is a pair of runs of which only one passed. `links` lead to the replays or logs of failed runs.
+"""
 
 from dataclasses import replace
 
@@ -26,9 +29,9 @@ EXPLANATION = (
     "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
     "test for metrics, for significant changes with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
 )
-"""Text next to the tables that explains their columns."""
+"""Text next to the tables that explains their columns. -/=/+ are numbers of pairs: lower, equal, higher value."""
 _HEADINGS = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
-"""Headings of the table of metrics. {0} is the name of the baseline, {1} that of the stack compared with it."""
+"""Headings of the table of metrics: {0} is the baseline, {1} the stack compared with it; see EXPLANATION."""
 
 
 def comparison_html(comparison: Comparison) -> str:
@@ -99,7 +102,7 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
 
 
 def _link_markdown(flip: Flip, links: Links) -> str:
-    """Return the link to the failed run of a flip in parentheses; "" if there is none."""
+    """Return the link to the failed one of the two runs of a flip, in parentheses; "" if there is none."""
     link = links.get((flip.failed, flip.scenario, flip.seed))
     return f" (`{link}`)" if link else ""
 

@@ -141,7 +141,11 @@ class Component(Spec):
     """
 
     component: ClassVar[str]
-    """Address `package.module:Class` of a class or function that is called with the specification and the setting."""
+    """Address `package.module:Class` of the class or function that makes the object.
+
+    It is called with the specification and a setting: what the object may know of its run, such as the
+    simscen.stack.setting.Setting of all parts of a stack, or the simscen.sensors.sensor.SensorSetting of a sensor.
+    """
 
     @classmethod
     def definition_problem(cls) -> str:

@@ -22,10 +22,10 @@ BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
 """Rates in Hz of beliefs between scans, and of local plans."""
 MAX_CELLS_PER_SECOND = 125_000
 """Maximum number of cells published per second for each costmap; a larger costmap is published less often."""
-# Translation of costs as in nav2_costmap_2d's publisher: 1 … 252 become 1 … 98.
-_PUBLISHED = np.array(
+_OCCUPANCY_TABLE = np.array(
     [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
 ).tobytes()
+"""Published occupancy for each cost 0 … 255, as in nav2_costmap_2d: 1 … 252 become 1 … 98, 253 → 99, 254 → 100."""
 
 
 Updates = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
@@ -52,7 +52,7 @@ class Publisher:
         self._local_costmap = _CostmapPublisher("local", local_frame)
 
     def belief(self, tick: int) -> Belief:
-        """Return the belief to publish. To be called after each scan, and when the tick `belief_due` is reached."""
+        """Return the belief to publish. Call it after each scan, and at the tick in the attribute `belief_due`."""
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
@@ -107,7 +107,7 @@ class _CostmapPublisher:
         if view.revision == self.revision:
             return None
         self.revision = view.revision
-        cells = np.frombuffer(view.costs.tobytes().translate(_PUBLISHED), dtype=np.int8).reshape(view.costs.shape)
+        cells = np.frombuffer(view.costs.tobytes().translate(_OCCUPANCY_TABLE), dtype=np.int8).reshape(view.costs.shape)
         grid = OccupancyGrid(cells, view.resolution, Pose2(*view.origin))
         return CostGrid(self.name, self.frame, grid)
 

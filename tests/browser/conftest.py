@@ -124,7 +124,7 @@ def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
     for server in servers:
         server.shutdown()
         server.server_close()
-        server.close_files()
+        server.stop_runs()
 
 
 @pytest.fixture

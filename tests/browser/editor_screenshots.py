@@ -49,7 +49,7 @@ def main() -> None:
         shown.wait_for_timeout(1000)
         save(shown.screenshot(), IMAGES / "edit.png")
         server.shutdown()
-        server.close_files()
+        server.stop_runs()
 
 
 if __name__ == "__main__":

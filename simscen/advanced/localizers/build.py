@@ -8,7 +8,7 @@ from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapResiduals, 
 from simscen.advanced.localizers.particle_filter import (
     ScanMatchingParticleFilter,
     TemperedLikelihoodField,
-    beyond_the_map,
+    unmapped_cells,
 )
 from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
 from simscen.core.decorators import cached_on_instance
@@ -56,7 +56,7 @@ class MapModels:
 def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
     """Return the models of a map; cached with the map, since a map of 100 x 100 m takes 0.3 s."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
-    field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), beyond_the_map(grid).ravel()
+    field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), unmapped_cells(grid).ravel()
     trust_field = field if spec.laser_likelihood_max_dist > FIT_DISTANCE_M else obstacle_field(grid, 2 * FIT_DISTANCE_M)
     if spec.laser_model_type == "likelihood_field_prob":
         sensor: SensorModel = TemperedLikelihoodField(

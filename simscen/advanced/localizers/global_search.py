@@ -25,13 +25,14 @@ MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
 COARSE_CELL_M, HEADING_COUNT = 0.2, 180
 """Cell size and number of headings of the coarse grid."""
 COARSE_POINTS, FINAL_POINTS = 80, 240
-"""Maximum number of endpoints, and of points along beams, that are used for the search and for the final scores."""
+"""Maximum number of points of each kind (endpoints, points along beams): for the search, and for the final scores."""
 MAX_RANGE_M = 15.0
 """Points farther away are ignored, because they move too far from one heading of the coarse grid to the next."""
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
-"""Maximum number of poses from the coarse grid, of those that are refined, and of those that are returned."""
+"""Maximum numbers of poses: taken from the coarse grid, then refined, then returned."""
 NEARBY_STEPS, REFINED_NEARBY_POSES = ((6, 0.2), (9, 0.035)), 12
-"""Steps of `search_near` to each side, as (number, size) in m and in rad; and number of poses that it refines."""
+"""Grid of `search_near`: (steps to each side, step size) for x and y in m, and for yaw in rad. Number of poses that it
+refines."""
 MIN_SEPARATION = (0.5, 0.2)
 """Poses that differ by no more than both of these values (m, rad) count as the same."""
 PASSED_SHARES = (0.3, 0.55, 0.8)
@@ -69,7 +70,7 @@ class GlobalSearch:
     """Finds the poses on a map at which a view fits best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Search this map. `field` are the distances from its obstacles, if they have already been computed."""
+        """Prepare searches on the map `grid`. `field` has its distances from obstacles, if already computed."""
         self._grid, self._given_field = grid, field
 
     def precompute(self) -> None:
@@ -101,7 +102,7 @@ class GlobalSearch:
         return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def score(self, poses: Array, view: View) -> Array:
-        """Return the scores (n,) of a view at each of the `poses` (n, 3), in 0 … 1."""
+        """Return the scores (n,) in 0 … 1 of a view, one for each of the `poses` (n, 3)."""
         parts = [(self._nearness_table, view.ends, 1.0), (self._free_table, view.passed, FREE_WEIGHT)]
         nonempty = [(table, points, weight) for table, points, weight in parts if len(points)]
         total = sum(weight * self._mean(table, poses, points) for table, points, weight in nonempty)
@@ -136,7 +137,11 @@ class GlobalSearch:
 
     @cached_property
     def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
-        """Map cells per coarse cell; for each coarse cell the maximum of both tables, and whether it has free cells."""
+        """Tables for coarse cells: (factor, nearness table, free table, mask of the coarse cells with any free cell).
+
+        A coarse cell consists of `factor` x `factor` map cells. Its value in a table is their maximum in the table of
+        the same name for map cells.
+        """
         factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape
         shape = rows + 2, columns + 2

@@ -32,16 +32,17 @@ class MapResiduals:
     """
 
     def __init__(
-        self, field: DistanceField, beyond: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
+        self, field: DistanceField, unmapped: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
     ) -> None:
-        """Take a map and AMCL's parameters. `beyond` marks cells of `field.table` that are outside the mapped area."""
-        self._field, self._beyond = field, beyond
+        """Take a map and AMCL's parameters. `unmapped` marks cells of `field.table` outside the mapped area."""
+        self._field, self._unmapped = field, unmapped
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
     def residuals(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
         """Return the residuals of a scan taken at `pose`; None if the map explains none of its beams."""
         cells = self._field.endpoint_cells(np.array([pose]), beams.ends)[0]
-        distances = self._field.table.take(cells, mode="clip")[~self._beyond.take(cells, mode="clip")] / self._sigma_hit
+        is_mapped = ~self._unmapped.take(cells, mode="clip")
+        distances = self._field.table.take(cells, mode="clip")[is_mapped] / self._sigma_hit
         hit = self._z_hit * np.exp(-0.5 * np.square(distances, dtype=np.float64))
         if not len(hit) or not hit.any():
             return None
@@ -86,14 +87,14 @@ class MapTrust:
     which few beams end on the mapped area is therefore ignored as well.
     """
 
-    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], zero: float, full: float) -> None:
-        """Classify the cells of a map. `beyond`, in the order of `field.table`, marks cells outside the mapped area.
+    def __init__(self, field: DistanceField, unmapped: npt.NDArray[np.bool_], zero: float, full: float) -> None:
+        """Classify the cells of a map. `unmapped`, in the order of `field.table`, marks cells outside the mapped area.
 
         A scan is ignored if at most the share `zero` of its beams fits. From the share `full` on, it counts fully.
         """
         self._field, self._zero, self._full = field, zero, full
         mapped = np.where(field.table < FIT_DISTANCE_M, _FITS, _MISSES)
-        self._class_table = np.where(beyond, _UNMAPPED, mapped).astype(np.uint8)
+        self._class_table = np.where(unmapped, _UNMAPPED, mapped).astype(np.uint8)
 
     def weight(self, particles: Particles, beams: Beams) -> ScanWeight:
         """Return the weight of a scan.

@@ -29,7 +29,7 @@ About the geometric mean of the likelihoods of all beams of a well localized rob
 favor poses from which more beams leave the map.
 """
 MAX_WALL_THICKNESS_M = 1.0
-"""Unknown space behind a wall that is deeper than this may contain unmapped rooms."""
+"""Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
@@ -51,11 +51,11 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
         return likelihoods
 
 
-def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
-    """Return the cells outside the mapped area: unknown ones that a beam can reach. The mask has a border of one cell.
+def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
+    """Return the mask (rows + 2, columns + 2) of the cells outside the mapped area, with a border of one cell.
 
-    These are the unknown cells whose nearest known cell is free, and those deeper than MAX_WALL_THICKNESS_M behind a
-    wall. No beam reaches other unknown cells, since a wall stops it.
+    These are the unknown cells whose nearest known cell is free, and those farther than MAX_WALL_THICKNESS_M from all
+    known cells, which may be unmapped rooms. The other unknown cells are the inside of walls, which no beam reaches.
     """
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
@@ -77,7 +77,7 @@ ODOMETRY_SHARE = 0.2
 FIRST_SCAN_WEIGHT = 0.2
 """Weight of the first scan after an initial pose: the exponent of the scan's likelihood.
 
-The weight grows to 1 while the robot drives the parameter `settling_distance`.
+The weight grows to 1 until the robot has driven the distance `settling_distance` (a parameter of the localizer).
 """
 CERTAIN_FIT = 0.9
 """Minimum share of a scan's beams that fit the map for the filter to be certain."""
@@ -101,7 +101,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         super().reset(estimate)
         if self._spec.relocalization == "scan_matching":  # random particles would compete with the search
             self._augmented_mcl = AugmentedMcl(0.0, 0.0)
-        self._map_weight, self._is_one_group = 1.0, False
+        self._map_weight, self._is_one_cluster = 1.0, False
         self.fitting_share = 0.0
         """Share of the last scan's beams that fit the map at the particles, of those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
@@ -109,9 +109,9 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     @property
     def is_certain(self) -> bool:
-        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow group."""
+        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow cluster."""
         is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
-        return is_mapped and self._is_one_group and self._augmented_mcl.random_fraction == 0
+        return is_mapped and self._is_one_cluster and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
@@ -121,10 +121,10 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def follow(self, step: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching.
 
-        `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta`
-        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow
-        odometry, and later scans show which particles fit the map. If the map does not show the surroundings, all
-        particles follow scan matching.
+        `step` is the motion from scan matching, and `delta` the motion that odometry measured in the same time, both in
+        the base frame. If they disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some
+        particles then follow odometry, and later scans show which particles fit the map. If the map does not show the
+        surroundings, all particles follow scan matching.
         """
         self._settle(delta)
         poses = sample_step(self.particles.poses, step, self._rng)

@@ -32,7 +32,7 @@ APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
 """Weight of a collision with a static obstacle, and the distance in m to keep from it."""
 PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, OTHER_COST = 1.0, 0.15, 0.08, 0.1
-"""Weights of progress, of driving backward, of a changed command, and of another trajectory than the controller's."""
+"""Weights of progress, of driving backward, and of a changed command; cost of leaving the controller's trajectory."""
 SAFE_RISK = 0.02
 """Risk (`Avoidance._risk`) up to which the controller's command stays."""
 RESUME_RISK = 0.01
@@ -114,9 +114,11 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None,
     ) -> Twist:
-        """Return the first command of the cheapest trajectory; of several, the controller's own or that first in order.
+        """Return the first command of the trajectory with the lowest cost.
 
-        The risk is only computed for trajectories that can be the best by their other costs, in order of these.
+        If several have the same cost, the controller's own trajectory is preferred, then the first one of the sampler.
+        Because risk and static costs take long to compute, trajectories are evaluated in the order of their other
+        costs, and only until these alone exceed the lowest total cost.
         """
         fan, goal = self._sampler.sample(pose, twist), self._goal(pose, path, home)
         all_indices = np.arange(len(fan.commands))
@@ -188,9 +190,9 @@ class Avoidance:
         cost: Array = STATIC_WEIGHT * is_close.max(axis=1)
         return cost
 
-    def _clearance(self, rollouts: Rollouts, costmap: CostmapView, times: tuple[slice, int | slice]) -> Reals:
-        """Return the distances in m of trajectories from static obstacles at `times`."""
-        return np.asarray(self._discs.clearance(costmap, rollouts.x[times], rollouts.y[times], rollouts.yaw[times]))
+    def _clearance(self, rollouts: Rollouts, costmap: CostmapView, index: tuple[slice, int | slice]) -> Reals:
+        """Return the distances in m of poses from static obstacles; `index` selects them from arrays (n, times)."""
+        return np.asarray(self._discs.clearance(costmap, rollouts.x[index], rollouts.y[index], rollouts.yaw[index]))
 
     def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
         """Return the position that the robot should approach."""
@@ -245,9 +247,9 @@ class StandPosition:
         """Forget the pose, because the robot drives."""
         self._home, self._is_away = None, False
 
-    def remember(self, pose: Pose2, has_moving: bool) -> Pose2 | None:
-        """Return the stand position: the pose at which an obstacle moved for the first time; None before that."""
-        if self._home is None and has_moving:
+    def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
+        """Return the stand position: the robot's pose when an obstacle first moved. None if none has moved yet."""
+        if self._home is None and has_moving_obstacles:
             self._home = pose
         return self._home
 

@@ -134,9 +134,9 @@ class MotionPrediction:
             return
         tracker.on_scan(scan, self._odometry.at(scan.tick))
         self._predicted = None
-        if self.is_idle and not tracker.has_moving:
+        if self.is_idle and not tracker.has_moving_obstacles:
             return
-        self._active = [each for each in self._trackers.values() if each.has_moving]
+        self._active = [each for each in self._trackers.values() if each.has_moving_obstacles]
         self.is_idle = not self._active and all(
             each.first_tick is not None and scan.tick - each.first_tick >= self._warm_up_ticks
             for each in self._trackers.values()

@@ -162,7 +162,7 @@ class Tracker:
         """Moving obstacles at the tick of the latest scan."""
 
     @property
-    def has_moving(self) -> bool:
+    def has_moving_obstacles(self) -> bool:
         """Whether there are moving obstacles."""
         return self.moving is not self._no_obstacles
 

@@ -82,7 +82,7 @@ def command(
         except KeyboardInterrupt:
             print_text("")
         finally:
-            server.close_files()
+            server.stop_runs()
 
 
 def _backend() -> "Backend":

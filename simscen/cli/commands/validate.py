@@ -69,7 +69,7 @@ def command(
 
 
 def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
-    """Return the problems of the text; if there are no errors, also those of building the world or robot."""
+    """Return the problems of a file. If its text has no errors, its world or robot is built and checked as well."""
     if kind in ("scenario", "study"):
         numbers = CHECKED_DRAWS if kind == "study" else None
         found = [problem for choice in checker.choices for problem in checker.check_scenario(file, choice, numbers)[1]]
@@ -83,7 +83,7 @@ def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
 
 @dataclass
 class _Checked:
-    """Numbers of checked files by kind and of invalid files, and the problems of all files."""
+    """Result of the checks: number of files by kind, problems of all files, and number of invalid files."""
 
     kinds: Counter[str] = field(default_factory=Counter)
     problems: list[Problem] = field(default_factory=list)

@@ -75,8 +75,8 @@ def turn_rate(trace: Trace) -> Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """Driven path as a sequence of moves: at `ticks[k]`, the robot had driven `travelled[k]` m."""
+class DrivenPath:
+    """Path of the robot as a sequence of moves: at `ticks[k]`, the robot had driven `travelled[k]` m."""
 
     ticks: Ticks
     travelled: Array
@@ -92,7 +92,7 @@ class Drive:
         return float(driven[-1]) if len(driven) else 0.0
 
 
-def drive(trace: Trace) -> Drive:
+def drive(trace: Trace) -> DrivenPath:
     """Return the driven path in the plane, in moves of at least MIN_MOVE_M, without teleportation.
 
     Yaw is not part of the distance, unlike in Arena's get_metrics.py, which adds radians to meters.
@@ -101,7 +101,7 @@ def drive(trace: Trace) -> Drive:
     indices, lengths = [0], [0.0]
     points = poses.values[:, :2].tolist()
     if not points:
-        return Drive(np.empty(0, dtype=np.int64), np.empty(0))
+        return DrivenPath(np.empty(0, dtype=np.int64), np.empty(0))
     last = points[0]
     for k, point in enumerate(points[1:], start=1):
         step = math.dist(point, last)
@@ -112,7 +112,7 @@ def drive(trace: Trace) -> Drive:
         indices.append(k)
         lengths.append(step)
         last = point
-    return Drive(poses.ticks[indices], np.cumsum(lengths))
+    return DrivenPath(poses.ticks[indices], np.cumsum(lengths))
 
 
 def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:

@@ -6,7 +6,7 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.estimation_errors import nees_samples, pose_error
-from simscen.criteria.trace_signals.ground_truth import Drive, teleport_samples, truth
+from simscen.criteria.trace_signals.ground_truth import DrivenPath, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
 """Minimum distance in m between points for computing the curvature, as in bench-mr. Closer points are noise."""
@@ -19,7 +19,7 @@ PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
 """Metrics that `path_metrics` returns."""
 
 
-def path_metrics(trace: Trace, path: Drive) -> Values:
+def path_metrics(trace: Trace, path: DrivenPath) -> Values:
     """Return the metrics on turns and curvature of the driven path, without teleportations."""
     segments = path_segments(trace, path)
     total_turn = heading_change(trace)
@@ -33,7 +33,7 @@ def path_metrics(trace: Trace, path: Drive) -> Values:
     }
 
 
-def path_segments(trace: Trace, path: Drive) -> list[Array]:
+def path_segments(trace: Trace, path: DrivenPath) -> list[Array]:
     """Return the points (n, 2) of each part of the driven path between teleportations."""
     corners = truth(trace).at(path.ticks)[:, :2]
     breaks = np.flatnonzero(np.diff(path.travelled) == 0.0) + 1

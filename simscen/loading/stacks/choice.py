@@ -38,9 +38,9 @@ class StackChoice:
     section: MappingNode | None = field(default=None, repr=False)
     """Section `stack:` of the stack file."""
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
-    """Texts of the stack file and of the files that it extends, by their names in problems."""
+    """Texts of the stack file and of the files that it extends, by their names in messages."""
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
-    """Absolute paths of these files, by their names in problems."""
+    """Absolute paths of these files, by their names in messages."""
     external_command: ExternalCommand | None = field(default=None, repr=False)
     """Command that starts an external stack."""
     notes: tuple[Problem, ...] = field(default=(), repr=False)

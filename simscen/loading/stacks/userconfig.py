@@ -21,7 +21,7 @@ from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 @dataclass(frozen=True)
 class UserConfig:
-    """User configuration, and the file that it was read from. `tree` and `library` are None if the file is missing."""
+    """User configuration and its `file`. `tree` and `library`, which locate errors in it, are None if it is missing."""
 
     file: Path
     spec: UserConfigSpec
@@ -69,24 +69,25 @@ def load_config(file: Path) -> UserConfig:
     return UserConfig(file, spec, tree, library)
 
 
-def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
+def undefined_stack(
+    loaded: LoadedScenario, defined_names: Iterable[str] = (), config_file: Path | None = None
+) -> Problem | None:
     """Return a problem if the scenario has an external stack without a command; else None.
 
-    `known` are the names of external stacks with a command, and `config` is the user configuration; they are used in
-    the hint.
+    Its hint suggests one of the `defined_names` of stacks that have a command, or an entry in `config_file`.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
         return None
     name = stack.external
-    near = suggestion(name, known)
-    there = f", or under `stacks:` in {config}" if config is not None else ""
+    near = suggestion(name, defined_names)
+    there = f", or under `stacks:` in {config_file}" if config_file is not None else ""
     hint = near if near.startswith("did") else f"give it with --stack {name}='COMMAND'{there}"
     message = f"the external stack {quoted(name)} has no command"
     return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)
 
 
-def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
+def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
     """Return a problem if several `--stack` give commands to robots of the same scenario; else an empty list.
 
     A run can use only one `--stack`. `given` are the names of the external stacks to which `--stack` gives commands.
@@ -95,5 +96,5 @@ def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Pat
     conflicting = [name for name in given if name in own]
     stacks = " and ".join(map(quoted, conflicting))
     message = f"robots of this scenario have the stacks {stacks}, but a run can have only one --stack"
-    hint = f"define the commands of all but one under `stacks:` in {config}"
+    hint = f"define the commands of all but one under `stacks:` in {config_file}"
     return [own[conflicting[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(conflicting) > 1 else []

@@ -28,9 +28,9 @@ class Library:
 
     sandbox: PathSandbox
     texts: dict[str, str] = field(default_factory=dict)
-    """Texts of the files read so far, by their names in problems."""
+    """Texts of the files read so far, by their names in messages (PathSandbox.display_name)."""
     files: dict[str, Path] = field(default_factory=dict)
-    """Absolute paths of these files, by their names in problems."""
+    """Absolute paths of these files, by their names in messages."""
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
     """Worlds, maps, and robots loaded so far, by the name of the loading function and the path (see Assets)."""
     unsaved: Mapping[Path, str] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Library:
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
-        """Add texts and paths of files that were read without this library, by their names in problems."""
+        """Add texts and paths of files that were read without this library, by their names in messages."""
         self.texts |= texts
         self.files |= files
 

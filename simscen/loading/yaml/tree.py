@@ -12,7 +12,7 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in the file `path`, which is named as in problems. `line` and `col` count from 1."""
+    """Position in a file. `path` is relative to the root of the scenario if possible. `line` and `col` count from 1."""
 
     path: str
     line: int

@@ -23,13 +23,13 @@ STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
 """Yaw errors of the mount that are tried as starting points of the estimate."""
 MAX_MISFIT_RATIO = 0.7
-"""The best tried yaw error is the starting point only if its median range difference is less than this fraction of that
-at the nominal mount; otherwise the nominal mount is the starting point."""
+"""The best tried yaw error is the starting point if it reduces the median range difference to less than this fraction
+of the difference at the nominal mount. Otherwise, the estimate starts at the nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Beams with a larger difference from the expected range are ignored. The limit of the mount is halved with each
-Gauss-Newton step, down to 0.1 m."""
+"""Beams with a larger difference from the expected range are ignored. While the mount is estimated, this limit is
+halved after each Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
 """Smallest number of beams from which the mount is estimated."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
@@ -41,7 +41,7 @@ MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
 def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     """Return the true pose of the lidar relative to its nominal mount, by Gauss-Newton steps on the range differences.
 
-    It is the identity if too few beams hit the static world.
+    Returns the identity if too few beams hit the static world.
     """
     step = max(1, len(compared.scans) // TARGET_SCANS)
     chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]

@@ -53,7 +53,7 @@ class ScenarioContents:
         world: World file, or an inline world.
         map: Map file or "none"; "" for the map of the world.
         robot: Robot file or name of a shipped robot.
-        start: True start pose in the map frame.
+        start: Pose in the map frame at which the robot really starts.
         estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
             not know where the robot is; None for the default.
         passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.

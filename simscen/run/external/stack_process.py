@@ -23,7 +23,7 @@ from simscen.run.process.isolation import READ_BYTES, TAIL_BYTES, CappedLog, cle
 EXIT_TIMEOUT_S = 2.0
 """Time in which a process is expected to exit after it closed its socket."""
 CLEANUP_TIMEOUT_S = 5.0
-"""Time in which the launcher is expected to end the stack with all of its descendants."""
+"""Time in which the launcher (see StackProcess) is expected to end the stack and all of its descendants."""
 MAX_MESSAGE_LENGTH = 2000
 """Number of characters to which error messages of a stack are cut."""
 PEER_PATH_VARIABLE = "SIMSCEN_PEER_PATH"
@@ -34,6 +34,9 @@ ROBOT_VARIABLE = "SIMSCEN_ROBOT"
 
 class StackProcess:
     """A running stack. Its output goes to `log_file`; error messages contain the last lines of the output.
+
+    The stack is the child of a launcher: a process of simscen.run.external.launcher that receives the command of the
+    stack, starts it, reports its exit, and ends it with all of its descendants.
 
     All waits have a time limit in wall time. Frames in both directions and output are transferred concurrently, so that
     none blocks another.
@@ -70,14 +73,14 @@ class StackProcess:
         self._poll = select.poll()
         self._readers: dict[int, Callable[[], bool]] = {
             self._stream.fileno(): self._read_frames,
-            self._report: self._read_report,
+            self._report: self._read_exit_report,
             self._output: self._read_output,
         }
         for descriptor in self._readers:
             self._poll.register(descriptor, select.POLLIN)
-        self._send_start_order(command, {ROBOT_VARIABLE: robot} if robot else {})
+        self._send_command_to_launcher(command, {ROBOT_VARIABLE: robot} if robot else {})
 
-    def _send_start_order(self, command: ExternalCommand, extra: dict[str, str]) -> None:
+    def _send_command_to_launcher(self, command: ExternalCommand, extra: dict[str, str]) -> None:
         inherited = {name: value for name, value in command.env.items() if name != ROBOT_VARIABLE}
         env = {**inherited, **extra, PEER_PATH_VARIABLE: str(Path(wire.__file__).parent / "standalone")}
         order = {"argv": command.argv, "env": env, "cwd": command.cwd, "variable": wire.SOCKET_FD_VARIABLE}
@@ -126,7 +129,7 @@ class StackProcess:
         return RunError(kind, f"stack {self._name}: {message}", output_tail(output), by_stack=True)
 
     def release(self) -> None:
-        """Request the end of the process and its descendants; `close` waits for it."""
+        """Ask the launcher to end the stack and its descendants, without waiting for it."""
         if self._control >= 0:
             with suppress(BrokenPipeError):
                 os.write(self._control, b"\0")
@@ -134,7 +137,7 @@ class StackProcess:
             self._control = -1
 
     def close(self) -> None:
-        """End the process and its descendants."""
+        """End the stack and its descendants, wait for it, and free all resources. Includes `release`."""
         self.release()
         self._pump(lambda: self._output not in self._readers and self._report not in self._readers, CLEANUP_TIMEOUT_S)
         self._launcher.kill()
@@ -189,7 +192,7 @@ class StackProcess:
         self._disconnected = not data
         return bool(data)
 
-    def _read_report(self) -> bool:
+    def _read_exit_report(self) -> bool:
         data = os.read(self._report, READ_BYTES)
         self._report_buffer += data
         *lines, rest = self._report_buffer.split(b"\n")
@@ -223,7 +226,7 @@ class StackProcess:
 
 
 def _describe_exit(report: dict[str, Any]) -> str:
-    """Describe a report of the launcher."""
+    """Describe the launcher's report that the stack could not be started or has exited."""
     if "failed" in report:
         return f"its process cannot be started: {report['failed']}"
     code = report["exit"]

@@ -33,7 +33,12 @@ MAX_ROUNDING_ERROR = 1e-9
 class _ActiveFault:
     """A fault that disturbs messages now, or that has ended but still holds delayed ones.
 
-    `changed_count` is the number of messages and commands that it has changed or withheld so far.
+    index:          index of the fault in the scenario
+    sensor:         name of the affected sensor or actuator
+    kind:           its kind: the class of a sensor's readings such as "Scan", or COMMAND, WHEELS, or BELIEF
+    effect:         what the fault does
+    changed_count:  number of messages and commands that the fault has changed or withheld so far
+    has_ended:      whether only delayed messages remain
     """
 
     index: int
@@ -66,7 +71,7 @@ class FaultInjector:
 
         `setting` returns what a fault knows of its target. Commands reach the base through `link`. `emit` receives an
         event when a fault changes its first message or command. `map_faults` are the indices in `faults` of those that
-        changed the map before the run.
+        changed the map before the run; while active, each of them counts this as one change.
         """
         self._map_faults = set(map_faults)
         self._faults, self._streams, self._setting, self._link, self._emit = faults, streams, setting, link, emit
@@ -119,9 +124,11 @@ class FaultInjector:
         return readings
 
     def command(self, tick: int, command: Twist) -> Twist:
-        """Return the command that the wheels receive, after faults of cmd_vel and then faults of the wheels.
+        """Send the stack's command to the base, and return the command that the wheels execute.
 
-        Must be called exactly once at each beat of the robot.
+        Faults of cmd_vel act on the messages in `link`. The base executes the last message that it has received, or
+        STOP after its timeout; faults of the wheels change what it executes. Must be called exactly once at each beat
+        of the robot, that is, each tick at which one of its sensors, its stack, or a truth sample is due.
         """
         is_sent = self._link.send(tick, command)
         if not self._affects_commands and not self.active:
@@ -179,7 +186,7 @@ class FaultInjector:
         return disturbed
 
     def _transmit_command(self, tick: int, command: Twist | None) -> None:
-        """Pass the new command, if any, and delayed ones through the faults; send the result, if any, to the base."""
+        """Send a message (None for no new one) through the faults of cmd_vel, which may replace it by a delayed one."""
         for active in self._in_order():
             if active.kind == COMMAND:
                 late = active.effect.arriving_command()

@@ -129,7 +129,7 @@ class CommandLink:
         self._received, self._received_at = STOP, 0
 
     def send(self, tick: int, command: Twist) -> bool:
-        """Take the stack's command at this beat; return whether the stack sends a message with it."""
+        """Take the stack's command at this beat, and return whether the stack sends a message with it now."""
         sent = tick % self._period == 0 or command != self._sent
         self._sent = command
         return sent
@@ -139,7 +139,7 @@ class CommandLink:
         self._received, self._received_at = command, tick
 
     def active_command(self, tick: int) -> Twist:
-        """Return the command that the base executes."""
+        """Return the command that the base executes: the last received one, or STOP after the timeout."""
         return self._received if tick - self._received_at <= self._timeout else STOP
 
 

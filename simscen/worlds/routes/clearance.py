@@ -37,7 +37,7 @@ HALF_DIAGONAL_CELLS = 0.7072
 
 @dataclass(frozen=True, eq=False)
 class ClearanceField:
-    """Distance to the nearest solid: approximate for each cell of a grid, exact for single points.
+    """Distance to the nearest solid: approximate for each cell of a grid, exact (see SPACING_M) for single points.
 
     grid:                   grid without yaw; only its size, resolution, and origin are used
     rough (rows, columns):  distance in m from the center of a cell to the center of the nearest cell that a solid

@@ -31,7 +31,7 @@ def server(tmp_path: Path) -> Iterator[EditorServer]:
     yield running
     running.shutdown()
     running.server_close()
-    running.close_files()
+    running.stop_runs()
 
 
 class Reply:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.particle_filter import beyond_the_map
+from simscen.advanced.localizers.particle_filter import unmapped_cells
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Beams, Plane
@@ -22,7 +22,7 @@ def trust() -> MapTrust:
     cells[20:100, 200:600] = FREE
     cells[[20, 99], 200:600] = OCCUPIED
     grid = OccupancyGrid(cells, 0.05, Pose2(-20.0, -3.0, 0.0))
-    return MapTrust(obstacle_field(grid, 2.0), beyond_the_map(grid).ravel(), 0.45, 0.8)
+    return MapTrust(obstacle_field(grid, 2.0), unmapped_cells(grid).ravel(), 0.45, 0.8)
 
 
 def beams_to(ends: Plane) -> Beams:

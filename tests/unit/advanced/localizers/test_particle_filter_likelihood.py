@@ -8,7 +8,7 @@ from simscen.advanced.localizers.particle_filter import (
     MAX_WALL_THICKNESS_M,
     UNINFORMATIVE_SHARE_OF_HIT,
     TemperedLikelihoodField,
-    beyond_the_map,
+    unmapped_cells,
 )
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
@@ -28,7 +28,7 @@ def test_the_map_ends_in_unknown_cells_next_to_free_ones(resolution: float, unkn
     bordered = np.pad(cells, 1, constant_values=UNKNOWN)
     to_known = distance_transform_edt(bordered == UNKNOWN)
     ends = (distance_transform_edt(bordered != FREE) == to_known) | (to_known * resolution > MAX_WALL_THICKNESS_M)
-    found = beyond_the_map(OccupancyGrid(cells.astype(np.int8), resolution))
+    found = unmapped_cells(OccupancyGrid(cells.astype(np.int8), resolution))
     assert np.array_equal(found, (bordered == UNKNOWN) & ends)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.particle_filter import beyond_the_map
+from simscen.advanced.localizers.particle_filter import unmapped_cells
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import Relocalizer
 from simscen.advanced.localizers.scan_matcher import Step
@@ -37,7 +37,7 @@ def found(
     `estimated` to be that far off, with standard deviations `std`.
     """
     known = map_ or grid()
-    trust = MapTrust(obstacle_field(known, 2.0), beyond_the_map(known).ravel(), 0.45, 0.8)
+    trust = MapTrust(obstacle_field(known, 2.0), unmapped_cells(known).ravel(), 0.45, 0.8)
     finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(estimated), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
         base = (
@@ -101,7 +101,7 @@ def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
 @pytest.mark.parametrize(("parted", "found_again"), [(True, True), (False, False)])
 def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: bool) -> None:
     """Scans from before the kidnapping would make the correct pose fit no better than others."""
-    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
+    trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
     finder, there, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
     step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
     for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
@@ -118,7 +118,7 @@ def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: b
 @pytest.mark.parametrize("carried_off", [True, False])
 def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(carried_off: bool) -> None:
     """Unmapped rooms look like mapped ones, so a robot that left the map needs stronger evidence."""
-    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
+    trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
     finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
     for k, driven in enumerate([0.25 * k for k in range(44)]):
         base = Pose2(2 * np.sin(driven / 2), 2 * (1 - np.cos(driven / 2)), driven / 2)  # a circle
