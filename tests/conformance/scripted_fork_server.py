@@ -20,7 +20,7 @@ from simscen.stack.localizers import sensor_models
 
 FLOOD = 200  # MiB
 perform = fork_server_main._execute
-prepared = fork_server_main._SCENARIOS.prepared
+prepared = fork_server_main._SCENARIOS.get_or_prepare
 
 
 def spin():
@@ -138,5 +138,5 @@ def slow_to_prepare(scenario):
 
 if __name__ == "__main__":
     fork_server_main._execute = misbehave
-    fork_server_main._SCENARIOS.prepared = slow_to_prepare
+    fork_server_main._SCENARIOS.get_or_prepare = slow_to_prepare
     fork_server_main.main()

@@ -9,8 +9,9 @@ import pytest
 from simscen.loading.checks.files import check_file, file_kind
 
 ROOT = Path(__file__).parents[2]
-# Those on packages of one's own are done step by step: test_own_packages.py.
-PAGES = [ROOT / "README.md", *(page for page in sorted((ROOT / "docs").rglob("*.md")) if "own-" not in page.name)]
+# Other tests read these pages: test_own_packages.py and test_extends_guide.py.
+ELSEWHERE = re.compile("own-|extends")
+PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not ELSEWHERE.match(p.name))]
 BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 

@@ -21,9 +21,9 @@ EXEMPT_RADIUS_M = 0.5
 """Half the edge length of the square around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
 """Minimum distance in cells between two samples of the costs along a line."""
-SAMPLE_SPACING_RATIO = 0.6
+SAMPLE_SPACING_RATIO = 0.4
 """Distance between two samples along a motion of a search, relative to the inscribed radius. An obstacle blocks at
-least a disc of this radius; between two samples, a line can enter the disc by at most 5 % of the radius."""
+least a disc of this radius; between two samples, a line can enter the disc by at most 2 % of the radius."""
 
 
 class TraversalCosts:
