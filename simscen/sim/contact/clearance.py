@@ -25,13 +25,12 @@ CONTACT_TOLERANCE_M = 0.002
 class _StaticNearest(NamedTuple):
     """State at a tick at which all else was farther away from the robot than the static world, by at least `margin` m.
 
-    `pose` is the pose of the robot, and `others` are the positions of the other robots.
+    `pose` is the pose of the robot. With several robots, there is no such state.
     """
 
     tick: int
     pose: Pose3
     margin: float
-    others: tuple[Vector, ...]
 
 
 class Clearance:
@@ -131,23 +130,10 @@ class Clearance:
             self.no_contact_before = tick + (0 if is_pushed else math.floor(free_s * self._tick_rate))
         self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
         self._static_nearest, self._deferrable_until = None, -1
-        if not self.may_be_enclosed and self._obstacle_distance is self._static_distance:
-            self._static_nearest = self._find_static_nearest(tick, pose)
+        if not (self.others or self.may_be_enclosed) and self._obstacle_distance is self._static_distance:
+            margin = self._actors.free_distance(self._base.id, pose[:3], self._distance + self.size, tick)
+            self._static_nearest = None if margin is None else _StaticNearest(tick, pose, margin)
         return self._distance
-
-    def _find_static_nearest(self, tick: int, pose: Pose3) -> _StaticNearest | None:
-        """Return the state at the current `tick` if the static world is nearest for sure, else None."""
-        reach, point = self._distance + self.size, pose[:3]
-        margin = self._actors.free_distance(self._base.id, point, reach, tick)
-        if margin is None:
-            return None
-        others = self._other_positions()
-        for robot, position in zip(self.others, others, strict=True):
-            margin = min(margin, math.dist(point, position) - reach - robot.size)
-        return _StaticNearest(tick, pose, margin, others)
-
-    def _other_positions(self) -> tuple[Vector, ...]:
-        return tuple([robot._state().pose.position for robot in self.others])
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
         """Return whether the clearance at the current `tick` can be computed later, by `static_clearance(pose)`.
@@ -161,10 +147,8 @@ class Clearance:
         if last is None:
             return False
         moved, closing_speed = max_displacement(last.pose, pose, self._extent), self._closing_speed(tick)
-        # The robot may have moved away from the static world and towards anything else, which may have moved, too.
+        # The robot may have moved away from the static world and towards actors, which may have moved, too.
         travel = self._actors.max_scripted_travel(tick - last.tick)
-        if last.others:
-            travel = max(travel, *map(math.dist, last.others, self._other_positions()))
         margin = last.margin - 2 * moved - travel
         if margin <= 0:
             return False

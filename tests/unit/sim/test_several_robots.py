@@ -8,7 +8,6 @@ from playground import box, shipped
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.records.trace import Truth
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.simulation import RobotPlacement, Simulation
@@ -105,27 +104,3 @@ def test_the_order_in_which_robots_are_named_changes_nothing(meet):
     robots = {"a": ("turtlebot", 0.0, 0.0, 0.0), "b": ("turtlebot", 0.9, 0.1, math.pi)}
     told = [drive(meet(**order), 720, a=FRONT, b=FRONT) for order in (robots, dict(reversed(robots.items())))]
     assert told[0] == told[1]
-
-
-def test_deferred_samples_equal_immediate_ones_while_robots_pass_and_meet(meet):
-    """Robot a passes a wall and robot b, then meets robot c. Each robot is nearest to walls for part of the time."""
-    walls = [box("near", 1.5, 0.7, 0.4, 0.3), box("far", 3.0, 2.5, 6.0, 0.2), box("low", 3.0, -1.6, 6.0, 0.2)]
-    commands = {"a": Twist(0.4, 0.0, 0.0), "b": Twist(0.3, 0.0, 0.1), "c": Twist(0.1, 0.0, 0.0)}
-    immediate, deferring = (
-        meet(walls, a=("turtlebot", 0, 0, 0), b=("turtlebot", 4, -0.9, math.pi), c=("turtlebot", 5, 0.1, math.pi))
-        for _ in range(2)
-    )
-    expected, samples = [], []
-    for _ in range(480):
-        for simulation in (immediate, deferring):
-            for name, twist in commands.items():
-                simulation.robots[name].drive(twist)
-            simulation.step(6)
-        expected += [robot.truth() for robot in immediate.robots.values()]
-        samples += [robot.sample(6) for robot in deferring.robots.values()]
-    deferred_count = sum(not isinstance(sample, Truth) for sample in samples)
-    assert 300 < deferred_count < len(samples)
-    assert [sample if isinstance(sample, Truth) else sample.truth() for sample in samples] == expected
-    contacts = [[robot.collisions() for robot in simulation.robots.values()] for simulation in (immediate, deferring)]
-    assert contacts[0] == contacts[1]
-    assert any(contacts[0])
