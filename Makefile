@@ -3,9 +3,12 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 VENV := .venv
 BIN := $(VENV)/bin
+# Interpreters that pyenv compiles without optimization come last: they run Python code about 30 % slower.
 PYTHON ?= $(shell for v in 3.11 3.10 3.12 3.13; do \
-	for p in python$$v $(HOME)/.pyenv/versions/$$v.*/bin/python $(HOME)/.local/share/uv/python/cpython-$$v.*/bin/python3; do \
-	if command -v $$p >/dev/null 2>&1 && $$p -c "import sys; sys.exit('%d.%d' % sys.version_info[:2] != '$$v')" 2>/dev/null; \
+	for p in $$(which -a python$$v 2>/dev/null | grep -v pyenv) $(HOME)/.local/share/uv/python/cpython-$$v.*/bin/python3 \
+		python$$v $(HOME)/.pyenv/versions/$$v.*/bin/python; do \
+	if command -v $$p >/dev/null 2>&1 && \
+		$$p -c "import ensurepip, sys; sys.exit('%d.%d' % sys.version_info[:2] != '$$v')" 2>/dev/null; \
 	then echo $$p; exit; fi; done; done)
 STAMP := $(VENV)/.installed
 
