@@ -30,7 +30,7 @@ from simscen.record.log_header import (
 )
 from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
-from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
+from simscen.sim.body.outline import convex_hull, footprint, outlines_in_z_range
 from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
@@ -93,7 +93,7 @@ def world_scenery(prepared: PreparedScenario) -> Scenery:
 
 
 def _movable_object(body: Body, world: World) -> MovableObject:
-    outlines = outlines_in_band(body.solids, Z_RANGE_M) or ([footprint(body.solids)] if body.solids else [])
+    outlines = outlines_in_z_range(body.solids, Z_RANGE_M) or ([footprint(body.solids)] if body.solids else [])
     rounded = tuple(tuple((round(x, DECIMALS), round(y, DECIMALS)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
     return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)

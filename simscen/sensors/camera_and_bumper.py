@@ -1,4 +1,4 @@
-"""Camera and bumper: sensors that report what the simulation computes, without noise."""
+"""Camera and bumper sensors, both without noise."""
 
 from simscen.core.messages.sensor_data import Bump, Image
 from simscen.model.robot import Bumper, Camera
@@ -13,7 +13,7 @@ class CameraSensor:
         self._mount = spec.mount.pose
 
     def read(self, tick: int) -> Image:
-        """Render and return a picture."""
+        """Return an image of the current scene."""
         spec = self._spec
         rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
         return Image(self.name, tick, rgb, depth, self._mount, spec.field_of_view)
@@ -26,5 +26,5 @@ class BumperSensor:
         self.name, self.period, self._view = setting.name, setting.period, setting.view
 
     def read(self, tick: int) -> Bump:
-        """Return whether the bumper is pressed."""
+        """Return a reading that states whether the bumper is pressed."""
         return Bump(self.name, tick, self._view.touching())

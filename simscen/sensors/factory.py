@@ -25,9 +25,9 @@ _DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
 def build_sensors(
     spec: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
 ) -> tuple[Sensor, ...]:
-    """Return the sensors of a robot sorted by name, each with its own random stream `sensor.<name>`.
+    """Return the sensors of a robot, sorted by name, with the sensors from plugins last.
 
-    Sensors from plugins come last, because the log gives the plain topic name to the first sensor of a kind. Raises
+    Each sensor has its own random stream `sensor.<name>`. `view` and `rays` are the inputs of all sensors. Raises
     ValueError if a rate does not divide the clock rate, and RunError if a plugin does not provide a valid sensor.
     """
     return tuple(
@@ -51,9 +51,9 @@ def _build_sensor(
 
 
 class PluginSensor:
-    """Wrapper of a plugin's sensor that checks each reading before the stack and the log receive it.
+    """Wrapper of a plugin's sensor that checks each reading. `kind` is the name of the sensor's type in YAML.
 
-    Raises RunError if the plugin's sensor raises an exception or is not valid.
+    Raises RunError if the plugin's sensor raises an exception or has no method `read`.
     """
 
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
@@ -65,7 +65,7 @@ class PluginSensor:
             self._fail(f"{type(self._sensor).__name__} has no method `read`")
 
     def read(self, tick: int) -> Reading:
-        """Return a reading. Raises RunError if it is invalid."""
+        """Return a reading; raises RunError if the reading is invalid."""
         reading: Reading = self._call(lambda: self._sensor.read(tick))
         if type(reading) is not self._reading_type:
             self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.reading_type}")
@@ -75,7 +75,7 @@ class PluginSensor:
             value = getattr(reading, field.name)
             if value is None and field.default is None:  # an optional field
                 continue
-            if defect := _defect(field.name, value):
+            if defect := _field_defect(field.name, value):
                 self._fail(f"returned a reading whose `{field.name}` {defect}")
         return reading
 
@@ -91,6 +91,7 @@ class PluginSensor:
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
     def _fail(self, problem: str) -> NoReturn:
+        """Raise RunError."""
         raise RunError(BROKEN_COMPONENT, f"{self._label} {problem}")
 
     @property
@@ -98,8 +99,8 @@ class PluginSensor:
         return f"sensor `{self.name}` ({self._kind}, {self._spec.component})"
 
 
-def _defect(name: str, value: object) -> str:
-    """Return what is wrong with the field `name` of a reading, for a message; "" if it is valid."""
+def _field_defect(name: str, value: object) -> str:
+    """Return the defect of a reading's field as part of a message, or "" if the field is valid."""
     match value:
         case np.ndarray() if name in _DISTANCE_ARRAYS:
             is_wrong = value.dtype.kind != "f" or (np.isfinite(value) & (value < 0)).any() or not value.size

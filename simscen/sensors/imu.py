@@ -10,9 +10,8 @@ from simscen.sensors.sensor import NormalStream, SensorSetting
 class ImuSensor:
     """Measures the angular velocity with a constant bias, and the mean specific force since the last reading.
 
-    The specific force is the acceleration minus gravity. The IMU is at the origin of the base frame, or at
-    `spec.mount`. There, rotation causes centripetal and tangential acceleration as well. Moving the robot elsewhere
-    (`kidnap`) causes no acceleration: the next reading contains only gravity.
+    The specific force is the acceleration minus gravity. The IMU is at `spec.mount`, or at the origin of the base frame
+    if there is no mount. Teleporting the robot (action `kidnap`) causes no acceleration.
     """
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
@@ -52,10 +51,7 @@ class ImuSensor:
         )
 
     def _sensor_motion(self) -> tuple[tuple[float, float, float, float], Vector, Vector]:
-        """Return the orientation of the sensor (quaternion x y z w), its linear velocity (m/s), and angular (rad/s).
-
-        All are in the world frame.
-        """
+        """Return orientation (x, y, z, w), linear velocity (m/s), and angular velocity (rad/s) in the world frame."""
         pose, (linear, angular) = self._view.base_pose(), self._view.base_velocity()
         if self._is_at_base:
             return pose.quaternion, linear, angular

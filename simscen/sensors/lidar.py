@@ -11,15 +11,15 @@ from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 MAX_NOISE_STDS = 10.0
-"""Number of standard deviations that noise is assumed never to exceed, to limit the length of rays."""
+"""Largest assumed noise in standard deviations. Rays end where even this noise gives no range below the maximum."""
 NOISE_BUFFER_SCANS = 8
-"""Number of scans whose noise is drawn at once, which is faster."""
+"""Number of scans whose noise is drawn at once, to save time."""
 
 
 class LidarSensor:
     """Lidar that measures all `spec.beams` directions at the same instant, as in Gazebo.
 
-    A full circle has no duplicate beam; a smaller field of view has beams on both of its edges.
+    If the field of view is less than 360 degrees, there is a beam on each of its edges.
     """
 
     def __init__(self, spec: Lidar, setting: SensorSetting) -> None:
@@ -40,7 +40,7 @@ class LidarSensor:
         self._noise_buffer, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
-        """Return a scan. A range of inf means no hit within range, -inf a hit below the minimum range (REP 117)."""
+        """Return a scan. A range is inf if the beam hits nothing, and -inf below the minimum range (REP 117)."""
         pose, spec = self._view.base_pose(), self._spec
         if self._tilted_mount is not None:
             ranges = self._to_ranges(self._tilted_distances(pose.compose(self._tilted_mount)))
@@ -53,12 +53,12 @@ class LidarSensor:
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 
     def _tilted_distances(self, lidar: Pose3) -> Array:
-        """Return the distances (beams,) in m to obstacles or the floor for a lidar at the pose `lidar`."""
+        """Return the true distances (beams,) in m to obstacles and the floor for a lidar at the pose `lidar`."""
         distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
         return np.minimum(distances, floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2]))
 
     def _to_ranges(self, distances: Array | Singles) -> Array:
-        """Return the ranges (beams,) to report for true distances in m: with noise, rounded, and limited."""
+        """Return the ranges (beams,) of a scan: true distances in m with noise, rounding, and limits."""
         spec = self._spec
         ranges: Array = distances + self._draw_noise() if spec.noise > 0 else distances.astype(np.float64)
         ranges /= spec.resolution
@@ -73,7 +73,7 @@ class LidarSensor:
         return ranges
 
     def _draw_noise(self) -> Array:
-        """Return the noise (beams,) of one scan in m, the same as if the noise of each scan were drawn separately."""
+        """Return the noise (beams,) of the next scan in m."""
         if self._next == len(self._noise_buffer):
             shape = NOISE_BUFFER_SCANS, self._spec.beams
             self._noise_buffer, self._next = self._rng.normal(0.0, self._spec.noise, shape), 0
@@ -82,11 +82,10 @@ class LidarSensor:
         return noise
 
 
-def floor_distances(height: float, slopes: Array) -> Array:
-    """Return the distances (n,) in m along beams from `height` m to the floor (z = 0).
+def floor_distances(height: float, beam_z: Array) -> Array:
+    """Return the distances (n,) in m along beams from `height` m to the floor (z = 0); inf for beams that miss it.
 
-    `slopes` (n,) are the z components of the unit vectors of the beams. The distance is inf if a beam does not point
-    down.
+    `beam_z` (n,) are the z components of the unit vectors of the beams.
     """
-    down = slopes < -1e-9
-    return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)
+    down = beam_z < -1e-9
+    return np.where(down, height / np.where(down, -beam_z, 1.0), np.inf)

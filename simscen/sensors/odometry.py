@@ -1,4 +1,4 @@
-"""Wheel odometry: integrates encoder increments along arcs, with errors that accumulate as a random walk."""
+"""Wheel odometry with random errors that accumulate."""
 
 import math
 from collections.abc import Callable
@@ -11,20 +11,21 @@ from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, Whee
 from simscen.sensors.sensor import NormalStream, SensorSetting
 
 EncoderIncrement = tuple[float, ...]
-"""Difference of two values of `SensorView.encoders`."""
-Kinematics = Callable[[EncoderIncrement], Twist]
-"""Function from encoder increments to the motion of the base in its own frame (m, m, rad)."""
+"""Change of each encoder between two readings; see `SensorView.encoders` for the elements."""
+Displacement = Twist
+"""Motion of the base between two readings, in the base frame: forward (m), left (m), and turn (rad)."""
+Kinematics = Callable[[EncoderIncrement], Displacement]
+"""Returns the displacement for an encoder increment."""
 Variances = tuple[float, float, float]
-"""Variances of the errors of an increment: forward and lateral (m²), and turn (rad²)."""
+"""Variances of the errors of a displacement: forward (m²), left (m²), and turn (rad²)."""
 _new = tuple.__new__  # creates a named tuple without the call overhead of its class
 
 
 class WheelOdometrySensor:
     """Dead reckoning from wheel encoders; the origin of the odom frame is the initial pose of the robot.
 
-    The errors of increments are independent, with variances proportional to distance and turn. The accumulated error
-    therefore does not depend on the rate, and its standard deviation after one meter is that of the specification.
-    Readings contain the covariances of velocity and pose. That of the pose is propagated to first order.
+    The errors of displacements are independent. Their variances are proportional to distance and turn, so that the
+    accumulated error does not depend on the rate. Readings contain the covariances of velocity and pose.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
@@ -54,15 +55,15 @@ class WheelOdometrySensor:
         twist_variance = forward / squared, lateral / squared, turn / squared
         return Odometry(self.name, tick, pose, twist, twist_variance, self._covariance)
 
-    def _variances(self, step: Twist) -> Variances:
-        """Return the variances of the errors of an increment `step` (m, m, rad): Probabilistic Robotics, table 5.6."""
+    def _variances(self, step: Displacement) -> Variances:
+        """Return the variances of the errors of a displacement (Probabilistic Robotics, table 5.6)."""
         vx, vy, wz = step
         distance = math.hypot(vx, vy)
         position = self._position_variance_per_m * distance
         heading = self._heading_variance_per_rad * abs(wz) + self._heading_variance_per_m * distance
         return position, position if vy else 0.0, heading
 
-    def _add_noise(self, step: Twist, variances: Variances) -> Twist:
+    def _add_noise(self, step: Displacement, variances: Variances) -> Displacement:
         forward_draw, lateral_draw, turn_draw = self._normals.take(3)
         (vx, vy, wz), (forward, lateral, turn) = step, variances
         return _new(Twist, (
@@ -71,7 +72,7 @@ class WheelOdometrySensor:
         ))  # fmt: skip
 
     def _grow_covariance(self, last: Pose2, pose: Pose2, variances: Variances) -> None:
-        """Propagate the covariance of the pose along an increment from `last` to `pose` with errors of `variances`."""
+        """Propagate the pose covariance to first order from `last` to `pose`, for a displacement with `variances`."""
         xx, xy, xa, _, yy, ya, _, _, aa = self._covariance
         forward, lateral, turn = variances
         dx, dy, heading = pose.x - last.x, pose.y - last.y, (pose.yaw + last.yaw) / 2
@@ -85,8 +86,8 @@ class WheelOdometrySensor:
         self._covariance = xx, xy, xa_new, xy, yy, ya_new, xa_new, ya_new, aa + turn
 
 
-def integrate_arc(step: Twist) -> Pose2:
-    """Return the pose after a motion (m, m, rad) at constant velocity from the origin: the exponential map of SE(2)."""
+def integrate_arc(step: Displacement) -> Pose2:
+    """Return the pose after driving a displacement from the origin at constant velocity (exponential map of SE(2))."""
     vx, vy, turn = step
     if abs(turn) < 1e-9:
         return _new(Pose2, (vx, vy, turn))
@@ -95,10 +96,9 @@ def integrate_arc(step: Twist) -> Pose2:
 
 
 def kinematics_of(drive: Drive) -> Kinematics:
-    """Return the forward kinematics of a drive without slip: a function from encoder increments to base motion.
+    """Return the forward kinematics of a drive without wheel slip.
 
-    Source: Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; for mecanum
-    wheels, see MecanumWheels.
+    Source: Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2.
     """
     if isinstance(drive, Omnidirectional):
         return _omnidirectional_motion
@@ -109,9 +109,9 @@ def kinematics_of(drive: Drive) -> Kinematics:
 
 
 def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
-    """Return the kinematics of driven wheels of `radius` m on two sides, `separation` m apart."""
+    """Return the kinematics of left and right wheels of `radius` m that are `separation` m apart."""
 
-    def motion(increment: EncoderIncrement) -> Twist:
+    def motion(increment: EncoderIncrement) -> Displacement:
         left, right = increment[0] * radius, increment[1] * radius
         return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
 
@@ -119,12 +119,12 @@ def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
 
 
 def _mecanum_kinematics(drive: Mecanum) -> Kinematics:
-    def motion(increment: EncoderIncrement) -> Twist:
+    def motion(increment: EncoderIncrement) -> Displacement:
         front_left, front_right, rear_left, rear_right = increment
         return drive.wheels.motion((front_left, front_right, rear_left, rear_right))
 
     return motion
 
 
-def _omnidirectional_motion(increment: EncoderIncrement) -> Twist:
+def _omnidirectional_motion(increment: EncoderIncrement) -> Displacement:
     return Twist(*increment)

@@ -1,4 +1,4 @@
-"""Interface of sensors, the arguments that they receive, and a stream of normal random numbers for their noise."""
+"""Interface of sensors, their constructor arguments, and random numbers for their noise."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,7 +14,7 @@ from simscen.model.robot import Drive
 Vector = tuple[float, float, float]
 
 BUFFER_SIZE = 384
-"""Number of random numbers that a NormalStream draws at once."""
+"""Number of random numbers that NormalStream draws at once."""
 
 
 class SensorView(Protocol):
@@ -29,20 +29,20 @@ class SensorView(Protocol):
         ...
 
     def placements(self) -> int:
-        """Return how many times `kidnap` has moved the robot elsewhere, which no sensor measures as motion."""
+        """Return how many times the robot has been teleported (action `kidnap`)."""
         ...
 
     def encoders(self) -> tuple[float, ...]:
         """Return the accumulated rotation of the wheels; the elements depend on the drive.
 
-        Wheels on two sides: mean angle in rad of the driven wheels on the left and on the right. Mecanum: angles in rad
-        of the front left, front right, rear left, and rear right wheel. Omnidirectional, whose wheels are not modeled:
-        distance in m driven forward and to the left, and angle in rad turned.
+        Differential, skid-steer, Ackermann: mean angle in rad of the left and of the right driven wheels.
+        Mecanum: angle in rad of the front left, front right, rear left, and rear right wheel.
+        Omnidirectional: distance in m driven forward, distance in m driven to the left, and turned angle in rad.
         """
         ...
 
     def touching(self) -> bool:
-        """Return whether the hull touches anything besides the ground."""
+        """Return whether the robot touches anything besides the ground."""
         ...
 
     def image(
@@ -50,23 +50,23 @@ class SensorView(Protocol):
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """Return colors (height, width, 3) and depths (height, width) in m along the optical axis, inf beyond `far` m.
 
-        `mount` is the pose of the camera in the base frame; the optical axis is the x axis of this pose. `width` and
-        `height` are in pixels. `field_of_view` is horizontal, in rad.
+        `mount` is the pose of the camera in the base frame; its x axis is the optical axis. `width` and `height` are in
+        pixels. `field_of_view` is horizontal, in rad.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """What a sensor needs besides its specification: a sensor is created as `Class(specification, setting)`.
+    """Second argument of each sensor's constructor, after the sensor's specification.
 
     name:     name of the sensor in the robot's file, which is also in its readings
     period:   time between two readings in ticks
     seconds:  time between two readings in s
-    rng:      random generator of this sensor, from the stream `sensor.<name>` of the run's seed
+    rng:      random generator of this sensor
     view:     part of the true state that sensors may use
     rays:     ray caster for distances to the surroundings
-    drive:    drive of the robot, for measurements at its wheels
+    drive:    specification of the robot's drive
     """
 
     name: str
@@ -102,10 +102,9 @@ class Sensor(Protocol):
 
 
 class NormalStream:
-    """Standard normal random numbers, the same as if they were drawn from the generator one by one.
+    """Standard normal random numbers that are drawn from a generator in batches, to save time.
 
-    They are drawn in large batches, because drawing three numbers takes as long as drawing hundreds. The generator must
-    have no other user.
+    The numbers are the same as if drawn one by one. Nothing else may use the generator.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""Physics simulation of one run: robots, static world, and movable objects. Time is counted in ticks."""
+"""Physics simulation of one run: robots, static world, and movable objects. A tick is one physics step."""
 
 import itertools
 import math
@@ -24,15 +24,15 @@ from simscen.sim.scene.terrain import Terrain
 from simscen.sim.scene.walls import Walls
 
 FIRMWARE_RATE_HZ = 60
-"""Rate at which a base's firmware updates its wheel speeds; those of Clearpath and Robotis run at 50 to 100 Hz."""
+"""Rate at which the firmware of a robot's base updates the wheel speeds."""
 REST_UPDATE_PERIOD_S = 5.0
-"""Time between two updates of the rest poses of pushable objects; see RestPoses."""
+"""Time between two updates of the poses in which pushable objects have come to rest."""
 SETTLING_TICKS = 60
-"""Ticks before tick 0 in which everything comes to rest on the ground."""
+"""Number of ticks before tick 0 in which everything comes to rest on the ground."""
 
 
 class RobotPlacement(NamedTuple):
-    """Body and initial pose of a robot, and the part of the static world that blocks it (None: all of it)."""
+    """Body and initial pose of a robot. `obstacles` is the part of the static world that blocks it (None: all)."""
 
     body: RobotBody
     pose: Pose2
@@ -40,7 +40,7 @@ class RobotPlacement(NamedTuple):
 
 
 class Simulation:
-    """Physics of one run. Create it in the process that uses it, and close it. `robots` has all robots by name."""
+    """Physics of one run. Create it in the process that uses it, and call `close` after use."""
 
     def __init__(
         self,
@@ -55,9 +55,8 @@ class Simulation:
     ) -> None:
         """Build the world with the robots at rest at their initial poses. `tick_rate` is in Hz.
 
-        `bodies` are the movable objects. The order of `robots` and `bodies` does not matter, because the engine
-        receives both sorted by name. Clearance is measured up to `clearance_range` m. `triangulate` returns the surface
-        of a shape that is not an engine primitive. Without `has_images`, cameras cannot be used.
+        `bodies` are the movable objects. `triangulate` returns the surface of a shape that PyBullet does not support.
+        Clearances are measured up to `clearance_range` m. Without `has_images`, cameras cannot be used.
         """
         client = CLIENT_POOL.take()
         engine.set_physics_parameters(client, tick_rate, solver_iterations, solve_islands_separately=len(robots) > 1)
@@ -90,7 +89,7 @@ class Simulation:
         self._scene.after_change()
 
     def _settle(self) -> None:
-        """Simulate SETTLING_TICKS, and let the objects sleep that are then at rest."""
+        """Simulate SETTLING_TICKS, and put the objects that are at rest to sleep."""
         actors = self._scene.actors
         rest_detector = actors.make_rest_detector()
         for tick in range(1 - SETTLING_TICKS, 1):
@@ -125,7 +124,7 @@ class Simulation:
         scene.activate_actors()
 
     def _step_uninterrupted(self, ticks: int) -> None:
-        """Simulate `ticks` ticks without updates of rest poses or deferred actors in between."""
+        """Simulate `ticks` ticks without the periodic updates that `step` makes."""
         scene, no_contact_before = self._scene, -1
         until, is_plain = scene.tick + ticks, not (scene.pushes or self._periodic_call or scene.floor)
         if is_plain and (no_contact_before := self._no_contact_before(ticks)) >= until:
@@ -153,6 +152,7 @@ class Simulation:
                 self._step_with_contact()
 
     def _step_without_contact(self, until: int) -> None:
+        """Simulate until the tick `until`, before which no robot can touch anything."""
         scene, tick = self._scene, self._scene.tick
         while tick < until:
             if tick % self._firmware_period == 0:
@@ -164,7 +164,7 @@ class Simulation:
         scene.tick = tick
 
     def _no_contact_before(self, ticks: int) -> int:
-        """Return the tick until which no contact is possible; -1 if one is possible in this step.
+        """Return the tick before which no contact is possible, or -1 if contact is possible in the next step.
 
         Also creates the walls that pushable objects can reach within `ticks`.
         """
@@ -177,10 +177,11 @@ class Simulation:
         return min(no_contact_before, actors.no_push_before(self._scene.tick, self._robot_speed_bound))
 
     def _robot_speed_bound(self) -> float:
+        """Return an upper bound in m/s of the speed of any point of any robot."""
         return max([robot.clearance.speed_bound() for robot in self._robots])
 
     def _step_with_contact(self) -> None:
-        """Simulate one tick with scripted actors at their poses, and record the contacts of robots."""
+        """Simulate one tick: first move the objects that follow a path, afterwards record the contacts of robots."""
         scene = self._scene
         if scene.tick < min([robot.no_contact_before for robot in self._robots]):  # only objects can touch each other
             scene.actors.begin_step(scene.tick, everything=False)
@@ -210,7 +211,7 @@ class Simulation:
                     robot.add_bodies(dict.fromkeys(new_walls))
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call `function` before each step that begins at a multiple of `period` ticks; replaces an earlier one."""
+        """Call `function` before each step that begins at a multiple of `period` ticks; replaces the last function."""
         self._periodic_call = period, function
 
     # Changing the world
@@ -232,19 +233,19 @@ class Simulation:
         self._scene.after_change()
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path from now on, without being pushed any more; raises KeyError for an unknown name."""
+        """Let a body follow a path from now on. It cannot be pushed any more. Raises KeyError for an unknown name."""
         self._scene.before_change()
         self._scene.actors.move(name, path, self.tick)
         self._scene.after_change()
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place a body somewhere else at rest and end its path; raises KeyError for an unknown name."""
+        """Place a body at rest at `pose`, and end its path; raises KeyError for an unknown name."""
         self._scene.before_change()
         self._scene.actors.place(name, pose, self.tick)
         self._scene.after_change()
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
-        """Apply an impulse (N s, world frame) to a body from the next tick on, over `seconds`, at least one tick.
+        """Apply an impulse (N s, world frame) to a body, spread over `seconds` from the next tick on.
 
         Has no effect on a body that does not exist or cannot be pushed.
         """
@@ -253,7 +254,7 @@ class Simulation:
         self._scene.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def add_steered(self, body: Body, max_speed: float) -> None:
-        """Add a round body that is moved with `follow`, such as a pedestrian, at up to `max_speed` m/s."""
+        """Add a body with a circular outline, such as a pedestrian, that `follow` moves at up to `max_speed` m/s."""
         self._scene.before_change()
         path = MotionPath((0.0,), (body.pose.plane,))
         self._scene.actors.add(replace(body, path=path), self.tick, is_steered=True)
@@ -261,21 +262,21 @@ class Simulation:
         self._scene.after_change()
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a body from `add_steered` follow a path that begins at its current pose, at up to `max_speed` m/s."""
+        """Let a body from `add_steered` follow a path at up to `max_speed` m/s; the path begins at its current pose."""
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that moves a body now and the seconds since its start, or None if no path moves it."""
+        """Return the path that a body follows and the seconds since its start, or None if it follows no path."""
         return self._scene.actors.motion(name, self.tick)
 
     def mass(self, name: str) -> float:
-        """Return the mass in kg of a pushable body, 0 for others and unknown names."""
+        """Return the mass in kg of a body, or 0 if it cannot be pushed or does not exist."""
         return self._scene.actors.mass(name)
 
     def bodies_and_poses(self) -> dict[str, tuple[Body, Pose3]]:
-        """Return all movable objects, without robots, with their poses by name in order."""
+        """Return the body and pose of each movable object, sorted by name."""
         return self._scene.actors.bodies_and_poses(self.tick)
 
     def object_pose(self, name: str) -> Pose3 | None:

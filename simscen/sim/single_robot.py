@@ -14,7 +14,7 @@ from simscen.sim.simulation import RobotPlacement, Simulation
 
 
 class SingleRobotSimulation(Simulation):
-    """A simulation with one unnamed robot. Offers some methods of `robot` as its own."""
+    """A simulation with one unnamed robot, `robot`."""
 
     def __init__(
         self,
@@ -26,12 +26,12 @@ class SingleRobotSimulation(Simulation):
         obstacles: TriangleMesh | None = None,
         **physics: Any,
     ) -> None:
-        """Build the world; `physics` are the remaining arguments of Simulation."""
+        """Build the world; `physics` are keyword arguments of Simulation."""
         super().__init__(static, bodies, {ROBOT_NAME: RobotPlacement(robot, pose, obstacles)}, triangulate, **physics)
         self.robot = self.robots[ROBOT_NAME]
 
     def drive(self, command: Twist) -> None:
-        """Command a velocity in the base frame; see `Robot.drive`."""
+        """Command a velocity in the base frame."""
         self.robot.drive(command)
 
     def truth(self) -> Truth:
@@ -47,5 +47,5 @@ class SingleRobotSimulation(Simulation):
         return self.robot.encoders()
 
     def place_robot(self, pose: Pose2) -> None:
-        """Place the robot somewhere else at rest."""
+        """Place the robot at rest at `pose`."""
         self.robot.place(pose)

@@ -13,7 +13,7 @@ from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.pedestrians.crowd import Crowd, Point
 from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, WallMap
-from simscen.sim.body.outline import footprint, outlines_in_band
+from simscen.sim.body.outline import footprint, outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.worlds.geometry.cross_section import cross_section
@@ -154,7 +154,7 @@ class PedestrianSimulation:
         if cached is None or cached[0] is not body.solids:
             cached = (
                 body.solids,
-                tuple(np.array(outline) for outline in outlines_in_band(body.solids, BODY_HEIGHT_RANGE_M)),
+                tuple(np.array(outline) for outline in outlines_in_z_range(body.solids, BODY_HEIGHT_RANGE_M)),
             )
             self._outlines[body.name] = cached
         return tuple(pose.plane.apply(outline) for outline in cached[1])

@@ -19,7 +19,7 @@ from simscen.core.records.trace import Decision, Truth
 from simscen.run.external.stack import ExternalStack
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.pedestrians import PedestrianSimulation
-from simscen.sim.body.outline import outlines_in_band
+from simscen.sim.body.outline import outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.checked_stack import CheckedStack
@@ -297,7 +297,7 @@ def body_data(body: Body) -> dict[str, Value]:
     pose = body.pose.plane
     fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [
-        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_band(body.solids, Z_RANGE_M)
+        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_z_range(body.solids, Z_RANGE_M)
     ]
     return {**fields, **_shape_data(body.solids[0].shape), "parts": outlines}
 

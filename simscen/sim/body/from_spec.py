@@ -7,14 +7,14 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import RobotSpec
 from simscen.sim.body.inertia import MassProperties, inertia_of_solids
-from simscen.sim.body.robot_body import RobotBody, assemble, check_ground_clearance, check_robot_size
+from simscen.sim.body.robot_body import RobotBody, assemble_body, check_ground_clearance, check_robot_size
 from simscen.sim.body.undercarriage import wheels_for_drive
 from simscen.sim.urdf.body import body_from_tree, read_spec_tree
 from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.xml_source import RobotFiles
 
 CENTER_OF_MASS_HEIGHT_RATIO = 0.5
-"""Height of the center of mass divided by that of the hull's centroid: batteries and motors are at the bottom."""
+"""Height of the center of mass divided by the height of the hull's centroid."""
 
 
 def build_robot_body(
@@ -22,17 +22,17 @@ def build_robot_body(
     file: Path | None = None,
     roots: Sequence[Path] = (),
     read_mesh: MeshReader | None = None,
-    found: RobotFiles | None = None,
+    located: RobotFiles | None = None,
 ) -> RobotBody:
     """Build the body of a robot from its specification. Raises InvalidInput if the URDF or the body is unusable.
 
-    `file` is the `*.robot.yaml`; `spec.urdf` is relative to its folder, unless `found` gives the path of the URDF. All
-    files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have meshes.
+    `file` is the `*.robot.yaml`. The URDF is at the path in `located`, or by default at `spec.urdf` relative to `file`.
+    All files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have meshes.
     """
     if spec.urdf is None:
         body = _body_from_shapes(spec, file)
     else:
-        body = body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
+        body = body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, located))
     check_robot_size(body, file)
     return body
 
@@ -48,4 +48,4 @@ def _body_from_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
     wheels = wheels_for_drive(spec.drive, spec.mass)
     uniform = inertia_of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
     chassis = MassProperties(uniform.mass, uniform.center * (1.0, 1.0, CENTER_OF_MASS_HEIGHT_RATIO), uniform.tensor)
-    return assemble(spec, parts, wheels, chassis)
+    return assemble_body(spec, parts, wheels, chassis)

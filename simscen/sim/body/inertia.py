@@ -19,12 +19,12 @@ class MassProperties:
     tensor: Array
 
     def transformed(self, pose: Pose3) -> "MassProperties":
-        """Return the properties in a parent frame; `pose` is the pose of the current frame in it."""
+        """Return the properties in another frame; `pose` is the pose of the current frame in the other frame."""
         turn = pose.rotation()
         return MassProperties(self.mass, pose.apply(self.center[None])[0], turn @ self.tensor @ turn.T)
 
     def principal(self) -> tuple[Vector, Pose3]:
-        """Return the principal moments in kg m², and their frame: at the center of mass, along the principal axes."""
+        """Return the principal moments of inertia in kg m², and the pose of the principal axes."""
         x, y, z = self.center.tolist()
         if np.abs(self.tensor - np.diag(np.diag(self.tensor))).max() <= 1e-9 * np.trace(self.tensor):
             a, b, c = np.diag(self.tensor).tolist()
@@ -55,7 +55,7 @@ def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
 
 
 def volume(shape: Shape) -> float:
-    """Return the volume in m³; a mesh counts as its bounding box, because it may be open."""
+    """Return the volume in m³; for a mesh, that of its bounding box."""
     match shape:
         case Box(size):
             return math.prod(size)
@@ -76,7 +76,7 @@ def volume(shape: Shape) -> float:
 
 
 def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
-    """Return the properties of a solid of uniform density in its own frame; a mesh counts as its bounding box."""
+    """Return the properties of a shape of uniform density in its own frame; for a mesh, those of its bounding box."""
     match shape:
         case Box((x, y, z)):
             return _symmetric(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
@@ -106,6 +106,7 @@ def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
 
 
 def _symmetric(mass: float, xx: float, yy: float, zz: float) -> MassProperties:
+    """Return properties with the center of mass at the origin, from moments of inertia per mass in m²."""
     return MassProperties(mass, np.zeros(3), mass * np.diag([xx, yy, zz]))
 
 
@@ -123,7 +124,7 @@ def _prism(polygon: Sequence[tuple[float, float]], height: float, mass: float) -
 
 
 def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, float, float, float, float, float]:
-    """Return area, centroid x and y, and ∫x², ∫y², ∫xy of a simple polygon (Steger, Moments of polygons, 1996)."""
+    """Return the area, centroid x, centroid y, ∫x², ∫y², and ∫xy of a simple polygon (Steger 1996)."""
     x, y = np.array(polygon).T
     u, v = np.roll(x, -1), np.roll(y, -1)
     cross = x * v - u * y
@@ -141,7 +142,7 @@ def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, flo
 
 
 def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
-    """Return (x, y, z, w) of a rotation matrix, dividing by the largest component (Shepperd 1978)."""
+    """Return the quaternion (x, y, z, w) of a rotation matrix (Shepperd 1978)."""
     diagonal_and_trace = np.array([*np.diag(rotation), np.trace(rotation)])
     k = int(np.argmax(diagonal_and_trace))
     if k == 3:
@@ -157,7 +158,7 @@ def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
 
 
 def _scaled_axis(rotation: Array) -> Vector:
-    """Return the axis of a rotation matrix, with the length 2 sin(angle)."""
+    """Return the axis of a rotation matrix, multiplied by 2 sin(angle)."""
     return (
         float(rotation[2, 1] - rotation[1, 2]),
         float(rotation[0, 2] - rotation[2, 0]),

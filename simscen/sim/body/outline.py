@@ -12,7 +12,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 MIN_POINTS_TO_FILTER = 200
-"""Number of points from which on `convex_hull` first discards points inside the polygon of the extreme points."""
+"""Number of points above which `convex_hull` first discards points that cannot be corners."""
 _CIRCLE_CORNERS = 64
 """Number of corners of the polygon that approximates a circle."""
 
@@ -28,8 +28,8 @@ def footprint(solids: Iterable[Solid]) -> Polygon:
     return convex_hull(np.concatenate([solid.pose.apply(hull_points(solid.shape))[:, :2] for solid in solids]))
 
 
-def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
-    """Return the outlines, seen from above, of the solids that extend into a range of heights (lowest, highest) in m.
+def outlines_in_z_range(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
+    """Return the outlines, seen from above, of the solids that extend into `z_range` (lowest, highest) in m.
 
     The outline of an upright extrusion can be concave; all other outlines are convex hulls.
     """
@@ -38,7 +38,7 @@ def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> l
 
 @cached_on_instance
 def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
-    """Return the outline, or () for a shape out of range; cached, because shapes such as chairs are repeated."""
+    """Return the outline of a shape at `pose`, or () if the shape is not in `z_range`. The result is cached."""
     corners = pose.apply(hull_points(shape))
     if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
         return ()
@@ -49,7 +49,7 @@ def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon
 
 
 def hull_points(shape: Shape) -> Array:
-    """Return points (n, 3) whose convex hull is that of the shape; round shapes are approximated by 64 corners."""
+    """Return points (n, 3) that span the convex hull of a shape; circles are approximated by 64 points."""
     match shape:
         case Box(size):
             return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
@@ -71,7 +71,7 @@ def hull_points(shape: Shape) -> Array:
 
 
 def radius_and_height(solids: Iterable[Solid]) -> tuple[float, float]:
-    """Return the largest distance from the z axis and the largest height above or below the origin, in meters."""
+    """Return the largest distance from the z axis in m, and the largest absolute z in m."""
     points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in solids])
     return float(np.hypot(points[:, 0], points[:, 1]).max()), float(np.abs(points[:, 2]).max())
 
@@ -85,7 +85,7 @@ def convex_hull(points: Array) -> Polygon:
 
 
 def _without_inner_points(points: Array) -> Array:
-    """Discard most points inside the polygon of the extreme points (Akl and Toussaint 1978)."""
+    """Discard most points that are not corners of the convex hull (Akl and Toussaint 1978)."""
     if len(points) < MIN_POINTS_TO_FILTER:
         return points
     angles = np.arange(32) * (math.pi / 16)
@@ -100,6 +100,7 @@ def _without_inner_points(points: Array) -> Array:
 
 
 def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return one half of the convex hull of sorted points, from the first point to the last."""
     chain: list[tuple[float, float]] = []
     for x, y in points:
         while len(chain) > 1:
@@ -112,7 +113,7 @@ def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _rings(radii: Array, heights: Array) -> Array:
-    """Return the points (n, 3) of horizontal circles around the z axis, circle by circle."""
+    """Return the points (n, 3) of horizontal circles around the z axis, given their radii and heights in m."""
     angles = np.arange(_CIRCLE_CORNERS) * (2 * math.pi / _CIRCLE_CORNERS)
     points = np.empty((len(radii), _CIRCLE_CORNERS, 3))
     points[:, :, 0], points[:, :, 1] = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
@@ -121,6 +122,7 @@ def _rings(radii: Array, heights: Array) -> Array:
 
 
 def _ball(radii: tuple[float, float, float]) -> Array:
+    """Return points (n, 3) on an ellipsoid at the origin."""
     latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE_CORNERS // 2 + 1).tolist()
     rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
     result: Array = _rings(*np.array(rings).T) * radii
@@ -128,7 +130,7 @@ def _ball(radii: tuple[float, float, float]) -> Array:
 
 
 MAX_HULL_VERTICES = 256
-"""Number of vertices above which `reduce_hull_vertices` omits vertices."""
+"""Number of vertices up to which `reduce_hull_vertices` keeps all of them."""
 HULL_TOLERANCE_M = 0.001
 """Largest distance in m of an omitted vertex from the reduced hull."""
 
@@ -136,10 +138,9 @@ _reduced_vertices: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
 
 
 def reduce_hull_vertices(mesh: Mesh) -> Array:
-    """Return the vertices (n, 3) that span the convex hull of a mesh within HULL_TOLERANCE_M, in their order.
+    """Return vertices (n, 3) of a mesh that span its convex hull within HULL_TOLERANCE_M. The result is cached.
 
-    Bullet needs time for each vertex at every step. Meshes with few vertices and planar meshes, whose hull has no
-    volume, keep all vertices. The result is cached for each mesh.
+    Returns all vertices if they are few or lie in a plane.
     """
     if len(mesh.vertices) <= MAX_HULL_VERTICES:
         return mesh.vertices
@@ -149,6 +150,7 @@ def reduce_hull_vertices(mesh: Mesh) -> Array:
 
 
 def _hull_corners(points: Array) -> Array:
+    """Return the points that span the convex hull within HULL_TOLERANCE_M; all points if they lie in a plane."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -1,7 +1,7 @@
-"""Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and what it can climb.
+"""Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and climbing limits.
 
-What a robot can climb is computed for slow driving, without a run-up. Sources: Bekker, Introduction to Terrain-Vehicle
-Systems, 1969; Wong, Theory of Ground Vehicles, chapters 2 and 4.
+The climbing limits are valid for slow driving. Sources: Bekker, Introduction to Terrain-Vehicle Systems, 1969; Wong,
+Theory of Ground Vehicles, chapters 2 and 4.
 """
 
 import math
@@ -19,7 +19,14 @@ from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, radius_and_height
-from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, caster_gap, compliant_casters, wheel_guards
+from simscen.sim.body.undercarriage import (
+    Wheel,
+    add_casters,
+    add_motors,
+    caster_gap,
+    casters_for_uneven_ground,
+    wheel_guards,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +35,7 @@ class RobotBody:
 
     hull:           solids that collide with obstacles, with the friction coefficient `hull_friction`
     casters:        spheres that collide with obstacles and slide on the ground without friction
-    wheels:         wheels, which only touch the ground
+    wheels:         wheels, which touch only the ground
     chassis:        mass properties of everything except the wheels
     footprint:      outline on the floor in m, counterclockwise
     radius:         radius in m of the footprint if it is a circle, else None
@@ -59,7 +66,7 @@ class RobotBody:
 
     @property
     def tires(self) -> tuple[Solid, ...]:
-        """Spheres with which the wheels roll on the ground."""
+        """One sphere for each wheel, with the radius and center of the wheel."""
         return tuple(Solid(Sphere(wheel.radius), Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in self.wheels)
 
     @property
@@ -68,12 +75,13 @@ class RobotBody:
         return max(math.hypot(x, y) for x, y in self.footprint)
 
 
-def assemble(
+def assemble_body(
     spec: RobotSpec, parts: tuple[Solid, ...], wheels: tuple[Wheel, ...], chassis: MassProperties
 ) -> RobotBody:
-    """Return the body of a robot whose hull consists of `parts`.
+    """Return the body of a robot from the solids of its hull, its wheels, and the mass properties of its chassis.
 
-    Adds wheel guards, motors, casters for a differential drive, and a footprint if the specification has none.
+    Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. The footprint is
+    that of the specification, or by default that of the hull.
     """
     hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
     outline = footprint(hull)
@@ -93,9 +101,9 @@ def _counterclockwise(polygon: Polygon) -> Polygon:
     return polygon if area > 0 else polygon[::-1]
 
 
-def add_payload(body: RobotBody, mass: float, at: Vector) -> RobotBody:
-    """Return the robot with a load of `mass` kg at a point in its base frame; the motors stay the same."""
-    load = MassProperties(mass, np.array(at), np.zeros((3, 3)))
+def add_payload(body: RobotBody, mass: float, position: Vector) -> RobotBody:
+    """Return the robot with a point mass of `mass` kg at a position in its base frame."""
+    load = MassProperties(mass, np.array(position), np.zeros((3, 3)))
     return replace(body, chassis=combine([body.chassis, load]))
 
 
@@ -118,7 +126,7 @@ def center_of_mass(body: RobotBody) -> Vector:
 
 
 def is_stable(body: RobotBody) -> bool:
-    """Return whether the center of mass is above the support polygon; true for all planar bases, which cannot tip."""
+    """Return whether the center of mass is above the support polygon. Always true for omnidirectional and mecanum."""
     points = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
     x, y, _ = center_of_mass(body)
     return len(points) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(points)), (x, y))
@@ -129,7 +137,7 @@ MIN_GROUND_CLEARANCE_M = 0.003
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
-    """Raise InvalidInput, which names `file`, if a part of the `body` of a wheeled robot is too low."""
+    """Raise InvalidInput with the path `file` if a part of `spec.body` is below MIN_GROUND_CLEARANCE_M."""
     on_wheels = not isinstance(spec.drive, Omnidirectional)
     if on_wheels and any(part.z < MIN_GROUND_CLEARANCE_M for part in spec.body or ()):
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
@@ -138,14 +146,11 @@ def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
 
 
 MAX_EXTENT_M = 10.0
-"""Largest distance in m of any part of a robot from its base frame. The largest vehicles in ports are 15 m long.
-
-Maps and footprints of a larger robot would exhaust memory and time.
-"""
+"""Largest allowed distance in m of any part of a robot from its base frame."""
 
 
 def check_robot_size(body: RobotBody, file: Path | None) -> None:
-    """Raise InvalidInput, which names `file`, if a robot extends farther than MAX_EXTENT_M."""
+    """Raise InvalidInput with the path `file` if a robot extends farther than MAX_EXTENT_M."""
     across, up = radius_and_height(body.collision_solids)
     wheels = max((math.hypot(wheel.x, wheel.y) + wheel.radius for wheel in body.wheels), default=0.0)
     farthest = max(across, up, wheels, body.circumscribed_radius)
@@ -156,18 +161,21 @@ def check_robot_size(body: RobotBody, file: Path | None) -> None:
 
 
 MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
-"""Steepest slope that `approach_angle` examines, and the step between two examined slopes."""
+"""Steepest slope that `approach_angle` examines, and the difference between two examined slopes."""
 
 
 class ClimbLimits(NamedTuple):
-    """Steepest slope in rad and highest step in m that a robot can climb; both are 0 for a planar base."""
+    """Steepest slope in rad and highest step in m that a robot can climb.
+
+    Both are 0 for omnidirectional and mecanum drives.
+    """
 
     slope: float
     step: float
 
 
 def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
-    """Return what a robot can climb, limited by its hull, its motors, and the friction coefficient of its wheels."""
+    """Return the climbing limits that follow from the hull, the motors, and the friction coefficient of the wheels."""
     wheels = [wheel for wheel in body.wheels if wheel.is_driven and wheel.stall_torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
@@ -179,8 +187,7 @@ def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
 def grip_angle(body: RobotBody, friction: float) -> float:
     """Return the slope θ in rad above which the wheels spin: tan θ = μ · (weight on driven wheels / total weight).
 
-    This ratio decreases with the slope, because the weight shifts backwards onto a caster behind the axle, by h tan θ
-    for a center of mass at the height h.
+    The ratio includes the weight that shifts to a caster behind the axle on a slope.
     """
     x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     ground_casters = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
@@ -205,12 +212,12 @@ def _driven_weight_ratio(body: RobotBody) -> float:
 
 
 def approach_angle(body: RobotBody) -> float:
-    """Return the slope in rad of the least steep ramp that the hull touches when the front wheels are at its foot.
+    """Return the smallest slope in rad of a ramp that the hull touches when the front wheels are at its foot.
 
-    If the hull touches none, returns the steepest examined slope.
+    Returns the steepest examined slope if the hull touches no ramp.
     """
     foremost = max(body.wheels, key=lambda wheel: wheel.x)
-    raised = [c for c in compliant_casters(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
+    raised = [c for c in casters_for_uneven_ground(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
     points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull])
     corners = [(x - foremost.x, z, 0.0) for x, _, z in points.tolist() if x > foremost.x]
     corners += [(c.pose.x - foremost.x, c.pose.z, c.shape.radius) for c in raised if isinstance(c.shape, Sphere)]

@@ -12,43 +12,33 @@ from simscen.sim.body.inertia import MassProperties, inertia_of_shape
 from simscen.sim.body.outline import footprint
 
 WHEEL_MASS_RATIO = 0.03
-"""Default mass of a wheel relative to that of the robot; the wheels of a TurtleBot3 and of a Jackal have 2 to 3 %."""
-ROTOR_INERTIA = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
-"""Rotor inertia of a wheel's motor at the output of its gear for each drive, in units of robot mass x wheel radius².
+"""Default mass of a wheel divided by the mass of the robot."""
+ROTOR_INERTIA_RATIO = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
+"""Rotor inertia of a wheel's motor at the gear output, divided by robot mass x wheel radius², for each type of drive.
 
-It grows with the square of the gear ratio and is far larger than the inertia of the wheel. It also lets ten solver
-iterations converge: without it, a robot at rest creeps. For skidding wheels, it brings the direction of friction closer
-to Coulomb's law. A larger inertia would tip the robot, because the reaction torque of an accelerating rotor turns the
-chassis.
+With a smaller inertia, a robot at rest creeps. With a larger inertia, accelerating tips the robot.
 """
-STALL_TORQUE = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
-"""Stall torque of a motor for each drive, relative to the torque at which its wheel loses grip.
-
-A differential drive stalls against a wall rather than spinning its wheels. Skid steering needs more than the friction
-torque, because it also accelerates the rotors.
-"""
-MASS_OFFSET_RATIO = 0.1
+STALL_TORQUE_RATIO = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
+"""Stall torque of a wheel's motor divided by the torque at which the wheel slips, for each type of drive."""
+MIN_MASS_OFFSET_RATIO = 0.1
 """Smallest distance of the center of mass from the axle, divided by the distance of the loaded caster from the axle.
 
-With the center of mass exactly above the axle, the robot would rock between its casters, and the load on the wheels
-would be undetermined.
+With the center of mass exactly above the axle, the robot would rock between its casters.
 """
 CASTER_GAP_M = 0.001
-"""Height of the unloaded caster above the ground in m."""
+"""Height of the unloaded caster above flat ground in m."""
 UNEVEN_CASTER_GAP_RATIO = math.tan(math.radians(8))
-"""Height of the unloaded caster above uneven ground, relative to its distance from the axle.
+"""Height of the unloaded caster above uneven ground, divided by its distance from the axle.
 
-Between two rigid casters, wheels would lose contact with the ground at the foot of a ramp. Real bases have suspended
-casters or wheels; here, the loaded caster and the wheels stand on the ground, and the other caster supports a robot
-that tips by 8°.
+The gap keeps the wheels on the ground at the foot of a ramp. The robot tips by 8° before this caster carries weight.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Wheel:
-    """A wheel on the ground that turns about y, with its center at `x` and `y` in the base frame; lengths are in m.
+    """A wheel on the ground that turns about the y axis. Its center is at `x`, `y` in the base frame. Lengths are in m.
 
-    A driven wheel has a motor with `stall_torque` in N m and `rotor_inertia` in kg m²; see ROTOR_INERTIA.
+    The motor of a driven wheel has a `stall_torque` in N m and a `rotor_inertia` at the gear output in kg m².
     """
 
     name: str
@@ -64,14 +54,14 @@ class Wheel:
 
     @property
     def is_left(self) -> bool:
-        """Whether it is on the left side."""
+        """Whether the wheel is on the left side."""
         return self.y > 0
 
 
 def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """Return the wheels of a drive without motors, rear before front and left before right.
+    """Return the wheels of a drive, without motors, rear before front and left before right.
 
-    Returns () for an omnidirectional drive. `mass` is that of the robot in kg.
+    Returns () for an omnidirectional drive. `mass` is the mass of the robot in kg.
     """
     match drive:
         case Omnidirectional():
@@ -94,20 +84,20 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
 
 
 def wheel_inertia(mass: float, radius: float, width: float) -> MassProperties:
-    """Return the mass properties of a wheel: a disc that rotates about y, with its center at the origin."""
+    """Return the mass properties of a wheel: a disc around the y axis with its center at the origin."""
     return inertia_of_shape(Cylinder(radius, width), mass).transformed(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0))
 
 
 def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """Return the wheels with motors for a robot of `mass` kg; the motors of mecanum wheels are in the planar base."""
+    """Return the wheels with motors for a robot of `mass` kg; mecanum wheels get no motors."""
     if isinstance(drive, Mecanum):
         return wheels
     grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.is_driven for wheel in wheels))
     return tuple(
         replace(
             wheel,
-            stall_torque=STALL_TORQUE[drive.type] * grip * wheel.radius,
-            rotor_inertia=ROTOR_INERTIA[drive.type] * mass * wheel.radius**2,
+            stall_torque=STALL_TORQUE_RATIO[drive.type] * grip * wheel.radius,
+            rotor_inertia=ROTOR_INERTIA_RATIO[drive.type] * mass * wheel.radius**2,
         )
         if wheel.is_driven
         else wheel
@@ -116,9 +106,9 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
 
 
 def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return a box with which a wheel collides with obstacles, or () if a part of the hull covers the wheel from above.
+    """Return a box around a wheel that collides with obstacles, or () if one of the hull's `parts` covers the wheel.
 
-    The box ends above the ground, so that it never carries weight.
+    The box does not touch the ground.
     """
     box = Solid(
         Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel"
@@ -128,6 +118,7 @@ def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
 
 
 def _contains(outer: Polygon, inner: Polygon) -> bool:
+    """Return whether a convex, counterclockwise polygon contains another polygon."""
     edges = list(zip(outer, (*outer[1:], outer[0]), strict=True))
     return all((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= -1e-6 for (ax, ay), (bx, by) in edges for x, y in inner)
 
@@ -135,29 +126,30 @@ def _contains(outer: Polygon, inner: Polygon) -> bool:
 def add_casters(
     chassis: MassProperties, outline: Polygon, wheel_radius: float
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
-    """Return a chassis and two casters: the loaded caster touches the ground, the other one ends just above it.
+    """Return the chassis and two casters, one in front of the axle and one behind it.
 
-    One caster is in front of the axle and one behind. The center of mass of the chassis is shifted towards the loaded
-    caster if it is closer to the axle than MASS_OFFSET_RATIO allows. `outline` is that of the hull, seen from above.
+    The loaded caster touches the ground; the other caster is CASTER_GAP_M above it. The center of mass is shifted
+    towards the loaded caster if MIN_MASS_OFFSET_RATIO requires it. `outline` is the outline of the hull from above.
     """
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)
     rear = 0.9 * (min(x for x, _ in outline) + radius)
     center = chassis.center.copy()
-    loaded = front if center[0] > MASS_OFFSET_RATIO * front else rear
-    if abs(center[0]) < MASS_OFFSET_RATIO * abs(loaded):
-        center[0] = MASS_OFFSET_RATIO * loaded
+    loaded = front if center[0] > MIN_MASS_OFFSET_RATIO * front else rear
+    if abs(center[0]) < MIN_MASS_OFFSET_RATIO * abs(loaded):
+        center[0] = MIN_MASS_OFFSET_RATIO * loaded
     gaps = {front: CASTER_GAP_M, rear: CASTER_GAP_M} | {loaded: 0.0}
     balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
     return MassProperties(chassis.mass, center, chassis.tensor), balls
 
 
-def compliant_casters(casters: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the casters for uneven ground, with a larger gap below the unloaded one."""
-    return tuple(_raised(caster) if caster_gap(caster) > 0 else caster for caster in casters)
+def casters_for_uneven_ground(casters: Sequence[Solid]) -> tuple[Solid, ...]:
+    """Return the casters for uneven ground: the unloaded caster is higher."""
+    return tuple(_raise_caster(caster) if caster_gap(caster) > 0 else caster for caster in casters)
 
 
-def _raised(caster: Solid) -> Solid:
+def _raise_caster(caster: Solid) -> Solid:
+    """Return a caster at the height that UNEVEN_CASTER_GAP_RATIO gives."""
     gap = UNEVEN_CASTER_GAP_RATIO * math.hypot(caster.pose.x, caster.pose.y)
     return replace(caster, pose=caster.pose._replace(z=caster.pose.z - caster_gap(caster) + gap))
 

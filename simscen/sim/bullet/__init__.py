@@ -1,4 +1,4 @@
-"""PyBullet clients, collision shapes, and rigid bodies. All modules import `pybullet` from here, without its output."""
+"""PyBullet clients, collision shapes, and bodies. Importing `pybullet` from here suppresses its start-up message."""
 
 import os
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ __all__ = ["pybullet"]
 
 @contextmanager
 def _discarded_stderr() -> Iterator[None]:
-    """Discard everything that is written to file descriptor 2, also by C code."""
+    """Discard everything that is written to stderr, also by C code."""
     try:
         saved = os.dup(2)
     except OSError:  # stderr is closed

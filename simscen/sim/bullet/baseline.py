@@ -13,9 +13,9 @@ from simscen.sim.robots.wheeled_base import WheeledBase
 
 
 class PyBulletBaseline:
-    """A robot at rest among static obstacles, stepped and scanned with PyBullet only.
+    """A robot at rest among static obstacles, simulated with PyBullet only.
 
-    The obstacles are one fused mesh, or one body for each solid.
+    The obstacles are one body if `static` is a mesh, else one body for each solid.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class PyBulletBaseline:
         self._pose = pose
 
     def _create_body(self, shape: int) -> int:
-        """Create a static body with PyBullet's defaults; those of `engine.create_static_body` are faster."""
+        """Create a static body in the way that is usual with PyBullet: as a multibody of mass 0."""
         return engine.create_rigid_body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:
@@ -45,11 +45,7 @@ class PyBulletBaseline:
             pybullet.stepSimulation(self._client)
 
     def scan(self, directions: Array, min_range: float, max_range: float, height: float) -> None:
-        """Cast rays along unit vectors (n, 2) at a height in m, from `min_range` to `max_range` m from the robot.
-
-        Rays start at `min_range`, outside the lidar's housing, as is usual. If they started inside, PyBullet would also
-        test each ray against the housing.
-        """
+        """Cast rays along unit vectors (n, 2) at a height in m, from `min_range` to `max_range` m from the robot."""
         origin = (self._pose.x, self._pose.y)
         starts, ends = np.full((2, len(directions), 3), height)
         starts[:, :2], ends[:, :2] = origin + min_range * directions, origin + max_range * directions

@@ -1,33 +1,30 @@
-"""Pool of PyBullet clients that contain only the ground plane. Reuses clients, or creates them before a process forks.
-
-Creating a client takes much longer than resetting one.
-"""
+"""Pool of PyBullet clients that contain only the ground plane. Creating a client takes longer than resetting one."""
 
 from simscen.sim.bullet import engine, pybullet
 
 MAX_FREE_CLIENTS = 2
-"""Number of clients that a run with one robot on flat ground uses."""
+"""Largest number of clients in the pool. A run with one robot on flat ground uses two."""
 
 
 class ClientPool:
-    """Lends clients and takes them back."""
+    """Pool of clients for one process."""
 
     def __init__(self) -> None:
         self._free: list[int] = []
         self._is_single_use = False
 
     def create_in_advance(self) -> None:
-        """Fill the pool in a process that forks for each run; clients that are released later are not reused."""
+        """Fill the pool in a process that forks for each run. From then on, released clients are disconnected."""
         self._is_single_use = True
         while len(self._free) < MAX_FREE_CLIENTS:
             self._free.append(_add_ground(_connect()))
 
     def take(self) -> int:
-        """Return a client that contains only the plane z = 0; the caller must set its physics parameters."""
+        """Return a client that contains only the plane z = 0, without physics parameters."""
         return self._free.pop() if self._free else _add_ground(_connect())
 
     def release(self, client: int) -> None:
-        """Take back a client that is no longer used, and reset or disconnect it."""
+        """Reset a client and put it back into the pool, or disconnect it."""
         if self._is_single_use or len(self._free) == MAX_FREE_CLIENTS:
             pybullet.disconnect(client)
         else:

@@ -3,19 +3,16 @@
 import math
 
 MAX_SUNK_DEPTH_M = 0.2
-"""Depth in m below the floor at which the center of a body has fallen through it.
-
-A landing body sinks in by millimeters, and a light body that a scripted body presses down by some centimeters.
-"""
+"""Largest valid depth in m of the center of a body below the floor."""
 MAX_COORDINATE_M = 1e5
-"""Largest valid coordinate in m; worlds extend to 10 km."""
+"""Largest valid coordinate in m."""
 
 
 def divergence_reason(body_name: str, x: float, y: float, z: float, finite_sum: float) -> str | None:
-    """Return why the state of a body is invalid, as a sentence about `body_name`, or None if it is valid.
+    """Return a sentence with the reason why the state of a body is invalid, or None if it is valid.
 
     `x`, `y`, and `z` are the position of its center in m. `finite_sum` is the sum of all other numbers of its state,
-    such as its velocity: the sum is finite only if all of them are.
+    such as velocities, and must be finite.
     """
     if (
         -MAX_SUNK_DEPTH_M <= z <= MAX_COORDINATE_M

@@ -16,32 +16,32 @@ from simscen.sim.body.outline import hull_points, reduce_hull_vertices
 from simscen.sim.bullet import pybullet
 
 MAX_FACES_PER_SHAPE = 40_000
-"""Largest number of faces of a shape: Bullet's shared-memory commands hold at most 131072 vertices."""
+"""Largest number of triangles in a collision shape; PyBullet refuses larger shapes."""
 STRIP_WIDTH_M = 20.0
-"""Width in m along x of the strips into which `split_into_tiles` sorts faces."""
+"""Width in m along x of the strips by which `split_into_tiles` sorts triangles."""
 CONTACT_BREAKING_RATIO = 0.02
-"""Fraction of a shape's extent by which a contact point may move in a step and still count as the same point."""
-REST_SPEED_SQUARED = 1e-6
-"""Squared speed in (m/s)² below which a body is at rest; Bullet's default of 0.05 would stop a ball at 0.2 m/s."""
+"""Fraction of a shape's size by which a contact point may move in a step and still count as the same point."""
+REST_SPEED_SQUARED_M2_S2 = 1e-6
+"""Squared speed in (m/s)² below which a body is at rest."""
 SLEEP_DELAY_S = 2.0
-"""Time in s at rest after which Bullet puts a body to sleep until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
+"""Time at rest after which Bullet puts a body to sleep until it is touched."""
 
 TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
-"""Collision groups: uneven ground, ground plane, hull and wheels of robots, and Bullet's own group of static bodies."""
+"""Collision groups: uneven ground, ground plane, hulls of robots, wheels of robots, and other bodies without mass."""
 NOTHING, EVERYTHING = 0, -1
-"""Masks of no and of all collision groups."""
+"""Collision masks of no group and of all groups."""
 STATIC_MASK = ~(STATIC | GROUND | TERRAIN)
-"""Mask of bodies without mass: Bullet would otherwise search for their contacts with the ground at each step."""
+"""Collision mask of bodies without mass: all groups except those that never move."""
 DEFAULT_VISUAL = -1
-"""Id of the visual shape that equals the collision shape; the renderer does not show most triangle meshes."""
+"""Id of the visual shape that equals the collision shape."""
 ORIGIN = Pose3()
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
-"""Shapes that the engine supports as primitives."""
+"""Types of shapes that PyBullet supports without triangles."""
 
 Triangulate = Callable[[Shape], Mesh]
 """Returns the closed surface of a shape."""
 Inertia = tuple[Vector, Pose3]
-"""Principal moments of inertia in kg m², and the frame of their axes at the center of mass, in the body frame."""
+"""Principal moments of inertia in kg m², and the pose of the principal axes in the body frame."""
 Faces = npt.NDArray[np.int32]
 """Vertex indices (n, 3) of triangles."""
 
@@ -49,9 +49,9 @@ Faces = npt.NDArray[np.int32]
 def set_physics_parameters(
     client: int, tick_rate: int, solver_iterations: int, solve_islands_separately: bool = False
 ) -> None:
-    """Set all physics parameters, so that no trajectory depends on a default. `tick_rate` is in Hz.
+    """Set all physics parameters of a client. `tick_rate` is in Hz.
 
-    With `solve_islands_separately`, bodies that are not in contact do not affect each other's solution.
+    With `solve_islands_separately`, bodies that are not in contact have no effect on each other.
     """
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / tick_rate,
@@ -83,20 +83,17 @@ def set_physics_parameters(
 
 
 def set_collision_filter(client: int, body: int, link: int, group: int, mask: int) -> None:
-    """Set the collision group of a link (-1 for the base), and the mask of the groups that it collides with.
-
-    Two links collide if the mask of each one contains the group of the other one.
-    """
+    """Set the collision group of a link (-1: the base), and the mask of the groups that it collides with."""
     pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
 
 
 def create_static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
-    """Create static faces as a few concave bodies, and return their ids."""
+    """Create triangles as a few static bodies, and return the ids of the bodies."""
     return [_create_concave_body(client, vertices, tile) for tile in split_into_tiles(vertices, faces)]
 
 
 def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
-    """Split faces into tiles of at most MAX_FACES_PER_SHAPE faces that are close together."""
+    """Split triangles into groups of at most MAX_FACES_PER_SHAPE that are close together."""
     if len(faces) > MAX_FACES_PER_SHAPE:
         middle = vertices[faces, :2].mean(axis=1)
         faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP_WIDTH_M)))]
@@ -104,7 +101,7 @@ def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
 
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
-    """Return the faces that do not lie on the floor."""
+    """Return the triangles that do not lie on the floor."""
     above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
     return above
 
@@ -139,7 +136,7 @@ def create_convex_shape(client: int, corners: Array) -> int:
 
 
 def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
-    """Create one rigid shape of solids that are primitives."""
+    """Create one shape from solids that are all PRIMITIVES."""
     kinds, halves, radii, lengths, positions, orientations = [], [], [], [], [], []
     for solid in solids:
         kind, half, radius, length = _primitive(solid.shape)
@@ -161,33 +158,34 @@ def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
     return _checked_shape(shape)
 
 
-def create_hull_shape(client: int, solids: Iterable[Solid]) -> int:
+def create_convex_hull_shape(client: int, solids: Iterable[Solid]) -> int:
     """Create the shape of the common convex hull of solids."""
     return create_convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
 
 
 def _corners(shape: Shape) -> Array:
+    """Return points (n, 3) that span the convex hull of a shape."""
     return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
 
 
-def create_hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
-    """Create the shapes of a robot's hull: one for all primitives, and the convex hull of each other solid."""
+def create_robot_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
+    """Create the shapes of a robot's solids: one shape for all PRIMITIVES, and one convex hull for each other solid."""
     primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
     others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
     first = [create_compound_shape(client, primitives)] if primitives else []
-    return first + [create_hull_shape(client, [solid]) for solid in others]
+    return first + [create_convex_hull_shape(client, [solid]) for solid in others]
 
 
 def create_body_shape(client: int, solids: Sequence[Solid], is_pushable: bool, triangulate: Triangulate) -> int:
     """Create the collision shape of a movable object.
 
-    If not all solids are primitives, a pushable object becomes its convex hull, because Bullet can only push convex
-    shapes. An object that cannot be pushed becomes a surface, which can be concave.
+    If not all solids are PRIMITIVES, the shape of a pushable object is its convex hull. Otherwise, the shape is the
+    exact surface, which can be concave.
     """
     if are_primitives(solids):
         return create_compound_shape(client, solids)
     return (
-        create_hull_shape(client, solids)
+        create_convex_hull_shape(client, solids)
         if is_pushable
         else create_concave_shape(client, fuse_surfaces(solids, triangulate))
     )
@@ -199,7 +197,7 @@ def is_hollow(solids: Sequence[Solid], is_pushable: bool) -> bool:
 
 
 def are_primitives(solids: Sequence[Solid]) -> bool:
-    """Return whether the engine supports all solids as primitives."""
+    """Return whether the shapes of all solids are PRIMITIVES."""
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
@@ -215,9 +213,9 @@ def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 def create_rigid_body(
     client: int, mass: float, shape: int, pose: Pose3, inertia: Inertia, friction: float, visual: int = DEFAULT_VISUAL
 ) -> int:
-    """Create a body with the collision shape `shape` and the visual shape `visual`; `mass` is in kg.
+    """Create a body that can move, with the collision shape `shape` and the visual shape `visual`.
 
-    A body with mass 0 cannot be pushed. It sleeps while it stands still, so that objects on it can sleep as well.
+    `mass` is in kg. A body with mass 0 cannot be pushed, but its pose can be set.
     """
     moments, base_from_center = inertia
     center = pose.compose(base_from_center)
@@ -241,18 +239,18 @@ def create_rigid_body(
 
 
 def wake(client: int, body_id: int) -> None:
-    """Wake a body. After SLEEP_DELAY_S at rest, it sleeps again until something with mass touches it."""
+    """Wake a sleeping body. It sleeps again after SLEEP_DELAY_S at rest."""
     awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
     pybullet.changeDynamics(
-        body_id, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+        body_id, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED_M2_S2, physicsClientId=client
     )
 
 
 def put_to_sleep(client: int, body_id: int) -> None:
-    """Put a body that is at rest to sleep after the next step, without waiting for SLEEP_DELAY_S."""
+    """Put a body to sleep after the next step, without waiting for SLEEP_DELAY_S."""
     asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
     pybullet.changeDynamics(
-        body_id, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+        body_id, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED_M2_S2, physicsClientId=client
     )
 
 
@@ -262,17 +260,16 @@ def disable_collisions(client: int, body_id: int) -> None:
 
 
 def enable_collisions(client: int, body_id: int) -> None:
-    """Let a body without mass collide again, as if it had been created now."""
+    """Let a body without mass collide again."""
     set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
 
 
 def create_static_body(
     client: int, shape: int, visual: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
 ) -> int:
-    """Create a static body. It sleeps, so that objects on it can sleep as well.
+    """Create a body that never moves. It sleeps, so that objects on it can sleep as well.
 
-    It is a rigid body instead of Bullet's default multibody, whose six velocities would be part of each contact and
-    would slow down each step.
+    It is a Bullet rigid body instead of a multibody, because this makes each step faster.
     """
     body_id: int = pybullet.createMultiBody(
         0.0, shape, visual, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
@@ -293,10 +290,7 @@ def create_ground_plane(client: int, visual: int = DEFAULT_VISUAL) -> int:
 
 
 def create_invisible_shape(client: int) -> int:
-    """Create a visual shape that is too small to be drawn, for simulations without images.
-
-    By default, Bullet creates a visual shape from each collision shape, which takes time.
-    """
+    """Create a visual shape that is too small to be drawn, which saves time in simulations without images."""
     corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
     visual: int = pybullet.createVisualShape(
         pybullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2], physicsClientId=client
@@ -305,6 +299,7 @@ def create_invisible_shape(client: int) -> int:
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
+    """Return PyBullet's type of a shape from PRIMITIVES, its half extents, radius, and length in m; 0 if unused."""
     match shape:
         case Box((x, y, z)):
             return pybullet.GEOM_BOX, (x / 2, y / 2, z / 2), 0.0, 0.0
@@ -319,6 +314,7 @@ def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
 
 
 def _checked_shape(shape: int) -> int:
+    """Return the id `shape`; raises RuntimeError if it is invalid."""
     if shape < 0:
         raise RuntimeError("PyBullet could not create a collision shape")
     return shape

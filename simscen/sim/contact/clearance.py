@@ -1,4 +1,4 @@
-"""Measures the clearance of a robot, and derives until when the robot cannot touch anything."""
+"""Clearance of a robot (distance to the nearest object), and the tick before which it cannot touch anything."""
 
 import itertools
 import math
@@ -23,9 +23,11 @@ CONTACT_TOLERANCE_M = 0.002
 
 
 class _StaticNearest(NamedTuple):
-    """State at a tick at which all else was farther away from the robot than the static world, by at least `margin` m.
+    """Measurement in which the static world was the nearest object.
 
-    `pose` is the pose of the robot. With several robots, there is no such state.
+    tick:    tick of the measurement
+    pose:    pose of the robot at this tick
+    margin:  lower bound in m of how much farther away all other objects were
     """
 
     tick: int
@@ -34,11 +36,10 @@ class _StaticNearest(NamedTuple):
 
 
 class Clearance:
-    """Distance from a robot to the static world, actors, and other robots. Call `close` after use.
+    """Distance from a robot to the static world, actors (movable objects), and other robots. Call `close` after use.
 
-    No contact is possible before the tick `no_contact_before`, because until then nothing is fast enough to close the
-    gap (conservative advancement; Mirtich, Impulse-based dynamic simulation, 1996, section 2.3). Measuring a distance
-    now and then costs less than asking the engine for contacts after every tick.
+    `no_contact_before` is a tick before which nothing is fast enough to touch the robot (conservative advancement;
+    Mirtich, Impulse-based dynamic simulation, 1996, section 2.3).
     """
 
     def __init__(
@@ -56,8 +57,8 @@ class Clearance:
     ) -> None:
         """Prepare measurements up to `max_range` m; `state` returns the current state of the robot.
 
-        `obstacles` is the part of the `static` world that blocks the robot, without the ramps that it can drive on.
-        `is_uneven` states that wheels and casters can also stand on ground other than the plane z = 0.
+        `obstacles` is the part of the `static` world that counts for the clearance: ramps that the robot can climb do
+        not count. `is_uneven` states whether the robot can stand on ground above the plane z = 0.
         """
         self._client, self._tick_rate, self._base, self._actors = client, tick_rate, base, actors
         self._state = state
@@ -69,9 +70,9 @@ class Clearance:
         self.size = SHAPE_MARGIN_M + self._extent
         """Radius in m of the robot's bounding sphere around its base frame."""
         self.contact_radius = self.size + CLEARANCE_RANGE_M
-        """Radius in m around its base frame within which actors collide, regardless of what is measured."""
+        """Radius in m around its base frame within which actors must be able to collide."""
         self.query_radius = max(self.contact_radius, self.size + max_range)
-        """Radius in m around its base frame within which actors affect the clearance or the sensors."""
+        """Radius in m around its base frame within which actors must be measurable."""
         # Wheels can also hit the solids that they roll on.
         touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
         self._static_distance = StaticDistance(static, touching, max_range)
@@ -93,23 +94,23 @@ class Clearance:
         self._measured_tick, self.no_contact_before = -1, 0
         self._static_nearest: _StaticNearest | None = None
         self._deferrable_until = -1
-        """Tick until which samples can be deferred and nothing is touched."""
+        """Tick until which `can_defer` is true."""
         self._actors.set_no_contact_before(self._base.id, -1)
         self.enclosed_by: str | None = None
-        """Name of the object that encloses the whole robot, so that it touches no surface."""
+        """Name of the object that encloses the whole robot, or None."""
         self.may_be_enclosed = True
-        """Whether the robot may be inside an object: only after it was placed, or the object appeared."""
+        """Whether the robot may be inside an object, because the robot or an object was placed."""
 
     def on_push(self, tick: int) -> None:
-        """Discard all bounds, because a push during the step from `tick` changes velocities."""
+        """Discard all predictions, because something is pushed during the step that begins at `tick`."""
         self._push_tick = tick
         self._measured_tick, self.no_contact_before, self._static_nearest, self._deferrable_until = -1, tick, None, -1
         self._actors.set_no_contact_before(self._base.id, tick)
 
     def measure(self, tick: int, period: int = NEVER) -> float:
-        """Return the clearance in m at the current `tick`, at most the maximum range.
+        """Return the clearance in m at the current `tick`, at most `max_range`; negative inside an object.
 
-        If the next call is `period` ticks later, `no_contact_before` is only updated if it is earlier than that.
+        `period` is the number of ticks until the next call. `no_contact_before` is updated only if it is before then.
         """
         if self._measured_tick == tick:
             return self._distance
@@ -136,10 +137,10 @@ class Clearance:
         return self._distance
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
-        """Return whether the clearance at the current `tick` can be computed later, by `static_clearance(pose)`.
+        """Return whether `static_clearance(pose)` can compute the clearance at the current `tick` later.
 
-        It can if the static world is nearest and no contact is possible for `period` ticks. This is decided without a
-        measurement, by how far robots and actors have moved since the last measurement and can still move.
+        True if the static world is nearest and no contact is possible for `period` ticks. Uses upper bounds of motions
+        since the last measurement, and measures nothing.
         """
         if tick + period <= self._deferrable_until:
             return True
@@ -159,10 +160,11 @@ class Clearance:
         return tick + period <= self._deferrable_until
 
     def static_clearance(self, pose: Pose3) -> float:
-        """Return the clearance at `pose` for a tick at which `can_defer` was true."""
+        """Return the distance in m from the robot at `pose` to the static world, at most `max_range`."""
         return min(self._max_range, self._obstacle_distance.distance(pose))
 
     def _search(self, tick: int, pose: Pose3, static: StaticDistance) -> float:
+        """Return the distance in m to the nearest of `static`, all actors, and all other robots."""
         nearest, point = min(self._max_range, static.distance(pose)), pose[:3]
         # The top of a tilted robot extends beyond its radius.
         ground_radius = SHAPE_MARGIN_M + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)
@@ -193,12 +195,13 @@ class Clearance:
         return x, y, z
 
     def _find_enclosing(self, tick: int) -> str | None:
+        """Return the name of an object that encloses the robot, or None."""
         point = self._center_point()
         solids = self._static_distance.enclosing_solids(point, exclude=self._buildings)
         return self._static_distance.name(solids[0]) if solids else self._actors.find_enclosing(point, tick)
 
     def _closing_speed(self, tick: int) -> float:
-        """Return an upper bound in m/s of the speed at which the robot and anything else approach each other."""
+        """Return an upper bound in m/s of the speed at which the robot and any object approach each other."""
         speed = self._actors.speed_bound(tick)
         if self.others:
             # A body that is hit by another robot leaves with up to twice its speed.
@@ -213,7 +216,7 @@ class Clearance:
         return 1.25 * (forward + turning + math.hypot(x, y) * self._height)
 
     def static_solid_at(self, point: Vector) -> str:
-        """Return the name of the static solid that is touched at a point. Cached, because contacts last many ticks."""
+        """Return the name of the static solid that the robot touches at a point. The result is cached."""
         x, y, z = point
         cell = (round(100 * x), round(100 * y), round(100 * z))
         if cell not in self._static_names:

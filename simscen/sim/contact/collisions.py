@@ -1,4 +1,4 @@
-"""Detects the collisions of a robot: creates one event when a collision starts, and one when it ends."""
+"""Detects the collisions of a robot, and creates an event at the start and the end of each collision."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -10,25 +10,27 @@ from simscen.core.records.events import Event, EventKind
 from simscen.sim.bullet import pybullet
 
 END_DELAY_S = 0.1
-"""Time without contact after which a collision has ended, so that a bouncing robot collides once."""
+"""Time without contact after which a collision has ended."""
 MIN_CAUSING_SPEED_M_S = 0.02
-"""Speed towards the touched object below which the robot did not cause the contact.
+"""Smallest speed of a robot that has caused a collision.
 
-In contact with the static world, motion in any direction counts, because a robot may graze a wall.
+Towards a movable object, only motion along the contact normal counts.
 """
 NO_BODY = -1
-"""Body id that no body has."""
+"""Invalid body id."""
 
 IsGroundContact = Callable[[int, int, float], bool]
-"""Takes the id of the other body, the link of the robot, and the z of the unit normal towards the robot."""
+"""Returns whether a contact is with the ground, from the other body's id, the robot's link, and the normal's z."""
 
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """Contact of a robot with one object: `point` and unit `normal` towards the robot are in the world frame.
+    """Contact of a robot with one object during one tick.
 
-    `name` and `other_id` are the name and body id of the object, and `is_static` states whether it never moves.
-    `impulse` is in N s, during one tick.
+    name, other_id:  name and body id of the object
+    point, normal:   point and unit normal towards the robot in the world frame
+    impulse:         contact impulse in N s
+    is_static:       whether the object never moves
     """
 
     name: str
@@ -48,9 +50,9 @@ class BaseMotion(NamedTuple):
 
 
 class PreStepMotion(NamedTuple):
-    """Motions before a step, which give the speed of a collision that starts during the step.
+    """Motions before a step, to compute the speed of a collision that starts during the step.
 
-    robot:   motion of the robot that touches something
+    robot:   motion of the robot whose collisions are tracked
     actors:  velocities in m/s of all movable objects that can collide, by body id
     robots:  motions of all robots, by body id
     """
@@ -61,35 +63,35 @@ class PreStepMotion(NamedTuple):
 
 
 @dataclass
-class _Ongoing:
+class _OngoingCollision:
     first_tick: int
     last_tick: int
     impulse: float
 
 
 class CollisionTracker:
-    """Combines contacts of single ticks into collisions with a beginning and an end."""
+    """Combines the contacts of consecutive ticks into collisions with a start and an end."""
 
     def __init__(self, tick_rate: int) -> None:
         self._end_delay = round(END_DELAY_S * tick_rate)
-        self._ongoing: dict[str, _Ongoing] = {}
+        self._ongoing: dict[str, _OngoingCollision] = {}
         self._events: list[Event] = []
 
     def has_contact_at(self, tick: int) -> bool:
-        """Return whether the robot touched anything at `tick`, which must not be before the last update."""
+        """Return whether the robot touched anything at `tick`, the tick of the last update or a later one."""
         return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property
     def is_colliding(self) -> bool:
-        """Whether there is a collision that has not ended."""
+        """Whether any collision has started and not ended."""
         return bool(self._ongoing)
 
     def update(self, tick: int, contact_points: list[ContactPoint], before: PreStepMotion) -> None:
-        """Add the contacts at `tick`, with the motions before the step that ended at `tick`."""
+        """Process the contacts at `tick`; `before` are the motions before the step that ended at `tick`."""
         for contact in contact_points:
             collision = self._ongoing.get(contact.name)
             if collision is None:
-                self._ongoing[contact.name] = _Ongoing(tick, tick, contact.impulse)
+                self._ongoing[contact.name] = _OngoingCollision(tick, tick, contact.impulse)
                 self._events.append(_started_event(tick, contact, before))
             else:
                 collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
@@ -121,10 +123,10 @@ def contact_points(
     tick_seconds: float,
     is_ground_contact: IsGroundContact,
 ) -> list[ContactPoint]:
-    """Return the current contacts of a robot, one for each touched object, sorted by name.
+    """Return the current contacts of a robot, one for each touched object, sorted by name; without the ground.
 
-    `names` maps body ids to names; contacts with other bodies are ignored. If a name is None, the body is static, and
-    `static_solid_at` returns the name of the solid at a point. Contacts with the ground are ignored.
+    `names` maps the ids of all bodies that count to names. The name of a static body is None; then `static_solid_at`
+    returns the name of the solid at a point. `tick_seconds` is the duration of a tick.
     """
     found: dict[str, ContactPoint] = {}
     for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
@@ -139,14 +141,12 @@ def contact_points(
 
 
 def enclosed_contact(name: str, point: Vector) -> ContactPoint:
-    """Return the contact of a robot that is completely inside an object.
-
-    The normal points up, so that the speed of the collision is 0 for a robot on a level floor.
-    """
+    """Return the contact of a robot that is completely inside an object. The normal points up."""
     return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 
 def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> Event:
+    """Return the event for the start of a collision."""
     robot_velocity = _velocity_at(before.robot, contact.point)
     if contact.other_id in before.robots:
         other_velocity = _velocity_at(before.robots[contact.other_id], contact.point)
@@ -171,7 +171,7 @@ def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> E
 
 
 def _velocity_at(motion: BaseMotion, point: Vector) -> Vector:
-    """Return the velocity of a robot at a point."""
+    """Return the velocity in m/s of the point of a robot that is at `point`."""
     (vx, vy, vz), (wx, wy, wz) = motion.linear, motion.angular
     x, y, z = (point[i] - motion.origin[i] for i in range(3))
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

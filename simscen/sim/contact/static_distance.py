@@ -1,8 +1,6 @@
 """Measures the distance from a robot to the static world, and tests whether a closed surface encloses a point.
 
-Distances are measured part by part (see MeshParts) in a separate engine client that has no bodies and is never stepped.
-The shapes of a part are created when the robot first comes near. Querying the mesh of the whole world would cost time
-for each triangle within range.
+The static mesh is split into parts. A separate PyBullet client measures the distance to each part near the robot.
 """
 
 import itertools
@@ -23,25 +21,26 @@ from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene.mesh_parts import parts_of
 
 RELIST_DISTANCE_M = 4.0
-"""Distance that the robot can move before the list of parts near it is updated."""
+"""Distance that the robot moves between two updates of the list of parts near it."""
 SEARCH_SLACK_M = 0.15
-"""Distance beyond the nearest part within which other parts are measured too, so that their next measurement is later.
-"""
+"""Distance beyond the nearest part up to which other parts are measured."""
 BULLET_MARGIN_M = 0.001
-"""Collision margin of meshes without a body, which Bullet subtracts from distances."""
+"""Collision margin of mesh shapes, which Bullet subtracts from distances."""
 EXTENT_MARGIN_M = 0.002
 """Distance that a robot may extend beyond the vertices of its shapes."""
 NEAREST_SLACK_M = 0.005
-"""Additional distance within which the part that was nearest is searched again."""
+"""Additional search distance for the part that was nearest at the last measurement."""
 SOLID_TOLERANCE_M = 0.05
 """Largest distance from a contact point to the bounding box of the touched part."""
 LINE_TILT = 0.0123, 0.0271
-"""Slopes dx/dz and dy/dz of the line that tests for enclosure. A vertical line could hit the vertical edges of maps."""
+"""Slopes dx/dz and dy/dz of the line that `encloses_along_line` follows. It avoids vertical edges, as in maps."""
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]
-"""Lower bound in m of the distance to a part, plus the robot's travel at that time; index of the part; its bounding
-rectangle (left, low, right, high) in m."""
+"""Bound, index, and bounding rectangle (left, low, right, high) in m of a part of the static mesh.
+
+The bound minus the robot's current travel is a lower bound in m of the distance to the part.
+"""
 
 
 class StaticDistance:
@@ -52,11 +51,11 @@ class StaticDistance:
         self._mesh, self._max_range = static, max_range
         radius, self._height = outline.radius_and_height(robot.collision_solids)
         self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
-        self._hull = engine.create_hull_shapes(self._client, robot.collision_solids)
+        self._hull = engine.create_robot_shapes(self._client, robot.collision_solids)
         self._parts = parts_of(static)
         self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
         self._others: list[PartBound] = []
-        """Heap of the parts near the robot except for the nearest one."""
+        """Heap of the parts near the robot, without the nearest part."""
         self._travel = 0.0
         """Upper bound of the distance that any point of the robot has moved since the start."""
         self._nearest: PartBound | None = None
@@ -67,9 +66,9 @@ class StaticDistance:
         self._rectangles = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def distance(self, pose: Pose3) -> float:
-        """Return the distance in m from the robot, with its base at `pose`, to the nearest solid; inf out of range.
+        """Return the distance in m from the robot with its base frame at `pose` to the nearest solid; inf out of range.
 
-        A distance changes at most by the robot's motion. Only parts that may now be the nearest are measured again.
+        Only parts that may have become the nearest are measured again.
         """
         moved = max_displacement(self._pose, pose, self._extent)
         self._travel += moved
@@ -88,7 +87,7 @@ class StaticDistance:
         return nearest
 
     def _search_others(self, nearest: float) -> float:
-        """Measure the other parts that may be nearer, unless their bounding rectangle is too far away."""
+        """Measure all parts that may be nearer than `nearest` m; return the new smallest distance in m."""
         others, travel, (x, y) = self._others, self._travel, self._pose[:2]
         # The top of a tilted robot extends beyond its radius.
         radius = self._radius + 2 * self._height * math.hypot(*self._pose[3:5])
@@ -128,7 +127,7 @@ class StaticDistance:
         return nearest if nearest <= max_distance else math.inf
 
     def _list_parts(self, pose: Pose3) -> None:
-        """List the parts that may come within range before the next update of the list."""
+        """Update the list of the parts that may come within range before the next update."""
         x, y = self._list_center = (pose.x, pose.y)
         left, low, right, high = self._rectangles
         outside = np.maximum(np.maximum(left - x, x - right), np.maximum(low - y, y - high))
@@ -144,6 +143,7 @@ class StaticDistance:
         )
 
     def _build_shapes(self, part: int) -> list[int]:
+        """Create the collision shapes of a part, and return their ids."""
         vertices, hulls = self._mesh.vertices, self._mesh.hulls
         if hulls and (own := hulls[self._parts.solids[part]]):
             return [engine.create_convex_shape(self._client, vertices[own])]
@@ -158,7 +158,7 @@ class StaticDistance:
         return [k for k in self._parts.solids_around(point) if k not in exclude and self._encloses(k, point)]
 
     def _encloses(self, solid: int, point: Vector) -> bool:
-        """Return whether a solid encloses a point. If it has tiles, those on a line usually suffice for the test."""
+        """Return whether a solid encloses a point."""
         parts, vertices = self._parts, self._mesh.vertices
         tiles = parts.of_solid(solid)
         if len(tiles) > 1:
@@ -184,7 +184,7 @@ class StaticDistance:
         return self._mesh.names[solid]
 
     def nearest_solid_name(self, point: Vector) -> str:
-        """Return the name of the solid whose surface is nearest to a contact point; "" if no bounding box is near."""
+        """Return the name of the solid whose surface is nearest to a contact point, or "" if no solid is near."""
         position = np.array(point)
         outside = np.maximum(np.maximum(self._parts.low - position, position - self._parts.high), 0.0)
         near = np.flatnonzero((outside < SOLID_TOLERANCE_M).all(axis=1))
@@ -200,10 +200,7 @@ class StaticDistance:
 
 
 def max_displacement(before: Pose3, after: Pose3, extent: float) -> float:
-    """Return an upper bound in m of the motion of any point within `extent` m of the base frame's origin.
-
-    A rotation by an angle a moves such a point by 2 sin(a / 2) extent, and changes the quaternion by 2 sin(a / 4).
-    """
+    """Return an upper bound in m of the motion of any point within `extent` m of the base frame's origin."""
     return math.dist(before[:3], after[:3]) + 2 * extent * math.dist(before[3:], after[3:])
 
 
@@ -234,8 +231,8 @@ def _distances_to_segments(point: Array, start: Array, end: Array) -> Array:
 def encloses(corners: Array, point: Vector) -> bool:
     """Return whether a surface of triangles (n, 3, 3), counterclockwise from outside, encloses a point.
 
-    The criterion is a winding number above one half, which allows for small holes. The winding number is the sum of the
-    solid angles of all triangles divided by 4 pi (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
+    True if the winding number exceeds one half, so that small holes have no effect. The winding number is the sum of
+    the solid angles of all triangles divided by 4 pi (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
     """
     ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(point, 3)[:, None]
     la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
@@ -246,10 +243,10 @@ def encloses(corners: Array, point: Vector) -> bool:
 
 
 def encloses_along_line(corners: Array, point: Vector) -> bool | None:
-    """Return the result of `encloses`; `corners` (n, 3, 3) only needs the triangles that a tilted line may cross.
+    """Return whether a surface encloses a point, from its crossings with the line through the point with LINE_TILT.
 
-    The line passes through the point with LINE_TILT. The winding number is how many more times a ray along it leaves
-    the surface than enters it. Returns None if both directions disagree because of a hole, or if the line hits an edge.
+    `corners` (n, 3, 3) must contain all triangles that the line may cross. Returns None if the result is undecided,
+    because the surface has a hole or the line hits an edge.
     """
     x, y, z = np.moveaxis(corners - point, 2, 0)
     x, y = x - LINE_TILT[0] * z, y - LINE_TILT[1] * z

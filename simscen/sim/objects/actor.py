@@ -1,7 +1,7 @@
 """State of one movable object (actor), its creation in the engine, and precomputed poses of scripted actors.
 
-A scripted actor follows a path and has no mass in the engine. A pushable actor has a mass and no path. Others stand
-still.
+A scripted actor follows a path and has no mass in the engine. A pushable actor has a mass and no path. All other actors
+stand still.
 """
 
 import math
@@ -29,15 +29,15 @@ from simscen.sim.body.outline import radius_and_height
 from simscen.sim.bullet import engine, pybullet
 
 FRICTION = 0.6
-"""Friction of movable objects on the ground: about that of wood or cardboard on concrete."""
+"""Friction coefficient of movable objects on the ground, about that of wood on concrete."""
 SPEED_HORIZON_S = 0.1
-"""Time for which all upper bounds of speeds hold, also for objects that fall or are hit."""
+"""Time in the future for which upper bounds of speeds are valid."""
 FALL_SPEED_M_S = SPEED_HORIZON_S * GRAVITY_M_S2
 """Speed that a resting object can gain by falling for SPEED_HORIZON_S."""
 SHAPE_MARGIN_M = 0.05
-"""Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
+"""Distance that collision shapes may extend beyond their vertices."""
 PRECOMPUTED_S = 4
-"""Simulated seconds for which scripted poses are computed in one batch."""
+"""Simulated time for which the poses of scripted actors are computed in one batch."""
 
 CenterPose = tuple[Vector, tuple[float, float, float, float]]
 """Position and quaternion of a center of mass, as returned by PyBullet."""
@@ -45,13 +45,13 @@ CenterPose = tuple[Vector, tuple[float, float, float, float]]
 
 @dataclass
 class Actor:
-    """A movable body and the `path` that it has followed since `path_start_tick`, if any.
+    """A movable body, and the `path` that the body has followed since `path_start_tick` (None: no path).
 
-    segments:  line segments that contain every position of its origin
+    segments:  line segments that contain every position of its origin on the path
     max_speed: upper bound in m/s of the speed of any of its points on the path
     size:      radius in m of its bounding sphere around the origin
     radius:    radius in m of its bounding cylinder around the vertical axis
-    surface:   its surface in the body frame if it is hollow in the engine (see `engine.is_hollow`), else None
+    surface:   its surface in the body frame if its collision shape is a surface without an inside, else None
     """
 
     body: Body
@@ -67,15 +67,15 @@ class Actor:
     body_id: int | None = None
     """Body id in the engine; None if it is not in the engine."""
     collides: bool = False
-    """Whether it is in the engine and can collide. Otherwise, it can at most be measured and rendered."""
+    """Whether it is in the engine and can collide."""
     engine_pose: Pose3 | None = None
     """Pose at which it was last placed in the engine."""
     center_from_base: Pose3 = Pose3()
-    """Body frame in the frame of its principal axes of inertia."""
+    """Pose of the body frame in the frame of the principal axes of inertia."""
     center_and_pose: tuple[CenterPose, Pose3] | None = None
-    """The last center of mass that the engine returned, and the resulting pose."""
+    """Pose of its center of mass at the last query of the engine, and the resulting pose of its body frame."""
     is_resting: bool = False
-    """Whether it has not moved between the last two queries."""
+    """Whether the engine returned the same pose at the last two queries."""
     _sampler: PathSampler | None = None
     _path_poses: dict[int, Pose3] = field(default_factory=dict)
     """Cache of recent path poses by tick."""
@@ -89,11 +89,11 @@ class Actor:
 
     @property
     def is_pushable(self) -> bool:
-        """Whether the engine moves it, rather than a path."""
+        """Whether it can be pushed: it has a mass and no path."""
         return self.body.mass > 0 and self.path is None
 
     def is_parked(self, elapsed: float, horizon: float) -> bool:
-        """Return whether it stands still on its path from `elapsed` seconds after the start for `horizon` seconds."""
+        """Return whether it stands still from `elapsed` seconds after the start of its path for `horizon` seconds."""
         if self.path is None or self.is_steered:
             return False
         return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start
@@ -116,7 +116,7 @@ class Actor:
         return pose
 
     def path_velocity(self, tick: int, tick_rate: int) -> tuple[Vector, float]:
-        """Return the velocity in m/s and turn rate in rad/s that lead to its pose at the next tick; 0 for a jump."""
+        """Return the velocity in m/s and turn rate in rad/s on its path until the next tick; 0 if the path jumps."""
         pose, following = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
         vx, vy = (following.x - pose.x) * tick_rate, (following.y - pose.y) * tick_rate
         if math.hypot(vx, vy) > MAX_STEP_M * tick_rate:  # a jump of the path is a teleportation, not a motion
@@ -124,17 +124,17 @@ class Actor:
         return (vx, vy, 0.0), wrap(following.yaw - pose.yaw) * tick_rate
 
     def ground_radius(self, pose: Pose3) -> float:
-        """Return the radius in m of its bounding disc on the ground around its origin, also if it is tilted."""
+        """Return the radius in m of a disc on the ground, around its origin, that contains its top view at `pose`."""
         height = math.sqrt(self.size**2 - self.radius**2)
         return min(self.size, self.radius + 2 * height * math.hypot(pose.qx, pose.qy))
 
     def distance_to(self, point: Vector, pose: Pose3) -> float:
-        """Return the distance in m from a point to its origin, at `pose` or at its engine pose if that is nearer."""
+        """Return the distance in m from a point to its origin, at `pose` or at `engine_pose`, whichever is nearer."""
         distance = math.dist(pose[:3], point)
         return distance if self.engine_pose is None else min(distance, math.dist(self.engine_pose[:3], point))
 
     def set_engine_pose(self, client: int, pose: Pose3) -> None:
-        """Place it in the engine, unless it is not in the engine or already there."""
+        """Set its pose in the engine, if it is in the engine."""
         if self.body_id is not None and pose != self.engine_pose:
             self.engine_pose = pose
             pybullet.resetBasePositionAndOrientation(self.id, pose[:3], pose[3:], client)
@@ -156,7 +156,7 @@ class Actor:
 
 
 class ActorBuilder:
-    """Creates actors, and their bodies in the engine with or without collisions."""
+    """Creates actors, and their bodies in the engine."""
 
     def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate, visual_shape: int) -> None:
         """Take the id of the engine's client, and the id of the visual shape of all actors."""
@@ -164,7 +164,7 @@ class ActorBuilder:
         self._triangulate, self._visual_shape = triangulate, visual_shape
 
     def make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
-        """Return an actor for a body without creating it in the engine. Raises RunError for a path that is too fast."""
+        """Return an actor that is not in the engine yet. Raises RunError if its path is too fast."""
         radius, height = radius_and_height(body.solids)
         if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
             raise RunError("invalid", too_fast_message(body.name, step))
@@ -177,7 +177,7 @@ class ActorBuilder:
         return Actor(body, body.path, tick, segments, speed, size, radius, surface, is_steered)
 
     def enable_collisions(self, actor: Actor, tick: int) -> None:
-        """Let an actor collide, and create it if necessary. Bullet solves contacts in the order of these calls."""
+        """Let an actor collide; creates it in the engine if necessary."""
         if actor.collides:
             return
         if actor.body_id is None:
@@ -189,7 +189,7 @@ class ActorBuilder:
         actor.collides = True
 
     def add_without_collisions(self, actor: Actor, tick: int) -> None:
-        """Create an actor without collisions unless it exists, so that it can be measured and rendered."""
+        """Create an actor in the engine that can be measured and rendered but not collide, unless it exists."""
         if actor.body_id is None:
             self._create(actor, tick)
             engine.disable_collisions(self._client, actor.id)
@@ -223,7 +223,7 @@ class ScheduledPoses:
         self._sampler: BatchPathSampler | None = None
 
     def at(self, tick: int) -> PosesAtTick | None:
-        """Return the poses of all actors at a tick, or None if they have not been computed."""
+        """Return the poses of all actors at a tick, or None if these poses have not been computed."""
         return None if self._predicted is None else self._predicted.at(tick)
 
     def invalidate(self) -> None:
@@ -233,7 +233,7 @@ class ScheduledPoses:
     def compute(self, tick: int, period: int, poses: Mapping[str, Pose3]) -> None:
         """Compute the poses for every `period` ticks from `tick` on, unless they are known or an actor is steered.
 
-        `poses` are the current poses of all actors, so that `at` can return them together with the scripted poses.
+        `poses` are the current poses of all actors.
         """
         is_known = self._predicted is not None and tick in self._predicted.ticks
         if is_known or any(actor.is_steered for actor in self._scripted):

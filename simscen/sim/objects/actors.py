@@ -1,4 +1,8 @@
-"""All movable objects (actors) of a simulation; see `actor` for scripted and pushable ones."""
+"""All movable objects (actors) of a simulation.
+
+A scripted actor follows a path. A pushable actor has a mass and no path. A deferred actor cannot collide yet, because
+no robot has come near. A steered actor is a scripted actor whose path can change at any time, such as a pedestrian.
+"""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -20,13 +24,10 @@ NEVER = 2**62
 
 
 class Actors:
-    """All movable objects, sorted by name, so that their order in the engine is reproducible.
+    """All movable objects, sorted by name.
 
-    Scripted actors are moved in the engine only if contact is possible: `begin_step` and `end_step` give them their
-    pose and velocity, so that they push others with the correct speed. Pushable actors sleep until something comes
-    near (see BroadPhase). Without pushable actors, all actors collide only after a robot has come near (see
-    DeferredActors). Bullet solves contacts in the order in which bodies begin to collide. Therefore, actors that are
-    only measured or rendered are in the engine without collisions, so that no observation changes a run.
+    Scripted actors are moved in the engine only if contact is possible. Pushable actors sleep in the engine until an
+    object comes near. Actors are deferred only if no actor is pushable.
     """
 
     def __init__(
@@ -37,7 +38,7 @@ class Actors:
         visual_shape: int = engine.DEFAULT_VISUAL,
         is_rendered: bool = True,
     ) -> None:
-        """Begin without actors. If `is_rendered`, all actors are in the engine from the start, with `visual_shape`."""
+        """Begin without actors. If `is_rendered`, actors are in the engine with `visual_shape` even while deferred."""
         self._client, self._tick_rate = client, tick_rate
         self._builder = ActorBuilder(client, tick_rate, triangulate, visual_shape)
         self._is_rendered = is_rendered
@@ -52,7 +53,7 @@ class Actors:
         self._poses: Mapping[str, Pose3] = {}
         self._poses_tick: int | None = None
         self._resting_since: int | None = None
-        """Tick since when no pushable actor has moved."""
+        """Tick of the last motion of any pushable actor."""
         self._ticks_until_asleep = math.ceil(2 * engine.SLEEP_DELAY_S * tick_rate)
         self._no_contact_before: dict[int, int] = {}
         """For each robot's body id, the tick until which it cannot touch any actor."""
@@ -67,7 +68,7 @@ class Actors:
     # Adding, removing, and changing actors
 
     def add(self, body: Body, tick: int, is_steered: bool = False) -> None:
-        """Add a body, which replaces one of the same name; with `is_steered`, `follow` can change its path."""
+        """Add a body; replaces a body of the same name. If `is_steered`, `follow` can change its path."""
         self.remove(body.name)
         self._actors[body.name] = self._builder.make_actor(body, tick, is_steered)
         self._update_engine(tick)
@@ -78,7 +79,7 @@ class Actors:
         self._update_engine(tick)
 
     def _update_engine(self, tick: int) -> None:
-        """Let all actors collide that cannot be deferred; add the others without collisions if they are rendered."""
+        """Create actors in the engine after a change: those that cannot be deferred, and all if they are rendered."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
         none_deferred = any(actor.is_pushable for actor in actors)
@@ -91,13 +92,13 @@ class Actors:
 
     @property
     def is_engine_complete(self) -> bool:
-        """Whether all actors can collide, so that none is deferred."""
+        """Whether no actor is deferred."""
         return not self._deferred_count
 
     def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
-        """Let the deferred actors collide that any robot could reach, and add those that it could measure.
+        """Let the deferred actors near robots collide, and create the actors that robots can measure.
 
-        Returns the names of both by body id.
+        Returns the names of these actors by body id.
         """
         if self._deferred is None:
             self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.collides])
@@ -125,14 +126,14 @@ class Actors:
         self.add(replace(actor.body, pose=self.poses(tick)[name], mass=0.0, path=path), tick)
 
     def place(self, name: str, pose: Pose2, tick: int) -> None:
-        """Place a body somewhere else, upright and at rest, and end its path."""
+        """Place a body upright and at rest at `pose`, and end its path."""
         body = self._actors[name].body
         self.add(replace(body, pose=Pose3.planar(pose, body.pose.z), path=None), tick)
 
     def follow(self, name: str, path: MotionPath, max_speed: float, tick: int) -> None:
-        """Replace the path of an upright, round, steered body from `tick` on.
+        """Replace the path of a steered actor with a circular outline from `tick` on.
 
-        The path must begin at its current pose and not exceed `max_speed` m/s, so that clearances remain valid.
+        The path must begin at the current pose of the actor and must not exceed `max_speed` m/s.
         """
         actor = self._actors[name]
         actor.follow(path, max_speed, tick)
@@ -140,6 +141,7 @@ class Actors:
         self._scripted_speed = max(self._scripted_speed, max_speed)
 
     def _update_lists(self) -> None:
+        """Update the lists of actors, discard cached results, and wake all pushable actors."""
         self._poses_tick = self._resting_since = None
         actors = self._actors.values()
         self._deferred, self._deferred_count = None, sum(not actor.collides for actor in actors)
@@ -155,7 +157,7 @@ class Actors:
             engine.wake(self._client, actor.id)  # it may have stood on a removed object
 
     def motion(self, name: str, tick: int) -> tuple[MotionPath, float] | None:
-        """Return the path that moves a body now and the seconds since its start, or None if no path moves it."""
+        """Return the path that a body follows and the seconds since its start, or None if it follows no path."""
         actor = self._actors.get(name)
         if actor is None or actor.path is None:
             return None
@@ -170,17 +172,17 @@ class Actors:
         return bool(self._pushable)
 
     def mass(self, name: str) -> float:
-        """Return the mass in kg of a pushable body, 0 for others and unknown names."""
+        """Return the mass in kg of a body, or 0 if it cannot be pushed or does not exist."""
         actor = self._actors.get(name)
         return actor.body.mass if actor is not None and actor.is_pushable else 0.0
 
     def wake(self, name: str) -> None:
-        """Wake a body, so that it can be pushed one tick later: Bullet discards forces on sleeping bodies."""
+        """Wake a body. It can be pushed one tick later, because Bullet discards forces on sleeping bodies."""
         if self.mass(name):
             engine.wake(self._client, self._actors[name].id)
 
     def push(self, name: str, impulse: tuple[float, float]) -> None:
-        """Apply an impulse (N s) at the center of mass during the next tick; ignored if it cannot be pushed."""
+        """Apply an impulse (x, y in N s, world frame) to a body during the next tick, if the body can be pushed."""
         if not self.mass(name):
             return
         body_id = self._actors[name].id
@@ -190,11 +192,11 @@ class Actors:
         self._resting_since = None
 
     def make_rest_detector(self) -> RestDetector:
-        """Return a detector for all pushable actors; pass the ids that it returns to `put_to_sleep`."""
+        """Return a detector of the pushable actors that are at rest."""
         return RestDetector(self._client, [actor.id for actor in self._pushable])
 
     def put_to_sleep(self, body_ids: Collection[int]) -> None:
-        """Let bodies at rest sleep after the next step."""
+        """Put bodies to sleep after the next step."""
         for body_id in body_ids:
             engine.put_to_sleep(self._client, body_id)
         self._poses_tick = None
@@ -210,11 +212,11 @@ class Actors:
         return self._rest_poses.poses
 
     def on_push(self, tick: int) -> None:
-        """Discard speed bounds, because something is pushed during the step from `tick`."""
+        """Discard all speed bounds, because something is pushed during the step that begins at `tick`."""
         self._broad_phase.invalidate(tick)
 
     def no_push_before(self, tick: int, robot_speed: Callable[[], float]) -> int:
-        """Return the tick until which no scripted actor can push anything; -1 if one may do so during this step.
+        """Return a tick before which no scripted actor can push anything, or -1 if one may do so in the next step.
 
         Wakes the pushable actors that may be touched soon. `robot_speed` returns an upper bound in m/s for all robots.
         """
@@ -228,23 +230,20 @@ class Actors:
         return -1 if broad_phase.near_contact else broad_phase.valid_until
 
     def _is_asleep(self, tick: int) -> bool:
-        """Return whether all pushable actors sleep in the engine, and no robot can have touched one.
-
-        A robot that only comes near wakes a body in the engine, but does not move it noticeably.
-        """
+        """Return whether all pushable actors sleep in the engine, and no robot can have touched any of them."""
         is_resting = self._resting_since is not None and tick - self._resting_since > self._ticks_until_asleep
         return is_resting and tick <= min(self._no_contact_before.values())
 
     def set_no_contact_before(self, robot_id: int, tick: int) -> None:
-        """Store the tick before which this robot cannot touch any actor."""
+        """Store the tick before which the robot with the body id `robot_id` cannot touch any actor."""
         self._no_contact_before[robot_id] = tick
 
     # Stepping
 
     def begin_step(self, tick: int, everything: bool = True) -> None:
-        """Give scripted actors their pose and velocity before the step from `tick`.
+        """Set the poses and velocities of scripted actors in the engine before the step that begins at `tick`.
 
-        Without `everything`, only those are moved that may push something soon, as for `end_step`.
+        Without `everything`, affects only the scripted actors that may push something soon.
         """
         for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
@@ -253,12 +252,12 @@ class Actors:
                 pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turn_rate), physicsClientId=self._client)
 
     def end_step(self, tick: int, everything: bool = True) -> None:
-        """Move scripted actors to their pose at `tick`, after the step."""
+        """Set the poses of scripted actors in the engine after the step that ended at `tick`; see `begin_step`."""
         for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def move_rendered(self, tick: int) -> None:
-        """Move all scripted actors in the engine to their pose at `tick`, also those that do not collide."""
+        """Set the poses of all scripted actors in the engine, also of deferred actors."""
         for actor in self._scripted:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
@@ -271,7 +270,7 @@ class Actors:
     # Poses
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
-        """Return the poses of all actors by name in order; queries the engine at most once per tick."""
+        """Return the poses of all actors, sorted by name; queries the engine at most once per tick."""
         if self._poses_tick == tick:
             return self._poses
         if self._poses_tick is None or (self._pushable and not self._is_asleep(tick)):
@@ -300,16 +299,16 @@ class Actors:
         return actor.center_and_pose[1]
 
     def prefetch_poses(self, tick: int, period: int) -> None:
-        """Precompute scripted poses for calls of `poses` at the current `tick` and every `period` ticks after it."""
+        """Precompute poses of scripted actors for calls of `poses` every `period` ticks from the current `tick` on."""
         if self._scripted and self._poses_tick is not None and (not self._pushable or self._is_asleep(tick)):
             self._scheduled_poses.compute(tick, period, self._poses)
 
     def bodies_and_poses(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
-        """Return all bodies with their poses by name in order."""
+        """Return all bodies and their poses, sorted by name."""
         return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
 
     def bodies(self) -> dict[str, Body]:
-        """Return all bodies by name in order."""
+        """Return all bodies, sorted by name."""
         return {name: actor.body for name, actor in self._actors.items()}
 
     def names_by_id(self) -> dict[int, str | None]:
@@ -317,10 +316,7 @@ class Actors:
         return {actor.body_id: name for name, actor in self._actors.items() if actor.body_id is not None}
 
     def find_enclosing(self, point: Vector, tick: int) -> str | None:
-        """Return the name of the first hollow actor that encloses a point, or None.
-
-        The engine itself detects that a point is inside an actor that is not hollow (see `engine.is_hollow`).
-        """
+        """Return the name of the first actor with a `surface` that encloses a point, or None."""
         for name, pose in self.poses(tick).items():
             surface = self._actors[name].surface
             if surface is not None:
@@ -330,7 +326,7 @@ class Actors:
         return None
 
     def find_divergence(self, tick: int) -> str | None:
-        """Return what is wrong with the first actor that has diverged, of those that have moved, or None."""
+        """Return the reason why the state of an actor that has moved is invalid, or None if all states are valid."""
         self.poses(tick)
         moved, self._moved = self._moved, []
         for actor in moved:
@@ -345,10 +341,10 @@ class Actors:
     def prepare_nearby(
         self, robot_id: int, point: Vector, distance: float, ground_distance: float, tick: int
     ) -> list[int]:
-        """Prepare a robot's distance query; return the ids of the actors that may be within `distance` m of `point`.
+        """Return the body ids of the actors that may be within `distance` m of a robot's position `point`.
 
-        Moves scripted actors to their pose in the engine, if this pose or their outdated pose is within `distance`. If
-        none of the actors moves, returns only those that may be within `ground_distance` m along the ground.
+        Sets the poses of these actors in the engine. If none of them moves, returns only the actors that may be within
+        `ground_distance` m, measured in the ground plane.
         """
         poses = self.poses(tick)
         asleep_since = self._resting_since if not self._pushable or self._is_asleep(tick) else None
@@ -360,9 +356,9 @@ class Actors:
         return nearby.prepare_nearby(self._client, point, distance, ground_distance, poses)
 
     def free_distance(self, robot_id: int, point: Vector, distance: float, tick: int) -> float | None:
-        """Return by how many meters all actors are farther from `point` than `distance`, as a lower bound.
+        """Return a lower bound of the distance in m from `point` to the nearest actor, minus `distance`.
 
-        Call it after `prepare_nearby`. Returns None if any actor can be pushed or steered.
+        Call `prepare_nearby` first. Returns None if any actor is pushable or steered.
         """
         nearby = self._nearby[robot_id]
         if self._pushable or any(actor.is_steered for actor in self._scripted):
@@ -375,14 +371,14 @@ class Actors:
         return self._scripted_speed * ticks / self._tick_rate
 
     def reachable_spheres(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
-        """Yield body id, center, and radius in m of the sphere that each pushable actor can reach within `ticks`."""
+        """Yield a sphere (body id, center, radius in m) that each pushable actor cannot leave within `ticks`."""
         if self._pushable:
             poses, travel = self.poses(tick), self.speed_bound(tick) * ticks / self._tick_rate
             for actor in self._pushable:
                 yield actor.id, poses[actor.body.name].position, actor.size + travel
 
     def speed_bound(self, tick: int) -> float:
-        """Return an upper bound in m/s of the speed of all actors within SPEED_HORIZON_S from the current `tick`."""
+        """Return an upper bound in m/s of the speed of any actor for the next SPEED_HORIZON_S."""
         if not self._pushable:
             return self._scripted_speed
         self.poses(tick)

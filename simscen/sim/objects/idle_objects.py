@@ -1,13 +1,7 @@
 """Decides which pushable objects sleep in the engine, so that they need nearly no computing time.
 
-Bullet only lets a body sleep after two seconds at rest. Therefore, the world settles before tick 0, and objects at rest
-are then put to sleep. The speed of each object is sampled meanwhile. An object is at rest if it is slow at every sample
-and its speed does not increase from each sample to the next. A speed that always increases shows that the object begins
-to slide or tip over; other small speeds are jitter of the contact solver.
-
-Bullet does not wake a body that is touched by a scripted object, because this has no mass (see `actor`). Pushable
-objects are therefore woken before a scripted object reaches them. Any other contact wakes them in the engine, together
-with everything that they touch.
+Pushable objects that are at rest at tick 0 are put to sleep. They are woken before a scripted object (an object without
+mass that follows a path) reaches them, because Bullet does not wake them then.
 """
 
 import itertools
@@ -23,20 +17,23 @@ from simscen.sim.bullet import engine, pybullet
 from simscen.sim.objects.actor import SHAPE_MARGIN_M, SPEED_HORIZON_S, Actor
 
 SAMPLE_PERIOD_TICKS = 6
-"""Ticks between two samples. A swinging object is slow at one sample and fast at another."""
+"""Number of ticks between two samples of the speed of an object."""
 SAMPLE_COUNT = 5
 """Number of samples at which an object must be slow."""
 
 
 class RestDetector:
-    """Finds the bodies that are at rest, from samples of their speeds while the world settles."""
+    """Finds the bodies that are at rest from samples of their speeds.
+
+    A body is at rest if it is slow at every sample, unless its speed increases from each sample to the next.
+    """
 
     def __init__(self, client: int, body_ids: Iterable[int]) -> None:
         self._client = client
         self._speeds: dict[int, list[float]] = {body_id: [] for body_id in body_ids}
 
     def sample(self) -> None:
-        """Record the current speed of each body (norm of m/s and rad/s)."""
+        """Record the current speed of each body: the norm of its linear (m/s) and angular (rad/s) velocity."""
         for body_id, speeds in self._speeds.items():
             linear, angular = pybullet.getBaseVelocity(body_id, self._client)
             speeds.append(math.hypot(*linear, *angular))
@@ -47,7 +44,7 @@ class RestDetector:
 
 
 def _is_at_rest(speeds: list[float]) -> bool:
-    is_slow = max(speeds) ** 2 < engine.REST_SPEED_SQUARED
+    is_slow = max(speeds) ** 2 < engine.REST_SPEED_SQUARED_M2_S2
     return is_slow and any(now <= before for before, now in itertools.pairwise(speeds))
 
 
@@ -56,13 +53,13 @@ class RestPoses:
 
     def __init__(self) -> None:
         self.poses: Mapping[str, Pose3] = {}
-        """Newest rest pose of each object by name. A change creates a new mapping."""
+        """Last rest pose of each object by name."""
         self._last: Mapping[str, Pose3] | None = None
 
     def update(self, poses: Mapping[str, Pose3]) -> None:
         """Update the rest poses with the current poses of all pushable objects.
 
-        An object that moves or is removed keeps its last rest pose, in case it returns to exactly this pose.
+        An object that moves or is removed keeps its last rest pose.
         """
         before, self._last = poses if self._last is None else self._last, poses
         changed = {name: pose for name, pose in poses.items() if before.get(name) == pose != self.poses.get(name)}
@@ -71,11 +68,11 @@ class RestPoses:
 
 
 NEAR_CONTACT_S = 0.05
-"""Time to collision below which pushable objects are woken, and scripted objects are moved in the engine every tick."""
+"""Time to collision below which pushable objects are woken."""
 
 
 class BoundingDiscs(NamedTuple):
-    """Top view of bodies: radii (n,) in m around centers (n, 2), and maximum speeds (n,) in m/s."""
+    """Bounding discs of bodies, seen from above: centers (n, 2) and radii (n,) in m, maximum speeds (n,) in m/s."""
 
     centers: Array
     radii: Array
@@ -83,14 +80,14 @@ class BoundingDiscs(NamedTuple):
 
     @classmethod
     def of(cls, spheres: Iterable[tuple[Vector, float, float]]) -> "BoundingDiscs":
-        """Return the discs of bounding spheres, each with its center, radius, and speed."""
+        """Return the discs of bounding spheres, given as tuples (center, radius, maximum speed)."""
         rows = list(spheres)
         centers, radii, speeds = zip(*rows, strict=True) if rows else ((), (), ())
         return cls(np.array(centers).reshape(-1, 3)[:, :2], np.array(radii), np.array(speeds))
 
 
 class CollisionCandidates(NamedTuple):
-    """Indices of the scripted and pushable bodies that may touch soon. No others can touch for `seconds`."""
+    """Indices of the scripted and pushable bodies that may touch soon. No other pair can touch within `seconds`."""
 
     scripted: tuple[int, ...]
     pushable: tuple[int, ...]
@@ -98,7 +95,7 @@ class CollisionCandidates(NamedTuple):
 
 
 def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed: float) -> CollisionCandidates:
-    """Return the bodies that may touch within NEAR_CONTACT_S; a pushable body that is hit can reach `hit_speed` m/s."""
+    """Return the bodies that may touch within NEAR_CONTACT_S. A hit pushable body is at most `hit_speed` m/s fast."""
     distances = np.linalg.norm(scripted.centers[:, np.newaxis] - pushable.centers, axis=2)
     gaps = distances - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
     closing_speeds = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit_speed)
@@ -113,9 +110,9 @@ def _indices(mask: npt.NDArray[np.bool_]) -> tuple[int, ...]:
 
 
 class BroadPhase:
-    """Broad phase between scripted and pushable actors: finds those that may touch soon, and wakes the pushable ones.
+    """Finds scripted and pushable actors (movable objects) that may touch soon, and wakes the pushable actors.
 
-    The set of actors is fixed; create a new instance when it changes.
+    Create a new instance when actors are added or removed.
     """
 
     def __init__(self, client: int, tick_rate: int, scripted: Sequence[Actor], pushable: Sequence[Actor]) -> None:
@@ -123,19 +120,19 @@ class BroadPhase:
         self._pushable_discs: BoundingDiscs | None = None
         self._push_tick = -1
         self.valid_until = -1
-        """Tick until which only the actors in `near_contact` can push anything."""
+        """Tick until which no scripted actors except `near_contact` can push anything."""
         self.near_contact: list[Actor] = []
         """Scripted actors that may push something before `valid_until`."""
 
     def invalidate(self, tick: int) -> None:
-        """Discard the result, because a push during the step from `tick` changes speeds."""
+        """Discard the result, because something is pushed during the step that begins at `tick`."""
         self.valid_until, self._push_tick = -1, tick
 
     def update(self, tick: int, robot_speed: float, poses: Mapping[str, Pose3], is_asleep: bool) -> bool:
-        """Find the actors that may touch soon, and wake the pushable ones; return whether there were any.
+        """Wake the pushable actors that a scripted actor may touch soon; return whether there are any.
 
-        Places all scripted actors at their poses in the engine; only those in `near_contact` are moved again before the
-        next update. `robot_speed` is an upper bound in m/s for all robots. `is_asleep`: all pushable actors sleep.
+        Also sets the poses of all scripted actors in the engine. `robot_speed` is an upper bound in m/s for all robots.
+        `is_asleep` states whether all pushable actors sleep.
         """
         moving = list[Actor]()
         for actor in self._scripted:

@@ -1,4 +1,4 @@
-"""Selects the actors that a robot can see or touch, so that the others cost no computing time."""
+"""Selects the actors (movable objects) that a robot can touch or measure, to save computing time for all others."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,22 +10,23 @@ from simscen.core.geometry import Array, Pose3, Vector
 from simscen.sim.objects.actor import Actor
 
 EXTRA_RADIUS_M = 2.0
-"""Additional search radius, so that the next queries can use the same list of nearby actors."""
+"""Additional search radius, so that later searches can reuse the list of nearby actors."""
 REQUERY_DISTANCE_M = 1.0
-"""Distance that a robot can move before it queries deferred actors again."""
+"""Largest distance that a robot moves between two queries of deferred actors."""
 EARLY_QUERY_DISTANCE_M = 0.5
-"""Shorter distance that applies every ACTIVATION_PERIOD_S, so that REQUERY_DISTANCE_M is not exceeded in between."""
+"""Smallest distance that a robot has moved before a periodic query of deferred actors."""
 ACTIVATION_PERIOD_S = 0.05
-"""Time between early queries, in which robots, slower than 10 m/s, move at most EARLY_QUERY_DISTANCE_M."""
+"""Time between periodic queries of deferred actors. A robot moves at most EARLY_QUERY_DISTANCE_M in this time."""
 ROUNDING_MARGIN_M = 1e-3
 """Upper bound of rounding errors in the distances of deferred actors."""
 
 
 class NearbyActors(NamedTuple):
-    """The actors within `distance` m of a point at a tick, and all pushable actors unless they sleep.
+    """The actors within `distance` m of `point` at `tick`, and all pushable actors unless they sleep.
 
-    `asleep_since` is the tick since when all pushable actors have been at rest, or None if one is awake. `resting` has
-    each actor with its position (x, y) and its radius on the ground; it is None if any of the actors can move.
+    asleep_since:  tick since when all pushable actors have been at rest; None if any of them is awake
+    resting:       the same actors, each with its position (x, y) and the radius of its outline on the ground in m; None
+                   if any of them can move
     """
 
     actors: tuple[Actor, ...]
@@ -36,13 +37,19 @@ class NearbyActors(NamedTuple):
     resting: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def covers(self, point: Vector, distance: float, tick: int, max_step: float) -> bool:
-        """Return whether all other actors, moving up to `max_step` m per tick, are over `distance` m from `point`."""
+        """Return whether `actors` still has all actors within `distance` m of `point` at `tick`.
+
+        `max_step` is an upper bound in m of the motion of any actor per tick.
+        """
         return math.dist(point, self.point) + max_step * (tick - self.tick) + distance <= self.distance
 
     def prepare_nearby(
         self, client: int, point: Vector, distance: float, ground_distance: float, poses: Mapping[str, Pose3]
     ) -> list[int]:
-        """Move scripted actors near a point in the engine, return the ids of near ones; see `Actors.prepare_nearby`."""
+        """Return the body ids of the actors within `distance` m of a point, and set their poses in the engine.
+
+        If all actors are resting, returns the actors within `ground_distance` m, measured in the ground plane.
+        """
         if self.resting is not None:
             return [
                 actor.id for actor, xy, radius in self.resting if math.dist(xy, point[:2]) <= ground_distance + radius
@@ -57,7 +64,10 @@ class NearbyActors(NamedTuple):
         return near
 
     def free_distance(self, point: Vector, poses: Mapping[str, Pose3], travel: float) -> float:
-        """Return a lower bound in m of the distance to any actor; others have moved at most `travel` m since `tick`."""
+        """Return a lower bound in m of the distance from `point` to any actor in the simulation.
+
+        `travel` is an upper bound in m of the motion of any actor since `tick`.
+        """
         free = self.distance - math.dist(point, self.point) - travel
         return min([free, *(actor.distance_to(point, poses[actor.body.name]) - actor.size for actor in self.actors)])
 
@@ -70,7 +80,7 @@ def find_nearby(
     tick: int,
     asleep_since: int | None,
 ) -> NearbyActors:
-    """Return the actors within `distance` + EXTRA_RADIUS_M of a point; see NearbyActors for `asleep_since`."""
+    """Return the actors within `distance` + EXTRA_RADIUS_M of a point at the current `tick`."""
     distance += EXTRA_RADIUS_M
     is_awake = asleep_since is None
     nearby = tuple(
@@ -86,10 +96,7 @@ def find_nearby(
 
 
 class ProximityQuery(NamedTuple):
-    """Position of a robot and two radii in m around it.
-
-    Actors within `radius` must be simulated, those within `observed_radius` must be in the engine to be measured.
-    """
+    """Position of a robot and two radii in m: actors in `radius` must collide, in `observed_radius` be measurable."""
 
     point: Vector
     radius: float
@@ -97,10 +104,10 @@ class ProximityQuery(NamedTuple):
 
 
 class DeferredActors:
-    """Actors that do not collide in the engine yet, because no robot has come near their path.
+    """Actors that cannot collide in the engine yet, because no robot has come near their path.
 
-    They stand still or follow a fixed path. An actor is activated before a robot can reach any point of its path,
-    regardless of time and speed, so that no collision can be missed. It then remains active.
+    They stand still or follow a fixed path. An actor is activated before a robot can reach any point of its path, and
+    then stays active.
     """
 
     def __init__(self, actors: Sequence[Actor]) -> None:
@@ -115,9 +122,9 @@ class DeferredActors:
         self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
     def activate_near(self, queries: Iterable[ProximityQuery]) -> tuple[list[Actor], list[Actor]]:
-        """Return the deferred actors that any robot could reach, which are then active, and those it can only measure.
+        """Return the newly activated actors, and the actors that must now be measurable but cannot collide.
 
-        Each list contains an actor only once. Query again before a robot has moved by REQUERY_DISTANCE_M.
+        The results are valid until a robot has moved by REQUERY_DISTANCE_M.
         """
         is_near, is_measured = np.zeros((2, len(self._actors)), dtype=np.bool_)
         for point, radius, observed_radius in queries:
@@ -132,7 +139,7 @@ class DeferredActors:
         return [self._actors[index] for index in near], [self._actors[index] for index in measured]
 
     def _distances(self, point: Vector) -> Array:
-        """Return lower bounds of the distance in m from a point to the area that each segment sweeps."""
+        """Return lower bounds (segments,) of the distance in m from a point to the area that an actor sweeps."""
         offsets = np.array(point[:2]) - self._starts
         shares = np.clip((offsets * self._directions).sum(axis=1) / self._squared_lengths, 0.0, 1.0)
         centers = offsets - shares[:, np.newaxis] * self._directions

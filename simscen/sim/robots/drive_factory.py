@@ -15,16 +15,16 @@ from simscen.sim.scene.terrain import Terrain
 
 
 class Base(Protocol):
-    """Hull and wheels of a robot in the engine, with the body id `id`; its `hull_links` collide with obstacles."""
+    """Hull and wheels of a robot in the engine."""
 
     id: int
     hull_links: tuple[int, ...]
+    """Links that collide with obstacles."""
     ground_links: Mapping[int, float]
-    """Smallest z of the contact normal of each link that can stand on uneven ground; see `terrain.is_ground_contact`.
-    Empty for a planar base."""
+    """Links of the wheels and casters that can stand on uneven ground, each with its smallest z of a contact normal."""
 
     def place(self, pose: Pose2) -> None:
-        """Place the robot at rest with its base frame on the ground."""
+        """Place the robot at rest on the ground."""
         ...
 
     def state(self) -> RobotState:
@@ -32,11 +32,11 @@ class Base(Protocol):
         ...
 
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
-        """Set the friction of its wheels for the next step; `friction` returns the friction of the floor at (x, y)."""
+        """Set the friction of the wheels; `friction` returns the friction coefficient of the floor at (x, y)."""
         ...
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
+        """Apply an impulse (N s, world frame) at the center of mass during the next step, which takes `seconds`."""
         ...
 
 
@@ -49,7 +49,7 @@ class Drive(Protocol):
     """
 
     def command(self, twist: Twist) -> None:
-        """Set the velocity in the base frame to drive from now on."""
+        """Set the commanded velocity in the base frame."""
         ...
 
     def advance(self) -> None:
@@ -57,7 +57,7 @@ class Drive(Protocol):
         ...
 
     def rest(self) -> None:
-        """Reset the velocity after the robot was placed at rest."""
+        """Set the current velocity to zero, because the robot was placed at rest."""
         ...
 
     def encoders(self) -> tuple[float, ...]:
@@ -68,9 +68,9 @@ class Drive(Protocol):
 def build_drive(
     client: int, body: RobotBody, pose: Pose2, period: float, tick_seconds: float, terrain: Terrain, visual_shape: int
 ) -> tuple[Base, Drive]:
-    """Return the base of a robot at `pose` and its drive, whose firmware runs every `period` seconds.
+    """Return the base and drive of a robot at `pose`. The firmware of the drive runs every `period` seconds.
 
-    The renderer shows `visual_shape` (an id) instead of each collision shape.
+    `visual_shape` is the id of the shape that the renderer shows, `tick_seconds` the duration of a physics step.
     """
     match body.drive:
         case Omnidirectional():

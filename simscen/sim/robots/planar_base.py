@@ -18,17 +18,14 @@ from simscen.sim.robots.wheel_drives import VelocityRamp
 MAX_FORCE_PER_WEIGHT = 0.7
 """Largest motor force divided by the weight of the robot."""
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
-CARRIERS = 2
-"""Number of links without a shape between the world and the hull: one for the joint along x, one for that along y."""
+CARRIER_COUNT = 2
+"""Number of links without a shape between the world and the hull: one for each of the joints along x and y."""
 CARRIER_MASS_KG = 0.001
 """Mass of a carrier, because the engine requires one."""
 
 
 class PlanarBase:
-    """Hull on three joints from the world: along x, along y, and about z. It cannot tip, and no wheel slips.
-
-    It stays at z = 0: a ramp is a wall to it, and it ignores a sill that is lower than its hull.
-    """
+    """Hull on three joints from the world: along x, along y, and about z. It stays at z = 0 and cannot tip."""
 
     ground_links: Mapping[int, float]
 
@@ -36,19 +33,21 @@ class PlanarBase:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         moments, base_from_center = _total_mass_properties(body).principal()
-        hulls = engine.create_hull_shapes(client, body.collision_solids)
+        hulls = engine.create_robot_shapes(client, body.collision_solids)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,
-            linkMasses=[CARRIER_MASS_KG] * CARRIERS + [body.mass] + [CARRIER_MASS_KG] * extra,
-            linkCollisionShapeIndices=[-1] * CARRIERS + hulls,
-            linkVisualShapeIndices=[-1] * CARRIERS + [visual_shape] * len(hulls),
-            linkPositions=[(0, 0, 0)] * (CARRIERS + len(hulls)),
-            linkOrientations=[IDENTITY] * (CARRIERS + len(hulls)),
-            linkInertialFramePositions=[(0, 0, 0)] * CARRIERS + [base_from_center.position] + [(0, 0, 0)] * extra,
-            linkInertialFrameOrientations=[IDENTITY] * CARRIERS + [base_from_center.quaternion] + [IDENTITY] * extra,
+            linkMasses=[CARRIER_MASS_KG] * CARRIER_COUNT + [body.mass] + [CARRIER_MASS_KG] * extra,
+            linkCollisionShapeIndices=[-1] * CARRIER_COUNT + hulls,
+            linkVisualShapeIndices=[-1] * CARRIER_COUNT + [visual_shape] * len(hulls),
+            linkPositions=[(0, 0, 0)] * (CARRIER_COUNT + len(hulls)),
+            linkOrientations=[IDENTITY] * (CARRIER_COUNT + len(hulls)),
+            linkInertialFramePositions=[(0, 0, 0)] * CARRIER_COUNT + [base_from_center.position] + [(0, 0, 0)] * extra,
+            linkInertialFrameOrientations=[IDENTITY] * CARRIER_COUNT
+            + [base_from_center.quaternion]
+            + [IDENTITY] * extra,
             linkParentIndices=[0, 1, 2] + [3] * extra,
-            linkJointTypes=[pybullet.JOINT_PRISMATIC] * CARRIERS
+            linkJointTypes=[pybullet.JOINT_PRISMATIC] * CARRIER_COUNT
             + [pybullet.JOINT_REVOLUTE]
             + [pybullet.JOINT_FIXED] * extra,
             linkJointAxis=[(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 0, 1)] * extra,
@@ -81,23 +80,23 @@ class PlanarBase:
         return RobotState(Pose3.planar(Pose2(x, y, yaw)), (vx, vy, 0.0), (0.0, 0.0, wz))
 
     def pose(self) -> Pose2:
-        """Return the pose; its heading counts full turns."""
+        """Return the pose. The heading is not wrapped: it is 2π larger after a full turn."""
         states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
         return Pose2(*(state[0] for state in states))
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
+        """Apply an impulse (N s, world frame) at the center of mass during the next step, which takes `seconds`."""
         center = pybullet.getLinkState(self.id, 2, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, 2, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
-        """Limit the motor force to the friction of the floor at the center of the base."""
+        """Limit the motor force by the friction coefficient that `friction` returns at the center (x, y) of the base."""
         x, y, _ = self.pose()
         self._floor_friction = friction(x, y)
 
     def set_motors(self, velocity: Twist) -> None:
-        """Set the motors to a velocity along the world axes, with at most the force that the wheels can transmit."""
+        """Set the target velocity of the motors along the world axes, and their largest force."""
         max_force = min(MAX_FORCE_PER_WEIGHT * self._motor_ratio, self._floor_friction) * self._mass * GRAVITY_M_S2
         pybullet.setJointMotorControlArray(
             self.id,
@@ -110,13 +109,13 @@ class PlanarBase:
 
 
 def _total_mass_properties(body: RobotBody) -> MassProperties:
-    """Return the mass properties of the chassis with its wheels, which do not turn in this model."""
+    """Return the mass properties of the whole robot as one rigid body."""
     wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
     return combine([body.chassis, *wheels]) if wheels else body.chassis
 
 
 class OmnidirectionalDrive:
-    """Drive that follows any twist. Its encoders measure every motion over the ground, along the axes of the base."""
+    """Drive that follows any twist. Its encoders measure the motion of the base over the ground, in the base frame."""
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         self._base, self._period = base, period
@@ -126,11 +125,11 @@ class OmnidirectionalDrive:
         base.set_motors(STOP)
 
     def command(self, twist: Twist) -> None:
-        """Set the velocity to drive from now on."""
+        """Set the commanded velocity in the base frame."""
         self._ramp.command(twist)
 
     def advance(self) -> None:
-        """Update the motor velocity, rotated to the heading half a period ahead, so that the base drives arcs."""
+        """Run one period of the firmware: update the motor velocity towards the command."""
         changed = self._ramp.advance()
         velocity = self._actual_velocity(self._ramp.velocity)
         if not changed and velocity == STOP:
@@ -141,7 +140,7 @@ class OmnidirectionalDrive:
         self._base.set_motors(Twist(c * velocity.vx - s * velocity.vy, s * velocity.vx + c * velocity.vy, velocity.wz))
 
     def _actual_velocity(self, velocity: Twist) -> Twist:
-        """Return the velocity that the motors produce for a commanded one."""
+        """Return the velocity in the base frame that results from a commanded velocity."""
         return velocity
 
     def rest(self) -> None:
@@ -151,12 +150,12 @@ class OmnidirectionalDrive:
         self._base.set_motors(STOP)
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the accumulated motion: meters forward, meters to the left, and radians."""
+        """Return the accumulated motion: forward (m), left (m), and turn (rad)."""
         self._update_encoders()
         return self._traveled
 
     def _update_encoders(self) -> None:
-        """Add the motion since the last update as a constant twist (the logarithm in SE(2))."""
+        """Add the motion since the last update, which is assumed to be an arc (logarithm in SE(2))."""
         now = self._base.pose()
         step, turn = self._last_pose.between(now), wrap(now.yaw - self._last_pose.yaw)
         self._last_pose = now
@@ -170,7 +169,7 @@ class OmnidirectionalDrive:
 class MecanumDrive(OmnidirectionalDrive):
     """Drive with four mecanum wheels that never slip.
 
-    The firmware uses the wheel dimensions of the drive's specification, which may differ from those of the real wheels.
+    The firmware computes with the wheel dimensions of the drive's specification, which can differ from those in a URDF.
     """
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
@@ -187,7 +186,7 @@ class MecanumDrive(OmnidirectionalDrive):
 
 
 def _real_wheels(body: RobotBody) -> MecanumWheels:
-    """Return the dimensions of the body's wheels, which in a URDF can differ from those of the drive."""
+    """Return the mean dimensions of the body's wheels."""
     assert isinstance(body.drive, Mecanum)
     return MecanumWheels(
         radius=float(np.mean([wheel.radius for wheel in body.wheels])),

@@ -29,7 +29,10 @@ from simscen.sim.scene.walls import Walls
 
 @dataclass(frozen=True)
 class TimedPush:
-    """Call of `push` with `impulse` (N s, world frame) at each tick from `start_tick` to before `end_tick`."""
+    """Push that lasts several ticks: calls `push(impulse)` at each tick from `start_tick` to `end_tick - 1`.
+
+    `impulse` is in N s per tick, in the world frame.
+    """
 
     push: Callable[[tuple[float, float]], None]
     impulse: tuple[float, float]
@@ -39,7 +42,7 @@ class TimedPush:
 
 @dataclass(eq=False)
 class Scene:
-    """Everything that the robots of a simulation share, such as the current tick, and all robots by name."""
+    """State that all robots of a simulation share, such as the current tick."""
 
     client: int
     tick_rate: int
@@ -53,13 +56,13 @@ class Scene:
     floor: FloorFriction = field(default_factory=FloorFriction)
 
     def update_wheel_friction(self) -> None:
-        """Set the friction of all wheels to that of the floor below them for the next step."""
+        """Set the friction of each wheel to the friction of the floor below it."""
         self.floor.remove_expired(self.tick)
         for robot in self.robots.values():
             robot.base.set_friction(self.floor.friction)
 
     def apply_pushes(self) -> bool:
-        """Apply the pushes of the next step; return whether any push is due now or later."""
+        """Apply the pushes of the next step; return whether any pushes remain, now or later."""
         self.pushes = [push for push in self.pushes if push.end_tick > self.tick]
         for push in self.pushes:
             if push.start_tick <= self.tick:
@@ -71,25 +74,25 @@ class Scene:
     def add_push(
         self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, tick: int
     ) -> None:
-        """Spread an impulse in N s evenly over `seconds` from `tick` on, at least over one tick."""
+        """Schedule calls of `push` that spread an impulse (N s, world frame) evenly over `seconds` from `tick` on."""
         ticks = max(1, round(seconds * self.tick_rate))
         self.pushes.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), tick, tick + ticks))
 
     def on_push(self) -> None:
-        """Discard all predictions that would be wrong if something is pushed during the next step."""
+        """Discard all predictions of robots and actors, because something is pushed during the next step."""
         self.actors.on_push(self.tick)
         for robot in self.robots.values():
             robot.on_push()
 
     def before_change(self) -> None:
-        """Compute deferred samples before an object is added, removed, or moved."""
+        """Compute the deferred samples of all robots before an object is added, removed, or moved."""
         for robot in self.robots.values():
             robot.sampler.compute_deferred()
 
     def activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
-        """Let the deferred actors near robots collide. Call it at every tick at which a robot is observed.
+        """Let the actors (movable objects) near robots collide, which were deferred to save time.
 
-        Robots that have moved less than `moved` m since their last query are skipped.
+        Skips robots that have moved less than `moved` m since their last query.
         """
         if self.actors.is_engine_complete:
             return
@@ -99,7 +102,7 @@ class Scene:
                 robot.add_bodies(activated)
 
     def after_change(self) -> None:
-        """Update everything that depends on the objects of the world."""
+        """Update all robots after an object or robot was added, removed, or placed."""
         self.activate_actors(moved=0.0)
         for robot in self.robots.values():
             robot.on_change()
@@ -120,10 +123,10 @@ class Robot:
         clearance_range: float,
         visual_shape: int,
     ) -> None:
-        """Place the robot at `pose`; its firmware runs every `period` seconds, and the renderer shows `visual_shape`.
+        """Place the robot at `pose`. Its firmware runs every `period` seconds.
 
-        `obstacles` is the part of the `static` world that counts for the clearance, which is measured up to
-        `clearance_range` m.
+        `obstacles` is the part of the `static` world that counts for the clearance. The clearance is measured up to
+        `clearance_range` m. `visual_shape` is the id of the shape that the renderer shows.
         """
         self.name, self._scene = name, scene
         tick_seconds = 1 / scene.tick_rate
@@ -131,14 +134,14 @@ class Robot:
             scene.client, body, pose, period, tick_seconds, scene.terrain, visual_shape
         )
         self.advance = self._drive.advance
-        """Run one period of the firmware; called by the simulation."""
+        """Function that runs one period of the firmware."""
         self._command: Twist | None = None
         self._state = CachedState(self.base.state, scene)
         self._label = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
         """The other robots, by name."""
         self.bodies: Mapping[str, Body] = {}
-        """All movable bodies by name; the same object until one is added or removed."""
+        """All movable objects and other robots by name. A change replaces the mapping."""
         self.body = Body(name, body.collision_solids, Pose3.planar(pose), body.mass)
         self._collisions = CollisionTracker(scene.tick_rate)
         self._placements, self._placed_tick = 0, -1
@@ -155,7 +158,7 @@ class Robot:
     # Driving and observing
 
     def drive(self, command: Twist) -> None:
-        """Command a velocity in the base frame; the base follows within its limits."""
+        """Command a velocity in the base frame. The base follows within its limits."""
         if command is not self._command:  # most commands are the previous object again
             self._command = command
             self._drive.command(command)
@@ -166,9 +169,9 @@ class Robot:
         return self._truth(tick, self._checked_state(tick))
 
     def sample(self, period: int) -> Truth | DeferredTruth:
-        """Return the true state, or a deferred sample of it if its clearance can be computed later.
+        """Return the true state, or a sample whose clearance is computed later if that is possible.
 
-        The caller must take the next sample at most `period` ticks later. Raises RunError if the physics has diverged.
+        Take the next sample at most `period` ticks later. Raises RunError if the physics has diverged.
         """
         tick = self._scene.tick
         state = self._checked_state(tick)
@@ -179,7 +182,7 @@ class Robot:
         return self._truth(tick, state, period)
 
     def _checked_state(self, tick: int) -> RobotState:
-        """Return the state; raises RunError if the physics of the robot or of an actor has diverged."""
+        """Return the state; raises RunError if the physics of the robot or of a movable object has diverged."""
         (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._state()
         actors = self._scene.actors
         reason = divergence_reason(self._label, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
@@ -196,10 +199,7 @@ class Robot:
         return Truth(state.pose, state.twist, clearance, self.objects())
 
     def collisions(self) -> tuple[Event, ...]:
-        """Return the events collision.started and collision.ended since the last call.
-
-        In their data, `robot_caused` states whether the robot moved towards the object, rather than being hit.
-        """
+        """Return the events collision.started and collision.ended since the last call."""
         return self._collisions.take_events()
 
     def objects(self) -> Mapping[str, Pose3]:
@@ -209,7 +209,7 @@ class Robot:
 
     @property
     def rest_poses(self) -> Mapping[str, Pose3]:
-        """Poses in which pushable objects have come to rest, by name."""
+        """Last poses in which pushable objects were at rest, by name."""
         return self._scene.actors.rest_poses
 
     def bodies_and_poses(self) -> Mapping[str, tuple[Body, Pose3]]:
@@ -234,18 +234,18 @@ class Robot:
         return self._drive.encoders()
 
     def placements(self) -> int:
-        """Return how many times the robot was placed elsewhere."""
+        """Return how many times the robot has been teleported."""
         return self._placements
 
     def touching(self) -> bool:
-        """Return whether the hull touches anything besides the ground."""
+        """Return whether the robot touches anything besides the ground."""
         tick = self._scene.tick
         return self._collisions.is_colliding or (tick == self._placed_tick and self.clearance.measure(tick) <= 0.0)
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Return the image of a camera at `mount` in the base frame; see `render_image`."""
+        """Return colors (height, width, 3) and depths (height, width) in m; see `SensorView.image`."""
         render_scene = self._scene.render_scene
         assert render_scene is not None, "the simulation was built without images"
         self._scene.actors.move_rendered(self._scene.tick)
@@ -253,7 +253,7 @@ class Robot:
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
     def place(self, pose: Pose2) -> None:
-        """Place the robot somewhere else at rest, which ends its collisions."""
+        """Place the robot at rest at `pose`, and end its collisions."""
         self._collisions.end_all(self._scene.tick)
         self._placements, self._placed_tick = self._placements + 1, self._scene.tick
         self.set_pose(pose)
@@ -271,17 +271,17 @@ class Robot:
     # Called by the simulation
 
     def set_pose(self, pose: Pose2) -> None:
-        """Place the robot at rest, without updating the scene."""
+        """Place the robot at rest at `pose`, without updating the scene."""
         self.base.place(pose)
         self._state.invalidate()
         self._drive.rest()
 
     def on_push(self) -> None:
-        """Discard all predictions that would be wrong if something is pushed during the next step."""
+        """Discard all predictions, because something is pushed during the next step."""
         self.clearance.on_push(self._scene.tick)
 
     def on_change(self) -> None:
-        """Update the lists of other robots and objects after one was added, removed, or placed elsewhere."""
+        """Update the lists of other robots and objects after an object or robot was added, removed, or placed."""
         scene = self._scene
         self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
@@ -297,25 +297,25 @@ class Robot:
 
     @property
     def distance_since_query(self) -> float:
-        """Distance in m that it has moved since it last queried deferred actors."""
+        """Distance in m that the robot has moved since the last call of `make_query`."""
         return math.dist(self._query_point, self._state().pose[:3])
 
     def make_query(self) -> ProximityQuery:
-        """Return a query of the deferred actors near the robot, and remember its position."""
+        """Return a query for the deferred actors near the robot."""
         self._query_point = self._state().pose.position
         return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.query_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
-        """Add new bodies that the robot can touch; `names` has their names by body id, None for walls."""
+        """Add bodies that the robot can touch; `names` has their names by body id (None: a wall)."""
         self._names.update(names)
 
     @property
     def no_contact_before(self) -> int:
-        """Tick until which it cannot touch anything; -1 during a collision, whose end must be noticed."""
+        """Tick before which the robot cannot touch anything; -1 during a collision."""
         return -1 if self._collisions.is_colliding else self.clearance.no_contact_before
 
     def before_contact_step(self) -> BaseMotion:
-        """Measure the clearance, if needed, before a step with possible contact; return the current motion."""
+        """Return the current motion before a step with possible contact, and update the clearance if needed."""
         tick, clearance = self._scene.tick, self.clearance
         is_outdated = tick >= clearance.no_contact_before and not self._collisions.is_colliding
         if clearance.may_be_enclosed or is_outdated:
@@ -324,7 +324,7 @@ class Robot:
         return BaseMotion(state.pose.position, state.linear, state.angular)
 
     def after_contact_step(self, before: PreStepMotion) -> None:
-        """Record the robot's contacts after the step; `before` has the motions before the step."""
+        """Record the robot's contacts after a step; `before` has the motions before the step."""
         tick, clearance = self._scene.tick, self.clearance
         if not self._collisions.is_colliding and tick <= clearance.no_contact_before:
             return
@@ -342,6 +342,6 @@ class Robot:
         self._collisions.update(tick, contacts, before)
 
     def close(self) -> None:
-        """Compute deferred samples and release the engine clients of the clearance."""
+        """Compute the deferred samples, and release the engine clients."""
         self.sampler.compute_deferred()
         self.clearance.close()

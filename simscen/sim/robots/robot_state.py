@@ -1,8 +1,4 @@
-"""Pose and velocity of a robot, queried from the engine at most once per tick, and samples of its true state.
-
-The clearance of many samples is computed in one batch, because this uses the processor's caches better. It is not
-urgent, because the log needs a sample only some ticks later.
-"""
+"""Pose and velocity of a robot, and samples of the true state whose clearances are computed later in one batch."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
@@ -24,7 +20,7 @@ class RobotState(NamedTuple):
 
     @property
     def twist(self) -> Twist:
-        """The velocity in the base frame: forward, left, and turn rate. Same bits as with `geometry.rotated`."""
+        """The velocity in the base frame: forward (m/s), left (m/s), and turn rate (rad/s)."""
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -42,7 +38,7 @@ class TickClock(Protocol):
 
 
 class CachedState:
-    """Callable that returns the state of a robot, and caches it for the current tick."""
+    """Callable that returns the state of a robot; queries the engine at most once per tick."""
 
     def __init__(self, query: Callable[[], RobotState], clock: TickClock) -> None:
         self._query, self._clock = query, clock
@@ -56,12 +52,12 @@ class CachedState:
         return self._state
 
     def invalidate(self) -> None:
-        """Discard the cached state, because the robot was placed elsewhere."""
+        """Discard the cached state, because the robot was placed."""
         self._tick = -1
 
 
 class PendingTruth:
-    """Sample of the truth at one tick whose clearance is computed later. Implements DeferredTruth."""
+    """Sample of the true state at one tick whose clearance is computed later. Implements DeferredTruth."""
 
     __slots__ = ("objects", "result", "sampler", "state")
 
@@ -78,21 +74,21 @@ class PendingTruth:
 
 
 class TruthSampler:
-    """Collects the deferred samples of one robot, and computes the clearance of all of them when one is needed."""
+    """Collects the deferred samples of one robot, and computes all their clearances when one is needed."""
 
     def __init__(self, static_clearance: Callable[[Pose3], float]) -> None:
-        """Take the function that returns the clearance in m at a pose; see `Clearance.static_clearance`."""
+        """Begin without samples; `static_clearance` returns the distance in m to the static world at a pose."""
         self._static_clearance = static_clearance
         self._deferred: list[PendingTruth] = []
 
     def defer(self, state: RobotState, objects: Mapping[str, Pose3]) -> PendingTruth:
-        """Return a sample whose clearance, that to the static world, is computed later; see `Clearance.can_defer`."""
+        """Return a sample whose clearance is computed later. The static world must be the nearest object."""
         sample = PendingTruth(self, state, objects)
         self._deferred.append(sample)
         return sample
 
     def compute_deferred(self) -> None:
-        """Compute the clearance of all deferred samples."""
+        """Compute the clearances of all deferred samples."""
         deferred, self._deferred = self._deferred, []
         for sample in deferred:
             state = sample.state

@@ -1,4 +1,4 @@
-"""Drives of a wheeled base: differential, skid-steer, and Ackermann; and the velocity ramp that all firmware uses."""
+"""Drives of a wheeled base: differential, skid-steer, and Ackermann; and the velocity ramp of all drives."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,10 @@ from simscen.sim.robots.wheeled_base import WheeledBase
 
 
 class VelocityRamp:
-    """Velocity that follows commands within the limits of speed and acceleration, one step every `period` seconds."""
+    """Velocity that follows commands within the limits of speed and acceleration.
+
+    Takes one step every `period` seconds. Only a holonomic robot can move sideways.
+    """
 
     def __init__(self, limits: Limits, period: float, is_holonomic: bool) -> None:
         self._limits = limits
@@ -24,7 +27,7 @@ class VelocityRamp:
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:
-        """Set the velocity to reach."""
+        """Set the target velocity; the limits of speed are applied to it."""
         if twist == self._command:
             return
         limits, self._command = self._limits, twist
@@ -35,7 +38,7 @@ class VelocityRamp:
         )
 
     def advance(self) -> bool:
-        """Take one step towards the command; return whether the velocity changed."""
+        """Take one step towards the target velocity; return whether the velocity changed."""
         (vx, vy, wz), (target_vx, target_vy, target_wz) = now, target = self.velocity, self.target
         if now == target:
             return False
@@ -48,12 +51,12 @@ class VelocityRamp:
         return True
 
     def rest(self) -> None:
-        """Set the velocity to zero; the command remains."""
+        """Set the velocity to zero, and keep the target velocity."""
         self.velocity = STOP
 
 
 def _step_towards(now: float, target: float, speed_up: float, slow_down: float) -> float:
-    """Return the velocity after one step; a change of direction first brakes to zero."""
+    """Return `now` changed towards `target` by at most `speed_up` or `slow_down`; stops at 0 if the sign differs."""
     step = speed_up if now * target >= 0 and abs(target) > abs(now) else slow_down
     if now * target < 0:
         target = 0.0
@@ -61,7 +64,7 @@ def _step_towards(now: float, target: float, speed_up: float, slow_down: float) 
 
 
 MAX_HOLD_SPEED_M_S = 0.1
-"""Rim speed of a wheel up to which it is held in position if the robot should stand; above, motors still brake it."""
+"""Largest rim speed at which the motors hold the position of a wheel. A faster wheel is braked first."""
 
 
 class DifferentialDrive:
@@ -81,11 +84,11 @@ class DifferentialDrive:
         self._set_wheels()
 
     def command(self, twist: Twist) -> None:
-        """Set the velocity to drive from now on; lateral velocity is ignored."""
+        """Set the commanded velocity in the base frame; its lateral component is ignored."""
         self._ramp.command(twist)
 
     def advance(self) -> None:
-        """Update the wheel speeds if they change."""
+        """Run one period of the firmware: change the wheel speeds towards the command."""
         if self._ramp.advance() or self._is_braking:
             self._set_wheels()
 
@@ -95,7 +98,7 @@ class DifferentialDrive:
         self._set_wheels()
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the mean angles in rad of the left and of the right wheels."""
+        """Return the mean angle in rad of the left wheels, and that of the right wheels."""
         return mean_angles(self._client, self._vehicle.id, self._joints, len(self._left))
 
     def _set_wheels(self) -> None:
@@ -116,20 +119,20 @@ class DifferentialDrive:
 
 
 def driven_joints(body: RobotBody, vehicle: WheeledBase) -> tuple[list[int], list[int], list[float]]:
-    """Return the joints of the left and of the right driven wheels, and the stall torques in N m, left before right."""
+    """Return the left joints, the right joints, and the stall torques in N m (left before right) of driven wheels."""
     wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.is_driven]
     left, right = [pair for pair in wheels if pair[0].is_left], [pair for pair in wheels if not pair[0].is_left]
     return [j for _, j in left], [j for _, j in right], [w.stall_torque for w, _ in left + right]
 
 
 def is_rolling(client: int, robot: int, joints: Sequence[int], radius: float) -> bool:
-    """Return whether any wheel is too fast to be held in position; `radius` is that of the wheels in m."""
+    """Return whether any wheel turns faster than MAX_HOLD_SPEED_M_S; `radius` is the radius of the wheels in m."""
     speeds = (pybullet.getJointState(robot, joint, physicsClientId=client)[1] for joint in joints)
     return any(abs(speed) * radius > MAX_HOLD_SPEED_M_S for speed in speeds)
 
 
 def hold_wheels(client: int, robot: int, joints: Sequence[int], torques: Sequence[float]) -> None:
-    """Hold the wheel angles with position control, because a robot with velocity control at zero would creep."""
+    """Hold the current wheel angles with position control, so that the robot does not creep."""
     angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
     pybullet.setJointMotorControlArray(
         robot, joints, pybullet.POSITION_CONTROL, targetPositions=angles, forces=torques, physicsClientId=client
@@ -137,7 +140,7 @@ def hold_wheels(client: int, robot: int, joints: Sequence[int], torques: Sequenc
 
 
 def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int) -> tuple[float, float]:
-    """Return the mean angles in rad of the first `left_count` joints and of the others."""
+    """Return the mean angle in rad of the first `left_count` joints, and that of the remaining joints."""
     states = pybullet.getJointStates(robot, joints, client)
     if len(states) == 2:
         return states[0][0], states[1][0]
@@ -146,17 +149,16 @@ def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int)
 
 
 STEERING_RATE_RAD_S = 3.2
-"""Largest steering rate, that of the servo of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
+"""Largest steering rate, that of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
 MIN_STEERING_SPEED_M_S = 0.01
-"""Commanded speed below which the steering angle does not change, because the curvature is undefined at rest."""
+"""Commanded speed below which the steering angle does not change."""
 
 
 class AckermannDrive:
     """Drive of a car that steers its front wheels. It cannot turn in place.
 
-    Inverts the bicycle model: curvature = turn rate / speed, tan(steering angle) = wheel base * curvature. Both front
-    wheels turn around the same point on the line of the rear axle (Ackermann condition; Siegwart et al., Autonomous
-    Mobile Robots, section 3.3).
+    The steering angle follows from the bicycle model: tan(steering angle) = wheel base * turn rate / speed. The angles
+    of the two front wheels differ (Ackermann condition; Siegwart et al., Autonomous Mobile Robots, section 3.3).
     """
 
     def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
@@ -180,11 +182,11 @@ class AckermannDrive:
         self._set_wheels()
 
     def command(self, twist: Twist) -> None:
-        """Set the velocity to drive from now on."""
+        """Set the commanded velocity in the base frame; its lateral component is ignored."""
         self._ramp.command(twist)
 
     def advance(self) -> None:
-        """Steer and accelerate towards the command."""
+        """Run one period of the firmware: steer and accelerate towards the command."""
         steering = self._target_steering()
         if steering != self._steering:
             max_step = self._max_steering_step
@@ -207,7 +209,7 @@ class AckermannDrive:
         self._set_wheels()
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the angles in rad of the left and right rear wheel."""
+        """Return the angle in rad of the left rear wheel, and that of the right rear wheel."""
         return mean_angles(self._client, self._robot, self._left + self._right, len(self._left))
 
     def _set_steering(self) -> None:

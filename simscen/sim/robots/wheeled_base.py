@@ -1,4 +1,4 @@
-"""Base on wheels: a PyBullet multibody with the hull as its base and the wheels as links."""
+"""Wheeled base of a robot: a PyBullet multibody with the hull as its base and the wheels as links."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from simscen.core.geometry import Pose2, Pose3, Vector, rotated
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.body.undercarriage import Wheel, caster_gap, compliant_casters
+from simscen.sim.body.undercarriage import Wheel, caster_gap, casters_for_uneven_ground
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
@@ -18,22 +18,19 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 _new = tuple.__new__
 """Creates a named tuple without the call overhead of its class."""
 KNUCKLE_MASS_RATIO = 0.2
-"""Mass of a steering knuckle relative to that of its wheel."""
+"""Mass of a steering knuckle divided by the mass of its wheel."""
 PIN_RADIUS_M = 0.001
-"""Radius of the sphere that enlarges the extent of a wheel; see `_wheel_shape`."""
+"""Radius of the small sphere that `_wheel_shape` adds to a wheel."""
 ROLL_MARGIN = 1.1
 """Factor by which a wheel may roll farther in a step than the robot's velocity limits allow."""
 HULL_LINK_MASS_KG = 0.001
-"""Mass of a further link of the hull, because the engine requires one; the base has the mass of the chassis."""
+"""Mass of each link of the hull except the base, which has the mass of the chassis."""
 
 
 class WheeledBase:
     """Hull and casters on wheels, for all drives except omnidirectional and mecanum.
 
-    The contact shape of a wheel is a sphere, which touches the ground at a single point in the center plane of the
-    wheel, as datasheets assume, and needs less time than a cylinder. Only hull and casters collide with obstacles.
-    Casters are a separate link, because they have no friction, and because a caster may stand on a ramp, while a hull
-    may not touch it.
+    Wheels are spheres that touch only the ground. Hull and casters collide with obstacles. Casters have no friction.
     """
 
     def __init__(
@@ -45,16 +42,17 @@ class WheeledBase:
         tick_seconds: float = 0.0,
         visual_shape: int = engine.DEFAULT_VISUAL,
     ) -> None:
-        """Place the base at `pose`; `tick_seconds` is 0 for a robot that never drives.
+        """Place the base at `pose`. `terrain` is the uneven ground (None: flat ground).
 
-        `terrain` is the uneven ground, if there is any. The renderer shows `visual_shape`.
+        `tick_seconds` is the duration of a physics step (0: the robot never drives). `visual_shape` is the id of the
+        shape that the renderer shows.
         """
         self._client, self._terrain = client, terrain
         moments, self._base_from_center = body.chassis.principal()
         self._center = self._base_from_center.position
         self._center_from_base = self._base_from_center.inverse()
         self._is_aligned = self._center_from_base.quaternion == IDENTITY
-        casters = compliant_casters(body.casters) if terrain else body.casters
+        casters = casters_for_uneven_ground(body.casters) if terrain else body.casters
         self.id, self.joints, self.hull_links = _build(client, body, casters, tick_seconds, visual_shape)
         self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
@@ -80,7 +78,7 @@ class WheeledBase:
         )  # fmt: skip
 
     def place(self, pose: Pose2) -> None:
-        """Place the base at rest with its base frame on the ground."""
+        """Place the base at rest on the ground."""
         base = self._terrain.standing_pose(pose, self._supports) if self._terrain else Pose3.planar(pose)
         center = base.compose(self._base_from_center)
         pybullet.resetBasePositionAndOrientation(
@@ -106,7 +104,7 @@ class WheeledBase:
         return _new(RobotState, (pose, linear, angular))
 
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
-        """Set the friction of each wheel to that of the floor below it."""
+        """Set the friction of each wheel to the value that `friction` returns at the wheel's (x, y)."""
         base = self.state().pose
         for link, position in self._wheels.items():
             x, y, _ = rotated(base.quaternion, position)
@@ -116,7 +114,7 @@ class WheeledBase:
                 pybullet.changeDynamics(self.id, link, lateralFriction=value, physicsClientId=self._client)
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
+        """Apply an impulse (N s, world frame) at the center of mass during the next step, which takes `seconds`."""
         center = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
@@ -125,7 +123,10 @@ class WheeledBase:
 def _ground_links(
     body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
 ) -> dict[int, float]:
-    """Return `Base.ground_links`: the links of the wheels, and the last link of the `hull` if there are casters."""
+    """Return the links of wheels and casters, each with its smallest z of the contact normal with uneven ground.
+
+    `joints` are the first joints of the wheels, and `hull` are the links of the hull and casters.
+    """
     wheels = [joint + 1 if wheel.is_steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
     return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
 
@@ -133,9 +134,9 @@ def _ground_links(
 def _build(
     client: int, body: RobotBody, casters: Sequence[Solid], tick_seconds: float, visual_shape: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
-    """Create the multibody; return its id, the first joint of each wheel, and the links of the hull.
+    """Create the multibody; return its id, the first joint of each wheel, and the links of the hull and casters.
 
-    The first joint of a steered wheel is its steering joint. The `casters`, if any, are the last link of the hull.
+    The first joint of a steered wheel is its steering joint. The casters, if any, are the last link.
     """
     links: list[_Link] = []
     joints: list[int] = []
@@ -143,8 +144,8 @@ def _build(
         joints.append(len(links))
         max_roll = tick_seconds * (body.limits.linear + body.limits.angular * abs(wheel.y))
         links += _wheel_links(client, wheel, len(links), max_roll)
-    hull_shapes = engine.create_hull_shapes(client, body.hull)
-    first, *others = [*hull_shapes, *engine.create_hull_shapes(client, casters)]
+    hull_shapes = engine.create_robot_shapes(client, body.hull)
+    first, *others = [*hull_shapes, *engine.create_robot_shapes(client, casters)]
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_LINK_MASS_KG, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, center = body.chassis.principal()
@@ -177,7 +178,7 @@ def _build(
 
 
 class _Link(NamedTuple):
-    """Link of a multibody for createMultiBody; parent 0 is the base, k + 1 is link k."""
+    """Link for PyBullet's createMultiBody; parent 0 is the base, and parent k + 1 is link k."""
 
     mass: float
     shape: int
@@ -198,11 +199,10 @@ def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list
 
 
 def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
-    """Create the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere, with a pin if needed.
+    """Create the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere.
 
-    Bullet replaces the contact point of the last step if the wheel has moved it by at most CONTACT_BREAKING_RATIO of
-    the extent of the shape; otherwise, it keeps both points. A sphere that rolls farther would accumulate outdated
-    points, which cost time. The pin, a small sphere on the axle where nothing touches it, enlarges the extent.
+    For a fast wheel, adds a tiny second sphere on the axle, a pin. It enlarges the extent of the shape, so that Bullet
+    discards outdated contact points (see CONTACT_BREAKING_RATIO).
     """
     pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2)
     if pin_distance <= wheel.radius:

@@ -1,4 +1,4 @@
-"""Camera images from PyBullet's software renderer, which is slow but headless and deterministic."""
+"""Camera images from PyBullet's software renderer, which needs no display and is deterministic."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from simscen.sim.bullet import engine, pybullet
 NEAR_PLANE_M = 0.02
 """Distance from the camera below which nothing is rendered."""
 FACES_PER_SHAPE = 20_000
-"""Largest number of faces of a visual shape. Each has three vertices; Bullet accepts 131072, more than needed."""
+"""Largest number of triangles in a visual shape."""
 
 
 def render_image(
@@ -22,8 +22,8 @@ def render_image(
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
     """Return colors (height, width, 3) and depths (height, width) in m along the optical axis, inf beyond `far` m.
 
-    `camera` is the pose of the camera in the world: its x axis is the optical axis, and z points up in the image.
-    `width` and `height` are in pixels; `field_of_view` is horizontal, in rad.
+    `camera` is the pose of the camera in the world frame: x is the optical axis, and z points up in the image. `width`
+    and `height` are in pixels. `field_of_view` is horizontal, in rad.
     """
     eye, target, above = camera.apply(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).tolist()
     up = [a - b for a, b in zip(above, eye, strict=True)]
@@ -47,17 +47,17 @@ def render_image(
 
 @dataclass(frozen=True, eq=False)
 class _VisualBody:
-    """Bodies with the ids `body_ids` that show the `solids` of a movable object."""
+    """Solids of a movable object, and the ids of the bodies that show them."""
 
     solids: tuple[Solid, ...]
     body_ids: tuple[int, ...]
 
 
 class RenderScene:
-    """Visual bodies of the static world and of movable objects that are not primitives, for the renderer.
+    """Visual bodies of all triangle meshes: the static world, and movable objects that are not PyBullet primitives.
 
-    They are necessary because the renderer does not show collision shapes made of triangles. They are created with the
-    first image, because most runs take none.
+    PyBullet's renderer does not show collision shapes that are triangle meshes. The bodies are created with the first
+    image.
     """
 
     def __init__(self, client: int, static: TriangleMesh, triangulate: engine.Triangulate) -> None:
@@ -66,7 +66,7 @@ class RenderScene:
         self._visuals: dict[str, _VisualBody] = {}
 
     def update(self, moving: Mapping[str, tuple[Body, Pose3]]) -> None:
-        """Show the movable objects, given by name, at their current poses; remove the visual bodies of all others."""
+        """Show the movable objects, given by name with their current poses; remove all other movable objects."""
         if not self._is_built:
             self._is_built = True
             engine.set_collision_filter(
@@ -103,7 +103,7 @@ class RenderScene:
         )  # fmt: skip
 
     def _create_shape(self, corners: Array) -> int:
-        """Return a visual shape of triangles (n, 3, 3), each with its own normal."""
+        """Create a visual shape of triangles (n, 3, 3) with flat shading; return its id."""
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         shape: int = pybullet.createVisualShape(

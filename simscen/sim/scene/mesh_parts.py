@@ -1,4 +1,4 @@
-"""Splits the static mesh of a world into parts with bounding boxes, so that a distance query can skip distant parts."""
+"""Splits the static mesh of a world into parts with bounding boxes, so that distance queries can skip distant parts."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class MeshParts:
-    """Parts of a static mesh, sorted by solid. A solid with few faces is one part, a larger one is split into tiles.
+    """Parts of a static mesh, sorted by solid. A solid with few faces is one part; a larger solid is split into tiles.
 
-    Part k belongs to the solid with the index `solids[k]`, and consists of the faces `order[starts[k]:starts[k + 1]]`.
-    `low` and `high` are the corners (n, 3) of the bounding boxes of the parts.
+    Part k belongs to the solid with the index `solids[k]`, and has the face indices `order[starts[k]:starts[k + 1]]`.
+    Its bounding box is from `low[k]` to `high[k]` (x, y, z) in m.
     """
 
     order: Indices
@@ -35,7 +35,7 @@ class MeshParts:
         return self.order[self.starts[part] : self.starts[part + 1]]
 
     def is_whole_solid(self, part: int) -> bool:
-        """Return whether a solid consists of this part only."""
+        """Return whether a solid consists of only this part."""
         return len(self.of_solid(int(self.solids[part]))) == 1
 
     def of_solid(self, solid: int) -> range:
@@ -60,7 +60,7 @@ class MeshParts:
 
 @cached_on_instance
 def parts_of(mesh: TriangleMesh) -> MeshParts:
-    """Return the parts of a mesh; cached."""
+    """Return the parts of a mesh. The result is cached."""
     corners = mesh.vertices[mesh.faces]
     is_large = np.bincount(mesh.owners, minlength=len(mesh.names))[mesh.owners] > MAX_CONVEX_FACES
     tiles = np.where(is_large[:, None], np.floor(corners[:, :, :2].mean(axis=1) / PART_SIZE_M), 0.0)

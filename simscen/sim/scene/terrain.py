@@ -1,8 +1,4 @@
-"""Ground on which robots drive: ramps and other uneven ground above the plane z = 0, and the friction of the floor.
-
-Each convex solid becomes one convex shape, so that a wheel on a ramp does not bump into edges between triangles.
-Concave solids (height fields, meshes) remain triangles, and wheels lose some speed at their edges.
-"""
+"""Ground on which robots drive: ramps and other uneven ground above the plane z = 0, and the friction of the floor."""
 
 import math
 from collections.abc import Mapping
@@ -18,28 +14,24 @@ from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim.bullet import engine, pybullet
 
 RAY_HEIGHT_M = 1000.0
-"""Height above and below the floor between which rays search the ground."""
+"""Height above the floor from which vertical rays search the ground, and depth below the floor where they end."""
 MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
-"""Smallest z of the contact normal of a wheel or caster that stands on the ground; below, it has hit an obstacle.
-
-At an edge of height h, the normal of a wheel of radius r has z = 1 - h / r, so 0.6 is an edge of 0.4 r. A driven wheel
-climbs 0.29 r from standstill, and 0.4 r with some speed; a caster is pushed over anything lower than its center.
-"""
+"""Smallest z of the contact normal of a wheel or caster that stands on the ground. A smaller z means a collision."""
 
 
 class Terrain:
-    """The solids of a static world that wheels can roll on, as bodies in the engine.
+    """Solids of a static world that wheels can roll on, as bodies in the engine. True if there is any.
 
-    `solids` are their indices, and `names` are their names by body id. A terrain without solids is false.
+    `solids` has the indices of the solids, and `names` has their names by body id.
     """
 
     def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:
-        """Create the solids that wheels can roll onto if they climb steps of `max_step` m: the largest wheel radius."""
+        """Create the solids that wheels can roll on. `max_step` is the highest step in m that a wheel can climb."""
         self._client = client
         self.solids: SolidIndices = drivable_solids(static, max_step)
         self.names: dict[int, str | None] = {}
         self.obstacles = static
-        """The rest of the static world, on which no wheel can roll."""
+        """All other solids of the static world."""
         for solid in sorted(self.solids):
             self._add(static, solid)
         if self.solids:
@@ -53,6 +45,7 @@ class Terrain:
         return bool(self.names)
 
     def _add(self, static: TriangleMesh, solid: int) -> None:
+        # A convex solid becomes one shape, so that a wheel on a ramp does not bump into edges between triangles.
         faces = static.faces[static.owners == solid]
         mesh = submesh(static.vertices, faces)
         if is_convex(mesh):
@@ -70,7 +63,7 @@ class Terrain:
             self.names[body] = static.names[solid]
 
     def heights(self, points: Array) -> Array:
-        """Return the heights (n,) in m of the ground at points (n, 2); the highest surface counts."""
+        """Return the heights (n,) in m of the highest ground at points (n, 2)."""
         if not self.names:
             return np.zeros(len(points))
         above = np.column_stack((points, np.full(len(points), RAY_HEIGHT_M))).tolist()
@@ -84,9 +77,9 @@ class Terrain:
         return replace(body, pose=body.pose._replace(z=body.pose.z + height)) if height else body
 
     def standing_pose(self, pose: Pose2, supports: Array) -> Pose3:
-        """Return the base frame of a robot that stands at `pose` on the points `supports` (n, 2) of its own frame.
+        """Return the 3D pose of a robot that stands at `pose` on the ground, tilted like the ground below it.
 
-        The robot stands on the plane that fits the ground best, raised so that no support is below the ground.
+        `supports` (n, 2) are the points of its wheels and casters in the base frame. No support is below the ground.
         """
         heights = self.heights(pose.apply(supports))
         if len(supports) < 3 or not np.ptp(heights):
@@ -102,19 +95,19 @@ class Terrain:
 def is_ground_contact(
     ground: Mapping[int, str | None], min_normal_z: Mapping[int, float], other: int, link: int, normal_z: float
 ) -> bool:
-    """Return whether a robot's link touches the body `other` like a wheel or caster that stands on the ground.
+    """Return whether a contact is that of a wheel or caster with the ground, rather than a collision.
 
-    `ground` are the names of the terrain's bodies by body id. `min_normal_z` has the smallest `normal_z` of each wheel
-    and caster that stands on the ground, by link. `normal_z` is that of the unit normal towards the robot.
+    The contact is between the robot's `link` and the body with the id `other`; `normal_z` is the z of the unit normal
+    towards the robot. `ground` has the bodies of the terrain by id. `min_normal_z` has the smallest `normal_z` of a
+    ground contact by link.
     """
     return other in ground and link in min_normal_z and normal_z >= min_normal_z[link]
 
 
 class FloorFriction:
-    """Named patches of the floor with a friction of their own; a newer patch covers older ones.
+    """Named patches of the floor with their own friction coefficients; a newer patch covers older patches.
 
-    The engine multiplies the frictions of two bodies in contact. The ground has friction 1 and ramps have their own. A
-    wheel gets the friction of the patch below it, or 1 without a patch. On a ramp, both frictions are multiplied.
+    A wheel gets the friction of the patch below it. On a ramp, the engine multiplies it by the friction of the ramp.
     """
 
     def __init__(self) -> None:
@@ -122,7 +115,7 @@ class FloorFriction:
         self._has_expired = False
 
     def __bool__(self) -> bool:
-        """Whether a patch exists or has expired, so that the friction of wheels must be updated."""
+        """Whether a patch exists or has existed, so that the friction of wheels must be updated."""
         return bool(self._patches) or self._has_expired
 
     def add(self, name: str, patch: Patch) -> None:
@@ -132,13 +125,13 @@ class FloorFriction:
         self._patches[name] = patch, (min(xs), min(ys), max(xs), max(ys))
 
     def remove_expired(self, tick: int) -> None:
-        """Remove the patches whose time is over."""
+        """Remove the patches that end at `tick` or before."""
         for name in [name for name, (patch, _) in self._patches.items() if patch.until <= tick]:
             self._has_expired = True
             del self._patches[name]
 
     def friction(self, x: float, y: float) -> float:
-        """Return the friction of the top patch at a point, 1 without a patch."""
+        """Return the friction coefficient of the newest patch at a point in m, or 1 if there is no patch."""
         found = 1.0
         for patch, (left, low, right, high) in self._patches.values():
             if left <= x <= right and low <= y <= high and polygon_contains(patch.outline, (x, y)):

@@ -1,4 +1,4 @@
-"""Creates the static world in the engine. A large world is only created near moving bodies."""
+"""Creates the static world in the engine. A large world is created only near moving bodies, to save time."""
 
 import math
 from typing import NamedTuple
@@ -13,15 +13,15 @@ from simscen.sim.bullet import engine
 from simscen.sim.scene.mesh_parts import parts_of
 
 SMALL_WORLD_FACES = 10_000
-"""Number of faces up to which the whole mesh is created at once."""
+"""Largest number of faces of a mesh that is created at once."""
 TILE_SIZE_M = 4.0
 """Edge length of the square tiles in which a large mesh is created."""
 EXTRA_RADIUS_M = 2.0
-"""Additional radius in which walls are created, so that the next calls have nothing to do."""
+"""Additional radius in which `build_near` creates walls, so that later calls have nothing to do."""
 
 
 class _BuiltDisc(NamedTuple):
-    """Circle in which all walls exist in the engine, in m."""
+    """Circle in m in which all walls exist in the engine."""
 
     x: float
     y: float
@@ -29,10 +29,10 @@ class _BuiltDisc(NamedTuple):
 
 
 class Walls:
-    """Static mesh as bodies with the ids `bodies` in the engine.
+    """Static mesh in the engine. `bodies` has the ids of the created bodies.
 
-    The engine needs time to create each face, and searches all faces at each step. Therefore, a large mesh is created
-    in tiles: before a step, call `build_near` for each moving body that can touch a wall, unless `is_complete`.
+    A large mesh is created in tiles. Unless `is_complete`, call `build_near` before a step for each body that can touch
+    a wall during the step.
     """
 
     def __init__(self, client: int, mesh: TriangleMesh) -> None:
@@ -66,7 +66,7 @@ class Walls:
 
 
 def prepare_walls(mesh: TriangleMesh) -> None:
-    """Compute and cache the parts and tiles of a static mesh, in the process that forks for each run."""
+    """Compute and cache the parts and tiles of a static mesh. Call it in the process that forks for each run."""
     parts_of(mesh)
     if len(mesh.faces) > SMALL_WORLD_FACES:
         _tiles_of(mesh)
@@ -74,4 +74,5 @@ def prepare_walls(mesh: TriangleMesh) -> None:
 
 @cached_on_instance
 def _tiles_of(mesh: TriangleMesh) -> FaceTiles:
+    """Return the tiles of a mesh without the faces on the floor. The result is cached."""
     return tile_faces(mesh.vertices, engine.above_floor(mesh.vertices, mesh.faces), TILE_SIZE_M)

@@ -29,7 +29,7 @@ from simscen.model.robot import (
 )
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
-from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble
+from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble_body
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import LinkTree, MeshReader, MeshSource, build_tree
 from simscen.sim.urdf.wheels import WheelJoint, examine_joints, select_wheels
@@ -229,7 +229,7 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     wheels = tuple(_build_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
     if wheels:
         hull = _without_casters(tree, hull)  # an omnidirectional base has no ground contact
-    return assemble(spec, hull, wheels, _chassis_mass(tree, fixed, base_from_root, scale))
+    return assemble_body(spec, hull, wheels, _chassis_mass(tree, fixed, base_from_root, scale))
 
 
 def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> None:

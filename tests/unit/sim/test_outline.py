@@ -6,7 +6,7 @@ from shapely.geometry import MultiPoint, Polygon
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
-from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, outlines_in_band
+from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, outlines_in_z_range
 
 
 def test_convex_hull_is_shapelys():
@@ -72,6 +72,6 @@ def test_a_shape_has_an_outline_for_each_place_and_none_where_it_does_not_reach(
     box = Box((0.4, 0.2, 0.2))
     solids = [Solid(box, Pose3.planar(Pose2(x, 0.0, 0.0), z)) for x, z in ((0.0, 0.5), (1.0, 0.5), (2.0, 3.0))]
     for _ in range(2):  # the second time it is known
-        here, there = (Polygon(outline).bounds for outline in outlines_in_band(solids, (0.0, 1.0)))
+        here, there = (Polygon(outline).bounds for outline in outlines_in_z_range(solids, (0.0, 1.0)))
         assert (here, there) == (pytest.approx((-0.2, -0.1, 0.2, 0.1)), pytest.approx((0.8, -0.1, 1.2, 0.1)))
-    assert len(outlines_in_band(solids, (0.0, 4.0))) == 3
+    assert len(outlines_in_z_range(solids, (0.0, 4.0))) == 3
