@@ -1,4 +1,4 @@
-"""Build the simulation, robots, sensors, stacks, and faults of a run (the composition root)."""
+"""Build the simulation, robots, sensors, stacks, and faults of a run."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -39,9 +39,10 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 
 
 def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = None) -> RunSetup:
-    """Build everything that one run needs. The stacks are not started yet.
+    """Build everything that one run needs, without starting the stacks.
 
-    `stack_log` is the file for the output of an external stack, before the name of the robot is added.
+    `stack_log` is the file for the output of an external stack (None: no file). With several robots, the name of the
+    robot is added to the file name.
     """
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
@@ -75,11 +76,10 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
 def _directors(
     prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Yield the directors of a run, which start its events and faults.
+    """Yield the directors of a run. A director starts events and faults.
 
-    A single robot has one director. With several robots, the first director is for all events, and one for the faults
-    of each robot follows. The events use the stage of the first robot: an event for another robot names it, and all
-    other events have the same effect on every stage.
+    A single robot has one director. With several robots, one director starts all events on the stage of the first robot,
+    and each robot has another director for its faults.
     """
     spec = prepared.spec
     first, *_ = agents.values()
@@ -102,7 +102,10 @@ def _build_robot(
     stages: dict[str, LiveStage],
     stack_log: Path | None,
 ) -> RobotUnderTest:
-    """Build one robot with its sensors and its stack, and add its stage to `stages`."""
+    """Build one robot with its sensors and its stack.
+
+    The robot's stage (its view of the world) adds itself to `stages`, the stages of all robots by name.
+    """
     spec, robot = prepared.spec, simulation.robots[name]
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
     rays = LiveRayCaster(RayScene(scene), robot)
@@ -137,7 +140,7 @@ def _build_robot(
         stack=stack,
         faults=faults,
         stage=stage,
-        end_condition=EndCondition(clock, spec.time_limit, spec.linger, idle=bool(name) and not prepared.case.goals),
+        end_condition=EndCondition(clock, spec.time_limit, spec.linger, is_idle=bool(name) and not prepared.case.goals),
         schedule=TickSchedule(
             (truth_period, control_period, *suite.periods),
             (*suite.arrivals, *((control_period, latency) for latency in command_latencies(prepared, clock))),
@@ -154,7 +157,7 @@ def _build_stack(
     stack_log: Path | None,
     disturb_belief: Callable[[Belief], Belief],
 ) -> Stack:
-    """Build the stack of a robot. Active faults change each belief of its localizer through `disturb_belief`."""
+    """Build the stack of a robot. `disturb_belief` applies active faults to each belief of the localizer."""
     world = prepared.built.world
     surroundings = Surroundings(
         robot=robot_model(prepared.body),
@@ -182,7 +185,7 @@ def _build_stack(
 
 
 class TruthSensor:
-    """Sensor for the `ground_truth` localizer: true pose (map frame) and velocity as an odometry message."""
+    """Sensor that gives the `ground_truth` localizer the true pose (map frame) and velocity as odometry."""
 
     name = "ground_truth"
 

@@ -1,16 +1,15 @@
 """The lockstep loop: physics, sensors, stack, and recording take turns on one clock.
 
-A beat is a tick at which a sensor, a stack, or a truth sample of any robot is due (a control cycle in the docs).
-Each pass of the loop processes one beat:
+A tick is one physics step. A beat is a tick at which a sensor, a stack, or a sample of the true state is due. Each pass
+of the loop processes one beat:
 
-1. observe: update where each robot is and which collisions happened
-2. direct: start the events and faults of the scenario whose triggers fire
-3. decide: read the sensors that are due, apply faults, and request a command from each stack
-4. record: append what happened to the logs
-5. drive: pass the commands to the wheels, then simulate until the next beat
+1. observe: sample the true states, and collect new collisions
+2. direct: start the events and faults whose triggers fire
+3. decide: read the sensors, apply faults, and request a command from each stack
+4. record: append the beat to the logs
+5. drive: send the commands to the wheels, and simulate until the next beat
 
-All robots decide before any robot moves. The stack sees readings only, never the truth. Nothing here reads the wall
-clock, so the speed of the machine has no effect on a run.
+All robots decide before any robot moves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -35,20 +34,19 @@ TIME_LIMIT = "time limit"
 class EndCondition:
     """Condition under which one robot is done: `linger` seconds after its navigation task, or at the time limit.
 
-    A goal that an event sends during these `linger` seconds cancels the end. The run ends when all robots are done, at
-    a regular sample of the truth or exactly at the time limit, where an additional sample is taken.
+    A new goal during these `linger` seconds cancels the end. The run ends when all robots are done.
     """
 
-    def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
-        """`time_limit` and `linger` in seconds. An `idle` robot has no task at first and does not delay the end."""
+    def __init__(self, clock: Clock, time_limit: float, linger: float, is_idle: bool = False) -> None:
+        """`time_limit` and `linger` are in seconds. A robot that `is_idle` starts without a task and counts as done."""
         self.time_limit_tick = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
-        self._end_tick: int | None = 0 if idle else None
+        self._end_tick: int | None = 0 if is_idle else None
         self.earliest_tick = self._earliest()
         """Earliest tick at which the robot can be done."""
 
     def update(self, decision: Decision) -> None:
-        """Update from the robot's decision. Must be called for each decision that has events."""
+        """Process the events in a decision of the robot's stack. Call it for each decision that has events."""
         for event in decision.events:
             if event.kind == EventKind.NAVIGATION_ENDED:
                 self._end_tick = event.tick + self._linger
@@ -60,7 +58,7 @@ class EndCondition:
         return self.time_limit_tick if self._end_tick is None else min(self._end_tick, self.time_limit_tick)
 
     def end_event(self, tick: int) -> Event | None:
-        """Return the event with which the robot is done at this tick, or None. The tick must have a truth sample."""
+        """Return the event that ends the run for this robot at `tick`, or None if the robot is not done."""
         if self._end_tick is not None and tick >= self._end_tick:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
         if tick >= self.time_limit_tick:
@@ -69,9 +67,9 @@ class EndCondition:
 
 
 def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
-    """Return the event that ends the run at this tick, or None if a robot is not done yet.
+    """Return the event that ends the run at `tick`, or None if a robot is not done yet.
 
-    If some robots end at the time limit and others with their task, it is the event of the time limit.
+    If any robot is done because of the time limit, returns the event of the time limit.
     """
     run_end: Event | None = None
     for condition in conditions:
@@ -86,8 +84,7 @@ def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None
 class RobotUnderTest:
     """A robot with its sensors, its stack, its faults, and its logs.
 
-    `observe` must be called at each beat. If the beat is one of this robot, so that `is_due` becomes true, `decide`,
-    `record`, and `drive` follow.
+    Call `observe` at each beat. If `is_due` is true afterwards, call `decide`, `record`, and `drive`.
     """
 
     robot: Robot
@@ -95,10 +92,10 @@ class RobotUnderTest:
     stack: Stack
     faults: FaultInjector
     stage: LiveStage
-    """The world as triggers observe it and actions change it, from the point of view of this robot."""
+    """View of the world for triggers and actions, from the point of view of this robot."""
     end_condition: EndCondition
     schedule: TickSchedule
-    """The ticks of this robot's beats."""
+    """Ticks of this robot's beats."""
     truth_period: int
     """Ticks between two samples of the true state."""
     logs: tuple[MomentSink, ...] = ()
@@ -111,7 +108,7 @@ class RobotUnderTest:
     _truth: Truth | DeferredTruth | None = field(default=None, init=False)
 
     def observe(self, tick: int) -> None:
-        """Sample the true state if a sample is due, and report new collisions."""
+        """Sample the true state if a sample is due, and record new collisions."""
         self.is_due = tick == self.next_tick
         if self.is_due:
             self.next_tick = tick + self.schedule.until_next(tick)
@@ -127,7 +124,7 @@ class RobotUnderTest:
             self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
-        """Deliver orders (such as a new goal), read the sensors, apply faults, and let the stack choose a command."""
+        """Deliver orders of events (such as a new goal), read sensors, apply faults, and get the stack's command."""
         stage, faults = self.stage, self.faults
         if stage.pending_orders:
             stage.deliver_orders(tick)
@@ -143,13 +140,13 @@ class RobotUnderTest:
         self.moment = Moment(tick, self._truth, readings, decision, events)
 
     def record(self, end: Event | None) -> None:
-        """Append the beat to all logs, with the event that ends the run if this is the last beat."""
+        """Append the beat to all logs. `end` is the event that ends the run (None: the run continues)."""
         moment = self.moment if end is None else replace(self.moment, events=(*self.moment.events, end))
         for log in self.logs:
             log.append(moment)
 
     def drive(self) -> None:
-        """Send the stack's command to the wheels, as changed by active faults."""
+        """Apply active faults to the stack's command, and send it to the wheels."""
         command = self.moment.decision.command
         self.robot.drive(self.faults.command(self.moment.tick, command) if self.faults.has_faults else command)
 
@@ -161,7 +158,7 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
-    """Each starts the events and faults whose triggers fire."""
+    """Directors that start the events and faults whose triggers fire."""
     truth_period: int
     """Ticks between two samples of the true state."""
 

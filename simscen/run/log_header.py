@@ -1,4 +1,4 @@
-"""Build the header of a run's log from the prepared scenario, once for all of its runs."""
+"""Build the header of a run's log from the prepared scenario."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -38,7 +38,7 @@ _CACHE: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
 
 
 def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
-    """Return the log header of a run."""
+    """Return the log header of a run. Builds the header once for all runs of a scenario."""
     header = _CACHE.get(prepared)
     if header is None:
         header = _CACHE[prepared] = _build_header(prepared)
@@ -62,23 +62,23 @@ def _robot_header(prepared: PreparedScenario) -> LogHeader:
         robot_description=to_urdf(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={**_key_facts(prepared), **{log_header_key(entry): requirement_of(entry) for entry in prepared.plugins}},
+        facts={**_run_facts(prepared), **{log_header_key(entry): requirement_of(entry) for entry in prepared.plugins}},
     )
 
 
-def _key_facts(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the stack chosen on the command line and the names of stack and variation, if they are given."""
+def _run_facts(prepared: PreparedScenario) -> dict[str, str]:
+    """Return the stack from the command line, its name, and the name of the variation, without empty values."""
     loaded = prepared.loaded
     facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
     return {name: value for name, value in facts.items() if value}
 
 
 DECIMALS = 3
-"""Decimals of coordinates in m in the scenery."""
+"""Number of decimals of coordinates (m) in the scenery."""
 
 
 def world_scenery(prepared: PreparedScenario) -> Scenery:
-    """Return the visible parts of the world and the zones of all robots."""
+    """Return the objects, regions, and zones that viewers show."""
     world, each = prepared.built.world, prepared.each
     diameter = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
     same = all(part.map is prepared.built.map for part in each.values())
@@ -115,7 +115,7 @@ def _drivable_surfaces(mesh: TriangleMesh, diameter: float) -> Iterator[Drivable
 
 
 def _zones(part: PreparedScenario, robot: str) -> Iterator[FilterZone]:
-    """Yield the zones of a robot's stack at the start of the run."""
+    """Yield the keepout and speed zones of a robot's stack at the start of the run."""
     regions, masks = part.built.world.regions, part.masks
     for region in part.stack.keepout:
         yield FilterZone("keepout", region, regions[region], robot=robot)

@@ -1,7 +1,4 @@
-"""Prepare a scenario: build everything that all of its runs share, such as world, map, goals, and shortest paths.
-
-The result holds only plain data and numpy arrays, so that the fork server can build it once for all workers.
-"""
+"""Prepare a scenario: build everything that its runs share, such as world, map, goals, and shortest paths."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -48,17 +45,16 @@ from simscen.worlds.routes.shortest_paths import Leg, legs_between
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Height at which the world is mapped for a robot without a lidar."""
+"""Height of the map of the world for a robot without a lidar."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedScenario:
-    """A scenario with its world, map, and robots built: everything about a run except the seed.
+    """A scenario with its world, map, and robots: everything about a run except the seed.
 
-    `map` (None without one), `masks`, and the initial `estimate` are what the stack gets; `start` is the true pose.
-
-    With several robots, `robots` holds a PreparedScenario for each by name, and the fields about a robot are those of
-    the first.
+    The stack receives `map` (None: no map), `masks`, and `estimate` (the initial pose estimate). `start` is the true
+    initial pose. With several robots, `robots` has a PreparedScenario for each robot by name, and all other fields
+    about a robot are those of the first robot.
     """
 
     loaded: LoadedScenario
@@ -74,37 +70,37 @@ class PreparedScenario:
     obstacles: TriangleMesh
     """The part of the world's mesh that blocks the robot."""
     map_faults: tuple[int, ...] = ()
-    """The indices of the faults that changed the map."""
+    """Indices of the faults that have changed the map."""
     plugins: tuple[Entry, ...] = ()
-    """The plug-ins that the scenario uses."""
+    """Plug-ins that the scenario uses."""
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
 
     @property
     def each(self) -> Mapping[str, "PreparedScenario"]:
-        """The prepared scenario of each robot by name; the name of a single robot is ""."""
+        """Prepared scenario of each robot by name. The name of a single robot is ""."""
         return self.robots or {ROBOT_NAME: self}
 
     @property
     def spec(self) -> ScenarioSpec:
-        """The specification of the scenario."""
+        """Specification of the scenario."""
         return self.loaded.spec
 
 
 BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
-"""Function that returns the built world of a scenario, with the map that a lidar at this height in m would see."""
+"""Function that builds the world of a scenario, with the map at a lidar height in m."""
 
 FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
-"""Function that returns the shortest path from each pose to its goal, for a disc with this radius in m."""
+"""Function that returns the shortest path from each pose to its goal, for a disc with a radius in m."""
 
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
-    """Build the world of a scenario, with the map that a lidar at `height` m would see; uses no cache."""
+    """Build the world of a scenario, with the map at a lidar height of `height` m, without a cache."""
     world = with_stops_in_bounds(load_world(loaded), loaded)
     return build_world_and_map(world, height, map_resolution(loaded, world))
 
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
-    """Return the resolution in m of the world's map: coarser in a large world if no robot uses this map."""
+    """Return the resolution in m of the world's map. In a large world, it is coarser if no robot uses the map."""
     is_used = any(view.map is None for view in loaded.robot_views.values())
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
@@ -112,10 +108,7 @@ def map_resolution(loaded: LoadedScenario, world: World) -> float:
 def prepare(
     loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
-    """Build what the runs of this scenario share; `build` and `find_legs` can be functions that use a cache.
-
-    Raises InvalidInput for unusable files.
-    """
+    """Return the prepared scenario. Raises InvalidInput for unusable files."""
     if not loaded.robots:
         return _prepare_robot(loaded, build, find_legs)
     parts: dict[str, PreparedScenario] = {}
@@ -175,9 +168,9 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
 
 
 def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
-    """Return the case with the shortest paths to its goals and the narrow passages along them.
+    """Return the case with the shortest paths to its goals, and with the narrow passages on these paths.
 
-    The path to a goal starts at the last goal before it that the robot is expected to reach, or else at `start`.
+    The path to a goal starts at the previous goal that the robot is expected to reach, or at the initial pose.
     """
     ends, pose = [], case.start
     for goal in case.goals:
@@ -192,7 +185,7 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
-    """Return the largest clearance range in m that a criterion or trigger needs."""
+    """Return the largest clearance in m that a criterion or trigger needs to distinguish."""
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
     ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
@@ -200,19 +193,20 @@ def _clearance_range(spec: ScenarioSpec) -> float:
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
+    """Return the map that the stack receives, or None if it receives none."""
     if loaded.map == "none":
         return None
     return load_map(loaded.map) if loaded.map is not None else built.map
 
 
 def lidar_height(robot: RobotSpec) -> float:
-    """Return the height in m of the robot's first lidar, at which the world is mapped."""
+    """Return the height in m of the robot's first lidar, or DEFAULT_LIDAR_HEIGHT_M without a lidar."""
     heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
 
 
 def effective_stack(spec: ScenarioSpec) -> AnyStack:
-    """Return the stack of a scenario; without a map, the default localizer is dead reckoning instead of AMCL."""
+    """Return the stack of a scenario. Without a map, it uses dead reckoning instead of the default localizer AMCL."""
     stack = spec.stack
     if not isinstance(stack, StackSpec):
         return stack
@@ -223,7 +217,7 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
 
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
-    """Return the case with which a criteria file judges a recorded log. Raises InvalidInput.
+    """Return the case (facts that criteria need besides the log) for a criteria file. Raises InvalidInput.
 
     If the file names no robot, the case has no footprint.
     """
@@ -250,7 +244,7 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
 
 
 def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
-    """Load the filter masks that the criteria of a criteria file name, by path as written. Raises InvalidInput."""
+    """Load the filter masks that the criteria of a criteria file use, by path. Raises InvalidInput."""
 
     def sourced(problem: Problem) -> Problem:
         return criteria.library.with_source([problem])[0]

@@ -24,7 +24,7 @@ PACKAGES = (
     *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
     *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
 )
-"""Python packages that affect results or the bytes of a log."""
+"""Python packages that affect the results or the log of a run."""
 _RELEVANT_CPU_FLAGS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
 """Instruction sets that affect the last bits of results."""
 
@@ -46,9 +46,9 @@ def cpu_flags() -> list[str]:
 
 @cache
 def arithmetic_fingerprints() -> dict[str, str]:
-    """Return a fingerprint of the last bits of computed results by library: OpenBLAS, C math library, and NumPy.
+    """Return a digest of sample results of each library (OpenBLAS, C math library, NumPy), by name.
 
-    These libraries choose instructions at run time, so the processor flags alone are not sufficient.
+    The digests show differences in the last bits, because these libraries choose processor instructions at run time.
     """
     import numpy as np
 
@@ -86,10 +86,7 @@ def _numpy_features() -> dict[str, bool]:
 
 @cache
 def source_digest(*parts: str) -> str:
-    """Return the SHA-256 of simscen's source files, because a working copy changes without a new version.
-
-    Only the subpackages and modules (`name.py`) in `parts` count, if there are any.
-    """
+    """Return the SHA-256 of simscen's source files, or only of the subpackages and modules (`name.py`) in `parts`."""
     sha, folder = hashlib.sha256(), PACKAGE
     roots = [folder / part for part in parts or (".",)]
     files = [path for root in roots for path in ([root] if root.is_file() else root.rglob("*"))]
@@ -106,7 +103,7 @@ def _version(package: str) -> str:
 
 
 def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
-    """Return `version` and `used` entry points of each package with plug-ins, by package name, for run.json."""
+    """Return the `version` and the `used` entry points of each package with plug-ins, by package name."""
     found: dict[str, dict[str, object]] = {}
     for entry in plugins:
         package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
@@ -117,7 +114,7 @@ def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
 
 
 def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
-    """Return package, version, class, and digest of all files of each plug-in, by group and name."""
+    """Return the package, its version, the class, and the digest of all files of each plug-in, by "GROUP NAME"."""
     return {
         f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
         for entry in plugins
@@ -125,14 +122,14 @@ def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
 
 
 def _files_digest(value: str) -> str:
-    """Return the SHA-256 of all files of the top-level package that contains the class `value`, or of its module."""
+    """Return the SHA-256 of the files of the top-level package that contains the class `value` ("module:Class")."""
     stats = ((name, file, file.stat()) for name, file in _files(value))
     return _digest_of_files(tuple((name, file, stat.st_mtime_ns, stat.st_size) for name, file, stat in stats))
 
 
 @lru_cache(maxsize=64)
 def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
-    """Return the SHA-256 of files; modification time and size are arguments so that changed files are read again."""
+    """Return the SHA-256 of files, each given as name, path, modification time in ns, and size in bytes. Cached."""
     sha = hashlib.sha256()
     for name, file, _, _ in files:
         _hash_file(sha, name, file.read_bytes())
@@ -145,6 +142,7 @@ def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
 
 
 def _files(value: str) -> Iterator[tuple[str, Path]]:
+    """Yield name and path of each file of the top-level package that contains the class `value` ("module:Class")."""
     found = importlib.util.find_spec(value.partition(":")[0])
     if found is None or found.origin is None:
         return
@@ -164,10 +162,10 @@ class ScenarioDigests(NamedTuple):
     """SHA-256 digests of a scenario.
 
     Attributes:
-        run: Digest of all files, options, versions, and processor features that affect a run. An old result is reused
-            only if this digest is equal.
+        run: Digest of all files, options, versions, and processor features that affect a run, except the seed. An old
+            result is reused only if this digest is equal.
         definition: Digest of the scenario without the parameters of its stacks, and of its world, robots, maps, and
-            meshes. Results of two versions of a stack or of simscen are compared only if this digest is equal.
+            meshes. Results of two stacks are compared only if this digest is equal.
     """
 
     run: str
@@ -177,10 +175,7 @@ class ScenarioDigests(NamedTuple):
 def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     """Return the digests of a scenario. Raises OSError if a file cannot be read.
 
-    The files are the scenario with `extends`, `defaults.yaml`, world, map, and robot, and all files that these refer
-    to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. `run` changes if a file moves or
-    if an installed plug-in that the scenario uses changes. `definition` depends neither on the folders of files nor on
-    comments in the scenario.
+    `run` depends on the paths of files. `definition` depends neither on their folders nor on comments in the scenario.
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
     files = {
@@ -208,7 +203,7 @@ def _definition(loaded: LoadedScenario) -> dict[str, Any]:
 
 
 def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario or robot with only those parameters of its stack that apply to every stack."""
+    """Return a scenario or robot with only the parameters of its stack that all types of stacks have."""
     stack = entry.get("stack")
     keys = StackBase.model_fields.keys() - {"controller_frequency"}
     common = {key: stack[key] for key in sorted(keys) if key in stack} if isinstance(stack, Mapping) else {}
@@ -216,11 +211,11 @@ def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 DEFINING_SUFFIXES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
-"""Suffixes of the text files of worlds and robots, whose content is part of the digest `definition`."""
+"""Suffixes of text files that are part of the digest `definition`: worlds and robots."""
 
 
 def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
-    """Return everything besides files and the seed that affects a run."""
+    """Return everything that affects a run, except files and the seed."""
     return {
         "versions": software_versions(),
         "code": source_digest(),
@@ -235,7 +230,7 @@ def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def _stacks(loaded: LoadedScenario) -> dict[str, object]:
-    """Return the stack that was chosen on the command line or in the user's configuration, for each robot."""
+    """Return the stack of each robot if it was chosen on the command line or in the user's configuration."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.external_command is None else {"runs": loaded.external_command.digest}),
@@ -254,7 +249,7 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
 
 
 def _portable_name(file: Path, loaded: LoadedScenario) -> str:
-    """Return the path relative to the root, so that moving a whole project does not change the digest."""
+    """Return the path of a file relative to the scenario's root folder, or the absolute path outside of it."""
     return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
@@ -266,7 +261,7 @@ def _hash_file(sha: "hashlib._Hash", name: str, data: bytes) -> None:
 def scenario_files(loaded: LoadedScenario) -> set[Path]:
     """Return all files that a scenario depends on, including programs of external stacks and plug-ins.
 
-    A `defaults.yaml` next to the scenario is included even if it does not exist yet.
+    Includes `defaults.yaml` next to the scenario even if it does not exist.
     """
     choice = loaded.choice
     programs = [

@@ -17,22 +17,22 @@ from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 TICK_RATE_HZ = 240
 COMMAND_PERIOD_TICKS = TICK_RATE_HZ // FIRMWARE_RATE_HZ
-"""Ticks between two commands; the robot reaches each velocity before the next command."""
+"""Ticks between two commands."""
 REST_TICKS, SETTLING_TICKS = 240, 60
 """Ticks at rest before the first trial and after each leg."""
 LINE_LENGTH_M, SQUARE_SIDE_M = 2.0, 1.0
 """Lengths of the straight line and of a side of the square."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.5, 1.0
-"""Largest speeds of the trials."""
+"""Largest linear and angular speeds of the trials."""
 SPEED_FRACTION, ACCELERATION_FRACTION = 0.8, 0.5
-"""Largest fractions of the robot's own limits of speed and acceleration that the trials use."""
+"""Largest speed and acceleration of the trials, divided by the robot's limits."""
 CIRCLE_RADIUS_FACTOR = 1.05
-"""Radius of the circle of a robot with Ackermann steering, relative to its smallest one; leaves room to correct."""
+"""Radius of the circle that an Ackermann robot drives, divided by its smallest turning radius."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion from the origin: distance `driven` in m, angle `turned` in rad, and the `path` of poses."""
+    """A motion from the origin along the poses of `path`: distance `driven` in m, and angle `turned` in rad."""
 
     driven: float
     turned: float
@@ -46,9 +46,9 @@ class Motion:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial drive: the motion that was commanded, the one that noise-free odometry reports, and the true one.
+    """One trial drive: the commanded motion, the motion by odometry without noise, and the true motion.
 
-    `tilt` is the largest angle in rad between the base and its orientation at rest.
+    `tilt` is the largest angle in rad by which the base leans while driving.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class RestingState:
-    """State after a second at rest: `tilt` in rad; `height` of the base frame above the ground and `drift` in m."""
+    """State after one second at rest: tilt in rad, height of the base frame above the ground in m, and drift in m."""
 
     tilt: float
     height: float
@@ -69,7 +69,7 @@ class RestingState:
 
 @dataclass(frozen=True)
 class _Leg:
-    """A motion from rest to rest: `forward` and `left` in m, and `turn` in rad counterclockwise, all at once."""
+    """A motion from rest to rest at a constant ratio: forward in m, left in m, and turn in rad (counterclockwise)."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -77,7 +77,7 @@ class _Leg:
 
 
 def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
-    """Drive a line, a turn in place (with Ackermann steering: a circle), a square, and, if holonomic, sideways.
+    """Drive a line, a turn in place (an Ackermann robot: a circle), a square, and a holonomic robot also sideways.
 
     Raises RunError if the simulation becomes unstable.
     """
@@ -90,6 +90,7 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
 
 def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
+    """Return the legs of each trial by its name."""
     radius = 0.0
     if isinstance(body.drive, Ackermann):
         radius = CIRCLE_RADIUS_FACTOR * body.drive.wheel_base / math.tan(body.drive.max_steering)
@@ -155,7 +156,7 @@ def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
 
 
 class _MotionRecorder:
-    """Sum of the motion along a sequence of poses that starts at the origin."""
+    """Collects poses from the origin on, and sums up distances and angles."""
 
     def __init__(self) -> None:
         self._path, self._driven, self._turned = [Pose2(0.0, 0.0, 0.0)], 0.0, 0.0
@@ -175,12 +176,12 @@ class _MotionRecorder:
 
 
 def _tilt(pose: Pose3, level: Pose3) -> float:
-    """Return the angle in rad between the upward axes of two poses."""
+    """Return the angle in rad between the z axes of two poses (small angles)."""
     return math.dist(_lean(pose), _lean(level))
 
 
 def _lean(pose: Pose3) -> tuple[float, float]:
-    """Return the lean of the upward axis forward and to the left, in rad (small angles)."""
+    """Return the angles in rad by which the z axis leans forward and to the left (small angles)."""
     x, y, z, w = pose.quaternion
     return 2 * (w * y - z * x), -2 * (w * x + y * z)
 
@@ -188,19 +189,19 @@ def _lean(pose: Pose3) -> tuple[float, float]:
 MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.002, 0.001
 """Largest values at rest: tilt, distance of the wheels from the ground, and drift in a second."""
 MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
-"""Largest relative errors of the distance driven on a line: from the commanded distance, and from odometry."""
+"""Largest relative errors on a line: true distance compared with the command, and odometry compared with the truth."""
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
-"""Largest heading at the end of the line, and largest tilt of the base at any time."""
+"""Largest heading at the end of the line, and largest tilt of the base while driving."""
 NEGLIGIBLE_CORRECTION = 0.005
-"""Relative deviation of a dimension that needs no correction."""
+"""Largest relative deviation of a dimension that needs no correction."""
 
 
 class TurnLimits(NamedTuple):
     """Largest relative errors in trials with turns.
 
     Attributes:
-        angle: True angle of the turn, compared with the commanded one.
-        odometry: Angle of the turn by odometry, compared with the true one.
+        angle: True angle of the turn, compared with the commanded angle.
+        odometry: Angle of the turn by odometry, compared with the true angle.
         square_end: Distance from the true end of the square to its end by odometry, relative to its length.
         offset: Distance from the start while turning in place, relative to the circumscribed radius.
     """
@@ -213,13 +214,12 @@ class TurnLimits(NamedTuple):
 
 ROLLING_LIMITS = TurnLimits(angle=0.02, odometry=0.02, square_end=0.02, offset=0.05)
 SKID_STEER_LIMITS = TurnLimits(angle=0.10, odometry=0.03, square_end=0.04, offset=0.50)
-"""Larger, because skid-steer robots turn as if their track were wider, by a ratio that changes with load and speed
-(Mandow et al., Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
+"""Limits for robots without and with skid steering, whose turns depend on load and speed (Mandow et al., IROS 2007)."""
 
 
 @dataclass(frozen=True)
 class DriveCheck:
-    """A measured value and its limit, both in `unit`. `advice` is a possible correction."""
+    """A measured value and its upper limit, both in `unit`. `advice` is a possible correction, or ""."""
 
     name: str
     value: float
@@ -299,12 +299,12 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
 
 
 def _deviation_check(name: str, value: float, expected: float, limit: float, advice: str = "") -> DriveCheck:
-    """Return a check of the deviation from the correct value, in percent of it."""
+    """Return a check of the relative deviation of `value` from `expected` in percent; `limit` is a ratio."""
     return DriveCheck(name, 100 * abs(value - expected) / max(abs(expected), 1e-9), 100 * limit, "%", advice)
 
 
 def _offset_advice(body: RobotBody) -> str:
-    """Describe the offset of the center of mass, which shifts the center of rotation of a skid-steer robot."""
+    """Return a message about the offset of the center of mass from the center of the wheels."""
     x, y, _ = body.chassis.center.tolist()
     longitudinal = f"{abs(x):.3f} m {'ahead of' if x > 0 else 'behind'}"
     lateral = f"{abs(y):.3f} m to the {'left' if y > 0 else 'right'} of"
@@ -312,7 +312,7 @@ def _offset_advice(body: RobotBody) -> str:
 
 
 def _wheel_radius_advice(drive: Drive, line: Trial) -> str:
-    """Return the wheel radius for which odometry would be correct."""
+    """Return a message with the wheel radius that makes odometry correct, or "" if it is unknown."""
     radius = getattr(drive, "wheel_radius", None)
     if radius is None or line.odometry.driven <= 0:
         return ""
@@ -320,7 +320,7 @@ def _wheel_radius_advice(drive: Drive, line: Trial) -> str:
 
 
 def _track_width_advice(drive: Drive, turn: Trial, line: Trial) -> str:
-    """Return the effective track width for which odometry would be correct."""
+    """Return a message with the track width that makes odometry correct, or "" if it is correct or unknown."""
     separation = getattr(drive, "wheel_separation", None)
     if separation is None or turn.truth.turned * turn.odometry.turned <= 0 or line.odometry.driven <= 0:
         return ""

@@ -1,4 +1,4 @@
-"""Connection of a robot with its stack: robot model, sensors, latencies, and the ticks at which something is due."""
+"""Interface between a robot and its stack: robot model, sensors, latencies, and the ticks at which the stack acts."""
 
 import math
 from collections import deque
@@ -38,13 +38,13 @@ def robot_model(body: RobotBody) -> RobotModel:
 
 
 def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the class name of the readings of each sensor, such as "Scan", by sensor name in reading order."""
+    """Return the class name of the readings of each sensor, such as "Scan", by sensor name."""
     truth = {TRUTH: Odometry.__name__} if prepared.stack.gets_ground_truth else {}
     return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | truth
 
 
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
-    """Return the mount pose in the base frame of each sensor that has one, by sensor name."""
+    """Return the pose in the base frame of each sensor with a mount, by sensor name."""
     mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
     return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}
 
@@ -53,7 +53,7 @@ StackT = TypeVar("StackT", bound=StackBase)
 
 
 def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
-    """Return the stack with the latencies of the robot's file if it has `latency: robot`, else the same stack."""
+    """Return the stack. If it has `latency: robot`, its latencies are those of the robot's specification."""
     if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(
@@ -62,7 +62,7 @@ def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
 
 
 def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, int]:
-    """Return the latency of each sensor in ticks, by name."""
+    """Return the latency of each sensor in ticks, by sensor name."""
     latencies = prepared.robot.latency.sensors if _uses_robot_latency(prepared.stack) else {}
     sensors = {name: sensor.chosen for name, sensor in prepared.robot.sensors.items()}
     return {
@@ -73,7 +73,7 @@ def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, i
 
 
 def command_latencies(prepared: PreparedScenario, clock: Clock) -> Iterator[int]:
-    """Yield the delays in ticks after which commands of a control step take effect; none without latencies."""
+    """Yield the delays in ticks from a control step to its commands; yields nothing for a stack without latencies."""
     stack = with_robot_latency(prepared.stack, prepared.robot)
     if isinstance(stack, StackSpec) and isinstance(stack.latency, Latency):
         yield clock.ticks(stack.latency.controller)
@@ -85,13 +85,10 @@ def _uses_robot_latency(stack: StackBase) -> bool:
 
 
 class SensorSuite:
-    """The sensors of a robot, in the order of its specification.
-
-    A reading carries the tick at which it was measured. It reaches the stack after the latency of its sensor.
-    """
+    """Sensors of a robot. A reading reaches the stack after the latency of its sensor."""
 
     def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int] | None = None) -> None:
-        """`latencies`: ticks from measurement to arrival at the stack, by sensor name."""
+        """`latencies` are in ticks by sensor name (default: 0)."""
         self._sensors = tuple(sensors)
         latencies = latencies or {}
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
@@ -101,17 +98,17 @@ class SensorSuite:
 
     @property
     def periods(self) -> tuple[int, ...]:
-        """The period of each sensor in ticks."""
+        """Period of each sensor in ticks."""
         return tuple(sensor.period for sensor in self._sensors)
 
     @property
     def arrivals(self) -> tuple[tuple[int, int], ...]:
-        """Period and latency in ticks of each sensor with a latency."""
+        """Period and latency in ticks of each sensor that has a latency."""
         pairs = zip(self.periods, self._latencies, strict=True)
         return tuple((period, latency) for period, latency in pairs if latency)
 
     def read(self, tick: int) -> Readings:
-        """Return the readings that arrive at this tick."""
+        """Return the readings that reach the stack at `tick`."""
         if self._without_latency is not None:
             return tuple([sensor.read(tick) for sensor, period in self._without_latency if tick % period == 0])
         readings: list[Reading] = []
@@ -124,13 +121,10 @@ class SensorSuite:
 
 
 class TickSchedule:
-    """Ticks at which something is due: multiples of periods, and ticks at fixed delays after such multiples.
-
-    Each tick is computed on demand, because a table up to the least common multiple of the periods could be large.
-    """
+    """Due ticks: all multiples of some periods, and ticks at a fixed delay after each multiple of some periods."""
 
     def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
-        """All in ticks. `delayed` has pairs of a period and the delay after each of its multiples."""
+        """`delayed` are pairs (period, delay after each multiple of the period). All numbers are in ticks."""
         offsets = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
         first, *others = sorted(
             offset for offset in offsets if not any(_is_covered_by(offset, other) for other in offsets)
@@ -146,6 +140,6 @@ class TickSchedule:
 
 
 def _is_covered_by(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Return whether `other` includes all ticks of `one`; both are (period, offset) in ticks, and must differ."""
+    """Return whether `other` includes all ticks of `one` and differs from it; both are (period, offset) in ticks."""
     (period, offset), (other_period, other_offset) = one, other
     return one != other and period % other_period == 0 and offset % other_period == other_offset

@@ -1,8 +1,4 @@
-"""Cache prepared scenarios in memory, and maps and shortest paths of worlds on disk.
-
-Maps and shortest paths take most of the time to prepare a scenario. Meshes are not cached, because reading and merging
-them is faster than looking them up.
-"""
+"""Cache prepared scenarios in memory, and maps and shortest paths of worlds on disk."""
 
 import contextlib
 import hashlib
@@ -39,18 +35,18 @@ from simscen.worlds.routes.shortest_paths import Leg, legs_between
 CACHE_DIR_VARIABLE, CACHE_OFF = "SIMSCEN_CACHE_DIR", "off"
 """Environment variable with the absolute path of the cache folder, and its value that disables the disk cache."""
 CACHE_FORMAT = "worlds-1"
-"""Name of the subfolder for entries; must change with their format."""
+"""Name of the subfolder for entries. Change it when the format of entries changes."""
 MAX_CACHE_BYTES = 256_000_000
-"""Size limit of the cache on disk. The least recently used entries are deleted first."""
+"""Size limit of the disk cache. The least recently used entries are deleted first."""
 MAX_ENTRY_BYTES = 32_000_000
-"""Size limit of one entry; larger ones are not stored."""
+"""Size limit of one entry; a larger entry is not stored."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def cache_folder(environment: Mapping[str, str]) -> Path | None:
-    """Return the folder for entries in $SIMSCEN_CACHE_DIR, or else in simscen in $XDG_CACHE_HOME or ~/.cache.
+    """Return the folder for entries: in $SIMSCEN_CACHE_DIR, $XDG_CACHE_HOME/simscen, or ~/.cache/simscen.
 
-    Returns None, to disable the disk cache, if $SIMSCEN_CACHE_DIR is `off` or not absolute, or without a home folder.
+    Returns None if $SIMSCEN_CACHE_DIR is `off` or not absolute, or if there is no home folder.
     """
     if (configured := environment.get(CACHE_DIR_VARIABLE)) is not None:
         return Path(configured) / CACHE_FORMAT if configured != CACHE_OFF and Path(configured).is_absolute() else None
@@ -61,7 +57,7 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """Cache with one file per entry, whose name is the key of the entry. Concurrent sessions can share the folder.
+    """Cache with one file for each entry, named like its key. Concurrent sessions can share the folder.
 
     Without a `folder`, the cache is disabled. `max_bytes` limits the total size of all entries.
     """
@@ -76,7 +72,7 @@ class DiskCache:
         return self._folder is not None
 
     def get(self, key: str) -> bytes | None:
-        """Return the entry of a key and mark it as used, or return None if the entry is missing or damaged."""
+        """Return the entry of a key, or None if the entry is missing or damaged."""
         if self._folder is None or not is_private_folder(self._folder):
             return None
         try:
@@ -93,7 +89,7 @@ class DiskCache:
         return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST_BYTES] else None
 
     def put(self, key: str, content: bytes) -> None:
-        """Store an entry, unless it is too large or the folder does not belong to this user alone."""
+        """Store an entry. Does nothing if the entry is too large or the folder cannot be used."""
         data = hashlib.sha256(key.encode() + content).digest() + content
         if self._folder is None or len(data) > min(MAX_ENTRY_BYTES, self._max_bytes):
             return
@@ -145,7 +141,7 @@ def _prune(folder: Path, max_bytes: int) -> int:
 
 
 def _files(folder: Path) -> list[tuple[int, int, str]]:
-    """Return time of last use (ns), size (bytes), and name of each file."""
+    """Return the time of last use (ns), size (bytes), and name of each file."""
     files = []
     with os.scandir(folder) as entries:
         for entry in entries:
@@ -158,19 +154,19 @@ def _files(folder: Path) -> list[tuple[int, int, str]]:
 
 _LEGS = TypeAdapter(list[Leg])
 _MAP_HEADER = struct.Struct("<II4d")
-"""Rows, columns, resolution (m), and origin (x, y, yaw) of a map, before its cells."""
+"""Rows, columns, resolution (m), and origin (x, y, yaw) of a map. The cells follow."""
 _CODE_PARTS = ("core", "grid_graph.py", "worlds")
-"""Packages and modules of simscen whose code affects the cached results."""
+"""Subpackages and modules of simscen that affect the cached results."""
 
 
 class CachedWorldBuilder:
-    """Reads maps and shortest paths from the disk cache, or computes them. Both give the same bits."""
+    """Reads maps and shortest paths from the disk cache, or computes them."""
 
     def __init__(self, cache: DiskCache) -> None:
         self._cache = cache
 
     def build(self, world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
-        """Return the world with its mesh, and its map (cells of `resolution` m) at the height of the lidar in m."""
+        """Return the world with its mesh and its map. `lidar_height` (height of the map) and `resolution` are in m."""
         if not self._cache.is_enabled:
             return build_world_and_map(world, lidar_height, resolution)
         mesh = merge_solids(world.solids)
@@ -198,9 +194,9 @@ class CachedWorldBuilder:
 
 
 def cache_key(*parts: object) -> str:
-    """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of such values.
+    """Return the cache key (a SHA-256) of a result that depends on `parts`: numbers, strings, arrays, and sequences.
 
-    The key, a SHA-256, also depends on the versions of simscen and other software, and on the processor.
+    The key also depends on the versions of simscen and other software, and on the processor.
     """
     sha = hashlib.sha256(_environment_key())
     _update_hash(sha, parts)
@@ -209,7 +205,7 @@ def cache_key(*parts: object) -> str:
 
 @cache
 def _environment_key() -> bytes:
-    """Return the versions, code, and arithmetic that affect the last bits of results."""
+    """Return the versions, source code digest, and arithmetic fingerprints on which all keys depend."""
     return repr((software_versions(), source_digest(*_CODE_PARTS), arithmetic_fingerprints())).encode()
 
 
@@ -252,11 +248,11 @@ def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:
 
 
 MAX_SCENARIOS = 100
-"""Largest number of prepared scenarios in memory; a file can have a thousand variations."""
+"""Largest number of prepared scenarios in memory."""
 
 
 class ScenarioCache:
-    """Prepared scenarios and built worlds in the memory of the fork server, which all workers inherit from it."""
+    """Prepared scenarios and built worlds in memory. Forked worker processes inherit them."""
 
     def __init__(self, builder: CachedWorldBuilder) -> None:
         self._builder = builder
@@ -265,7 +261,7 @@ class ScenarioCache:
         self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
 
     def get_or_prepare(self, loaded: LoadedScenario) -> PreparedScenario:
-        """Return the prepared scenario, and keep it. Raises InvalidInput for unusable files."""
+        """Return the prepared scenario, from memory if possible. Raises InvalidInput for unusable files."""
         name = loaded.id, loaded.variation, loaded.stack_name
         cached = self._scenarios.get(name)
         if cached is None or cached.loaded != loaded:

@@ -1,4 +1,4 @@
-"""Simulate a prepared scenario in lockstep, record the run, and judge it; in a worker, also write its files."""
+"""Simulate a prepared scenario in lockstep, record the run, judge it, and write its files."""
 
 import gc
 import hashlib
@@ -29,7 +29,7 @@ from simscen.run.preparation import PreparedScenario
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
-"""Function that receives the setup and the logs of the first robot; returns additional logs for this robot."""
+"""Function that receives the setup of a run and the logs of its first robot; returns additional logs for this robot."""
 
 
 def simulate(
@@ -42,11 +42,11 @@ def simulate(
 ) -> Run:
     """Run a prepared scenario with a seed (default: the scenario's own) and judge the run.
 
-    `log` is the MCAP file to write; None writes no log. `attach` is called before the first beat. `stack_log` is the
+    `log` is the MCAP file to write (None: no log). `attach` is called before the simulation starts. `stack_log` is the
     file for the output of an external stack; with several robots, the name of the robot is added to the file name.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, regardless of earlier runs in
-    this process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
+    this process. Raises RunError if the run cannot be completed, and OSError if the log cannot be written.
     """
     try:
         return _run_and_judge(prepared, prepared.spec.seed if seed is None else seed, log, attach, stack_log)
@@ -99,7 +99,7 @@ def _run_and_judge(
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
-    """End the processes of external stacks: all at the same time, so that their grace periods do not add up."""
+    """End the processes of external stacks, all at the same time."""
     for stack in stacks:
         stack.release()
     for stack in stacks:
@@ -107,7 +107,7 @@ def _close(stacks: Collection[ExternalStack]) -> None:
 
 
 def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
-    """Return the facts about external stacks for the log; with several robots, prefixed with the robot's name."""
+    """Return the facts about external stacks for the log, by `FACT` for a single robot, else by `ROBOT.FACT`."""
     return {
         f"{name}.{fact}" if name else fact: value
         for name, stack in externals.items()
@@ -116,13 +116,13 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
 
 
 def _with_stacks(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
-    """Return the run with the descriptions of its external stacks, which are given by robot name."""
+    """Return the run with the descriptions of its external stacks; `descriptions` has them by robot name."""
     robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
     return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
 
 
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
-    """Judge the traces of all robots, given by robot name. `log` is the MCAP file that the run names."""
+    """Judge the traces (recorded states and events) of all robots, given by robot name. `log` is the MCAP file."""
     if not prepared.robots:
         return _judge_robot(prepared, seed, traces[ROBOT_NAME], log)
     runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.robots.items()}
@@ -150,41 +150,40 @@ def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path 
 
 
 def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
-    """Return a RunError that names the plug-in whose code raised the exception; None if no plug-in did."""
+    """Return a RunError with the name of the plug-in that raised an exception, or None if no plug-in raised it."""
     packages = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__", ""))
         if module.partition(".")[0] in packages:
-            entry = _nearest(module, plugins)
+            entry = _plugin_of_module(module, plugins)
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
             summary = f"{type(error).__name__}: {error}".splitlines()[0]
             return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {summary} ({place})")
     return None
 
 
-def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
-    """Return the plug-in that is defined in a module, or the first of its package."""
+def _plugin_of_module(module: str, plugins: Sequence[Entry]) -> Entry:
+    """Return the plug-in that is defined in a module, or else the first plug-in of the module's package."""
     package = module.partition(".")[0]
     candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
     return next((entry for entry in candidates if entry.value.partition(":")[0] == module), candidates[0])
 
 
 GC_THRESHOLD = 20_000
-"""Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time."""
+"""First threshold of Python's garbage collection in a worker process; a larger threshold saves time."""
 
 WriteExtras = Callable[[PreparedScenario, Run, Path], None]
-"""Function that writes further files of a run to a folder, for example a picture."""
+"""Function that writes additional files of a run to a folder, for example a picture."""
 
 
 def execute_run(
     prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[MomentSink, ...], write_extras: WriteExtras
 ) -> dict[str, Any]:
-    """Execute a run in a worker and write run.mcap, result.json, scenario.yaml, and extra files to `folder`.
+    """Execute a run in a worker process, and write all its files to `folder`.
 
-    The output of an external stack goes to stack.log and its description to stack.json; with several robots, to
-    stack.ROBOT.log and stack.ROBOT.json. `logs` also receive the moments of the first robot.
-
-    Returns the end record for the supervisor: the `outcome`, and `sha256` of the log.
+    The files are run.mcap, result.json, scenario.yaml, for an external stack stack.log and stack.json (with several
+    robots stack.ROBOT.log and stack.ROBOT.json), and those of `write_extras`. The moments (recorded beats) of the first
+    robot are also sent to `logs`. Returns the `outcome`, and `sha256`, the digest of run.mcap.
     """
     if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)

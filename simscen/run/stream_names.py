@@ -1,4 +1,4 @@
-"""Name the random stream of each event and fault so that a change of one entry does not affect the others."""
+"""Names of the random streams of events and faults. A change of one entry does not affect the streams of others."""
 
 import json
 from collections import Counter
@@ -13,10 +13,10 @@ from simscen.spec.choice import Choice
 
 
 def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
-    """Return the name of the random stream of each entry; it does not depend on other entries or on the order.
+    """Return the name of the random stream of each entry.
 
-    The stream of an entry with a `name` has this name, and stays the same if the entry is edited. The stream of another
-    entry is named after its content. Entries with equal names or contents are numbered.
+    The stream of an entry with a `name` has this name. Any other stream is named after the content of its entry.
+    Entries with equal names or contents are numbered.
     """
     contents = [f"/{entry.name}" if entry.name is not None else f"={_content_key(entry)}" for entry in entries]
     counts: Counter[str] = Counter()
@@ -28,6 +28,7 @@ def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list
 
 
 def _content_key(entry: BaseModel) -> str:
+    """Return the content of an entry as JSON, without defaults."""
     if any(isinstance(part, Choice) and part.original_class is not None for _, part in walk(entry)):
         return json.dumps(_plain(entry), sort_keys=True)
     _build_serializers(entry)
@@ -35,11 +36,7 @@ def _content_key(entry: BaseModel) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return the content of a specification as plain data, without defaults.
-
-    pydantic would serialize only the fields of the declared class, and a choice from an installed package is an
-    instance of another class.
-    """
+    """Return the content of a specification as plain data, without defaults. Unlike pydantic, includes plug-ins."""
     if isinstance(value, RootModel):
         return _plain(value.root)
     if isinstance(value, BaseModel):
@@ -55,7 +52,7 @@ def _plain(value: Any) -> Any:
 
 
 def _build_serializers(value: object) -> None:
-    """Build the serializers of all nested models, because pydantic 2.11 does not do so for unpickled models."""
+    """Build the serializers of all nested models, which pydantic 2.11 does not do for unpickled models."""
     if isinstance(value, BaseModel):
         type(value).model_rebuild()
         for _, inner in value:

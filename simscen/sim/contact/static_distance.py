@@ -160,7 +160,7 @@ class StaticDistance:
     def _encloses(self, solid: int, point: Vector) -> bool:
         """Return whether a solid encloses a point."""
         parts, vertices = self._parts, self._mesh.vertices
-        tiles = parts.of_solid(solid)
+        tiles = parts.parts_of_solid(solid)
         if len(tiles) > 1:
             low, high = parts.low[tiles.start : tiles.stop], parts.high[tiles.start : tiles.stop]
             tilt = max(LINE_TILT) * max(high[:, 2].max() - point[2], point[2] - low[:, 2].min())

@@ -91,7 +91,7 @@ class PlanarBase:
         pybullet.applyExternalForce(self.id, 2, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
-        """Limit the motor force by the friction coefficient that `friction` returns at the center (x, y) of the base."""
+        """Limit the motor force by the friction coefficient that `friction` returns at the base's (x, y)."""
         x, y, _ = self.pose()
         self._floor_friction = friction(x, y)
 

@@ -36,16 +36,16 @@ class MeshParts:
 
     def is_whole_solid(self, part: int) -> bool:
         """Return whether a solid consists of only this part."""
-        return len(self.of_solid(int(self.solids[part]))) == 1
+        return len(self.parts_of_solid(int(self.solids[part]))) == 1
 
-    def of_solid(self, solid: int) -> range:
+    def parts_of_solid(self, solid: int) -> range:
         """Return the indices of the parts of a solid."""
         first, last = np.searchsorted(self.solids, (solid, solid + 1)).tolist()
         return range(first, last)
 
     def faces_of_solid(self, solid: int) -> Indices:
         """Return the indices of all faces of a solid."""
-        parts = self.of_solid(solid)
+        parts = self.parts_of_solid(solid)
         return self.order[self.starts[parts.start] : self.starts[parts.stop]]
 
     def solids_around(self, point: Vector) -> list[int]:

@@ -41,20 +41,21 @@ AXLE_TOLERANCE_M = 0.02
 MAX_UPSIDE_DOWN_Z = -0.9
 """Cosine of the angle between the z axes of lidar and robot, below which the lidar is mounted upside down."""
 DEFAULT_MAX_STEERING_RAD = 0.5
-"""Largest steering angle of a car whose steering joints have no limits, or have limits of 90 degrees or more."""
+"""Largest steering angle of a car whose steering joints have no limits below 90 degrees."""
 MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
-"""Range of plausible steering angles; the limit of a steering joint is clipped to it."""
+"""Range to which the limit of a steering joint is clipped."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
-"""Words in the names of links that carry a lidar."""
+"""Parts of the names of links that carry a lidar."""
 ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
 
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
     """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
 
-    Driven wheels make a differential drive if they are on one axle, else a skid-steer drive; steered wheels make a car.
-    Limits are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or lower if the wheel joints are slower. The lidar is at the link
-    with a name like LIDAR_NAMES, or on top. Raises InvalidInput if the file is invalid or its drive cannot be inferred.
+    A robot with steered wheels has an Ackermann drive, one with a single axle a differential drive, and any other robot
+    a skid-steer drive. Limits are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or lower if the wheel joints are slower. The
+    lidar is at a link with a name like LIDAR_NAMES, or on top of the robot. All files must be in `roots` (default: the
+    folder of `path`). Raises InvalidInput if the file is invalid or its drive cannot be inferred.
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
@@ -102,17 +103,16 @@ def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, 
 def _skid_factor(axles: Sequence[float]) -> float:
     """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for axles at x = `axles` in m.
 
-    Coulomb friction at the corners of a rectangle gives 1. The factors were measured with `simscen robot check`. They
-    differ, because wheels in the middle roll instead of skidding, and keep the others from slipping.
+    The factors for two, three, and more axles were measured with `simscen robot check`.
     """
     gaps = sum(after - before > AXLE_TOLERANCE_M for before, after in pairwise(sorted(axles)))
     return {1: 1.2, 2: 0.1}.get(gaps, 0.3)
 
 
 def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
-    """Return the largest steering angle in rad of a virtual wheel in the middle, from the limits of steering joints.
+    """Return the largest steering angle in rad of the bicycle model, from the limits of the steering joints.
 
-    The inner wheel turns more: cot(middle) = cot(inner) + ratio, where ratio is wheel separation / (2 * wheel base).
+    `ratio` is wheel separation / (2 * wheel base). cot(bicycle angle) = cot(angle of the inner wheel) + ratio.
     """
     ranges = [min(-wheel.steering.limits.lower, wheel.steering.limits.upper) for wheel in wheels if wheel.steering]
     limits = [angle for angle in ranges if 0 < angle < math.pi / 2]
@@ -123,7 +123,7 @@ def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
 
 
 def _describe_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
-    """Describe the wheels that were found, and why the other movable joints are not wheels."""
+    """Return a message with the names of all wheels, and the reasons why the other movable joints are not wheels."""
     if not wheels and not others:
         return "it has no movable joints"
     groups: dict[str, list[str]] = {"left": [], "right": []}
@@ -136,10 +136,11 @@ def _describe_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) 
 
 
 MAX_LISTED = 4
-"""Maximum number of joints, and of reasons, in a message."""
+"""Maximum number of names, and of reasons, in a message."""
 
 
 def _shortened(names: Sequence[str]) -> str:
+    """Return a list of at most MAX_LISTED names for a message."""
     more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
     return ", ".join(names[:MAX_LISTED]) + more if names else "none"
 
@@ -166,21 +167,22 @@ def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint
 
 
 MAX_CASTER_SIZE_RATIO = 0.35
-"""Largest length and width of a link that touches the ground and counts as a caster, relative to those of the hull."""
+"""Largest length and width of a caster, divided by the length and width of the hull."""
 
 
 def read_spec_tree(
-    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
+    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, located: RobotFiles | None
 ) -> LinkTree:
-    """Read the links and joints of `spec.urdf`, a path relative to `file` unless `found` is given. Raises InvalidInput.
+    """Read the links and joints of a robot's URDF. Raises InvalidInput.
 
-    The files must be in `roots` (default: the folder of `file`); meshes cannot be read without `read_mesh`.
+    The URDF is at the path in `located`, or by default at `spec.urdf` relative to the robot's `file`. All files must be
+    in `roots` (default: the folder of `file`). Without `read_mesh`, the URDF must not have meshes.
     """
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
-    folders = AllowedFolders.of(roots or (folder,), found.packages if found else None)
+    folders = AllowedFolders.of(roots or (folder,), located.packages if located else None)
     try:
-        path = found.urdf if found else folders.find(spec.urdf, folder)
+        path = located.urdf if located else folders.find(spec.urdf, folder)
     except UnusableFile as trouble:
         shown = folders.display_path(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
@@ -190,7 +192,7 @@ def read_spec_tree(
 def read_tree(
     path: Path, folders: AllowedFolders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> LinkTree:
-    """Read the links and joints of a URDF or xacro file; `arguments` are those of xacro. Raises InvalidInput."""
+    """Read the links and joints of a URDF or xacro file. `arguments` are xacro arguments. Raises InvalidInput."""
     path = folders.resolve_parent(path)
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
@@ -206,12 +208,12 @@ def read_tree(
 
 
 def _xml_text(argument: str | float | bool) -> str:
-    """Return an argument as text for an XML file."""
+    """Return the text of a xacro argument."""
     return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
 def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
-    """Build the body of a robot from its links. All joints but those of wheels are fixed at 0. Raises InvalidInput."""
+    """Build the body of a robot from its links. All joints except those of wheels are at 0. Raises InvalidInput."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
@@ -249,7 +251,7 @@ def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> 
 
 
 def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
-    """Raise InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
+    """Raise InvalidInput unless there are four wheels, one at each corner."""
     middle = np.mean([wheel.center[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
     corners = {(wheel.center[0] > middle[0], wheel.center[1] > middle[1]) for wheel in wheels}
     if len(wheels) != 4 or len(corners) != 4:
@@ -260,7 +262,7 @@ def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
 
 
 def _check_front_steering(wheels: Sequence[WheelJoint]) -> None:
-    """Raise InvalidInput for a car whose steered wheels are not in front of the driven ones."""
+    """Raise InvalidInput if the steered wheels are not in front of the other wheels."""
     steered = [wheel for wheel in wheels if wheel.is_steered]
     if not steered:
         return
@@ -276,7 +278,7 @@ def _check_front_steering(wheels: Sequence[WheelJoint]) -> None:
 
 
 def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
-    """Return the root frame in the base frame, which is on the ground below the center of the driven axles."""
+    """Return the pose of the root frame in the base frame: on the ground below the center of the driven axles."""
     if not wheels:
         return Pose3(0.0, 0.0, -min(_lowest_z(solid) for solid in solids))
     x, y, _ = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0).tolist()
@@ -288,7 +290,7 @@ def _lowest_z(solid: Solid) -> float:
 
 
 def _mass_scale(spec: RobotSpec, tree: LinkTree) -> float:
-    """Return the factor by which all masses must be multiplied so that the robot has the specified mass."""
+    """Return the factor that makes the sum of all masses equal to the specified mass; 1 if no mass is specified."""
     total = sum(link.mass.mass for link in tree.links.values() if link.mass is not None)
     if total <= 0:
         raise InvalidInput([tree.element.problem("no link has a mass", "give its <inertial> a <mass>")])
@@ -323,9 +325,9 @@ def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale
 
 
 def _without_casters(tree: LinkTree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
-    """Return the hull without small parts that touch the ground, which are casters.
+    """Return the hull without casters: small parts that touch the ground.
 
-    Raises InvalidInput if a large part touches the ground, because it would drag over the ground.
+    Raises InvalidInput if a large part touches the ground.
     """
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)

@@ -1,4 +1,4 @@
-"""Parses the links and joints of a URDF (wiki.ros.org/urdf/XML) to a tree. Visual elements are ignored."""
+"""Parses the links and joints of a URDF (wiki.ros.org/urdf/XML) to a tree. Ignores visual elements."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ MeshReader = Callable[[Path], Mesh]
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A rigid link: its collision shapes and mass properties in its own frame. `mass` is None without `<inertial>`."""
+    """A link with its collision shapes and mass properties in the link frame. `mass` is None without `<inertial>`."""
 
     name: str
     solids: tuple[Solid, ...]
@@ -43,7 +43,7 @@ class JointLimits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint: `pose` of the child frame in the parent frame, and unit `axis` of motion in the child frame."""
+    """A joint. `pose` is that of the child frame in the parent frame, `axis` a unit vector in the child frame."""
 
     name: str
     type: str
@@ -59,8 +59,8 @@ class Joint:
 class MeshSource:
     """Finds and reads the meshes of a URDF.
 
-    `folder` is the folder of the URDF, and `folders` are those that may be read. `read` is None if meshes cannot be
-    read. `is_from_xacro` states that the URDF was expanded from a xacro file, so that absolute paths are allowed.
+    `folder` is the folder of the URDF, and `folders` are the folders that may be read. `read` is None if meshes are not
+    supported. Absolute paths are allowed if the URDF `is_from_xacro`.
     """
 
     folder: Path
@@ -69,7 +69,7 @@ class MeshSource:
     is_from_xacro: bool = False
 
     def mesh(self, element: Element) -> Mesh:
-        """Read the mesh of a `<mesh>` element; raises InvalidElement with its line."""
+        """Read the file of a `<mesh>` element, and apply its scale; raises InvalidElement."""
         uri = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
@@ -91,6 +91,7 @@ class MeshSource:
         return Mesh(vertices, mesh.faces)
 
     def _find(self, uri: str) -> Path:
+        """Return the path of a mesh file; raises UnusableFile."""
         try:
             return self.folders.find(uri, self.folder, absolute=self.is_from_xacro)
         except NoSuchFile:
@@ -186,14 +187,16 @@ def _mass(inertial: Element) -> MassProperties:
 
 
 MAX_LINKS = 200
-"""Maximum number of links; Bullet takes 19 s to load 1000."""
+"""Maximum number of links."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkTree:
-    """Links and joints by name. `poses` are the poses of the links in the frame of the `root` link, all joints at zero.
+    """Links and joints of a URDF by name. `element` is the `<robot>`.
 
-    `child_joints` are the joints whose parent is a link, by the name of the link.
+    root:          name of the root link
+    poses:         poses of all links in the frame of the root link, by name, with all joints at zero
+    child_joints:  joints below each link, by the name of the link
     """
 
     name: str
@@ -205,14 +208,14 @@ class LinkTree:
     element: Element = field(repr=False)
 
     def subtree(self, link: str) -> Iterator[str]:
-        """Yield the names of a link and all its descendants."""
+        """Yield the name of a link and the names of all links below it."""
         yield link
         for joint in self.child_joints.get(link, []):
             yield from self.subtree(joint.child)
 
 
 def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
-    """Build the tree of a `<robot>`. Raises InvalidInput with all problems of its links and joints."""
+    """Build the tree of a `<robot>` element. Raises InvalidInput with all problems of its links and joints."""
     if robot.tag != "robot":
         raise InvalidInput([robot.problem(f"expected <robot>, got <{robot.tag}>")])
     if sum(1 for _ in robot.all("link")) > MAX_LINKS:
@@ -240,6 +243,7 @@ def _add(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", elem
 
 
 def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> LinkTree:
+    """Return the tree that joints make of links. Raises InvalidInput unless there is exactly one root link."""
     problems = []
     parents: dict[str, Joint] = {}
     child_joints: dict[str, list[Joint]] = {}

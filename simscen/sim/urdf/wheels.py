@@ -1,4 +1,4 @@
-"""Finds the wheels and the steering joints of a URDF, and warns about misaligned ones."""
+"""Finds the wheels and steering joints of a URDF, and warns about wheels and casters at wrong heights."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,27 +14,27 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.elements import Joint, LinkTree
 
 MIN_AXIS_COSINE = 0.99
-"""Cosine of the largest angle (8 degrees) between a joint axis and an axis of the root frame that it is parallel to."""
+"""Smallest cosine of the angle between two axes that count as parallel (8 degrees)."""
 ROTARY_JOINT_TYPES = ("revolute", "continuous")
-"""Types of joints that can steer or turn a wheel; a vertical prismatic joint is a suspension."""
+"""Types of joints that can steer or turn a wheel."""
 ROUNDNESS_TOLERANCE = 0.05
-"""Largest difference between the radii of a round mesh, and largest offset from its axis, relative to the radius."""
+"""Largest deviation of the radius of a round mesh, and largest offset from its axis, divided by the radius."""
 MIN_CASTER_TRAIL_RADII = 0.1
-"""Distance along x, in wheel radii, between wheel and swivel axis, above which it is a caster, not a steered wheel."""
+"""Smallest trail of a caster in wheel radii: the distance along x between the wheel center and the swivel axis."""
 MIN_WHEEL_RANGE_RAD = 20 * math.pi
 """Smallest range of a revolute joint that counts as continuous: ten turns."""
 MAX_WHEEL_GAP_RADII = 0.25
-"""Largest height of a wheel that stands on the ground above the lowest wheel, in radii of the wheel."""
+"""Largest gap below a wheel that counts as standing on the ground, in wheel radii."""
 MIN_DRIVEN_RADIUS_RATIO = 0.75
-"""Smallest radius of a driven wheel relative to the largest one; smaller ones are rollers, unless they are steered."""
+"""Smallest radius of a driven wheel, divided by the radius of the largest driven wheel."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
-    """A wheel with its `center` in the root frame; lengths are in m.
+    """A wheel with its `center` in the root frame. Lengths are in m.
 
-    `joint` is the joint about which it rolls, and `steering` is its steering joint, if any. `trail` is the distance
-    along x between its center and the axis of the steering joint.
+    `joint` is the joint about which it rolls. `steering` is its steering joint (None: not steered), and `trail` the
+    distance along x between its center and the steering axis.
     """
 
     joint: Joint
@@ -47,24 +47,24 @@ class WheelJoint:
 
     @property
     def bottom(self) -> float:
-        """Height in m of its lowest point in the root frame."""
+        """Height in m of the lowest point of the wheel in the root frame."""
         return self.center[2] - self.radius
 
     @property
     def is_left(self) -> bool:
-        """Whether it is on the left side."""
+        """Whether the wheel is on the left side."""
         return self.center[1] > 0
 
     @property
     def is_caster(self) -> bool:
-        """Whether it swivels freely instead of being steered."""
+        """Whether the wheel swivels freely instead of being steered."""
         return self.is_steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
 def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
-    """Return the wheels in a URDF, and the names of the other movable joints by the reason why they are not wheels.
+    """Return the wheels in a URDF, and the names of all other movable joints by the reason why they are not wheels.
 
-    A wheel is a joint with a lateral axis, whose child link is round and stands on the ground.
+    A wheel is a joint about the y axis with a round child link that stands on the ground.
     """
     joints = [joint for joint in tree.joints.values() if joint.type != "fixed"]
     steering_joints = [
@@ -98,7 +98,7 @@ def _stands_on(ground: float, wheel: WheelJoint) -> bool:
 
 
 def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
-    """Return why a joint has no wheel, or "" if it has one. `wheel` is the result of `_measure_wheel`."""
+    """Return the reason why a joint has no wheel, or "" if it has one. `wheel` is the result of `_measure_wheel`."""
     if not _turns_freely(joint):
         return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
     axis = _parallel_axis(tree, joint)
@@ -110,12 +110,12 @@ def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None)
 
 
 def _turns_freely(joint: Joint) -> bool:
-    """Return whether a joint is continuous, or revolute with limits that no drive reaches."""
+    """Return whether a joint is continuous, or revolute with a range of at least MIN_WHEEL_RANGE_RAD."""
     return joint.type in ROTARY_JOINT_TYPES and joint.limits.upper - joint.limits.lower >= MIN_WHEEL_RANGE_RAD
 
 
 def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
-    """Return a wheel with its steering joint and trail, if it has a steering joint."""
+    """Return a wheel with its steering joint and trail, or the same wheel if it has no steering joint."""
     for joint in steering_joints:
         if wheel.joint.child in tree.subtree(joint.child):
             return replace(wheel, trail=abs(wheel.center[0] - tree.poses[joint.child].x), steering=joint)
@@ -123,7 +123,7 @@ def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[
 
 
 def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
-    """Return the wheels of a drive: those in its specification, or the inferred ones. Raises InvalidInput."""
+    """Return the wheels on the joints that the drive names, or else all wheels in the URDF. Raises InvalidInput."""
     if isinstance(drive, Omnidirectional):
         return []
     steering = drive.steering if isinstance(drive, Ackermann) else None
@@ -151,13 +151,13 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
 
 
-def _steered_links(tree: LinkTree, knuckles: Sequence[Joint]) -> set[str]:
+def _steered_links(tree: LinkTree, steering_joints: Sequence[Joint]) -> set[str]:
     """Return the names of all links below the steering joints."""
-    return {link for joint in knuckles for link in tree.subtree(joint.child)}
+    return {link for joint in steering_joints for link in tree.subtree(joint.child)}
 
 
 def _measure_wheel(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
-    """Return the wheel on a joint, measured by its collision shapes, or None if none of them is round."""
+    """Return the wheel on a joint, with the size of its first round collision shape, or None if no shape is round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
         match solid.shape:
@@ -174,9 +174,9 @@ def _measure_wheel(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | 
 
 
 def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None:
-    """Return center (in the frame of the joint), radius, and width of a mesh in m; None if it is not round.
+    """Return the center in the child link's frame, the radius, and the width of a round mesh in m, or None.
 
-    It is round if its extents in eight directions across the axis of the joint are equal.
+    A mesh is round if its extents in eight directions perpendicular to the joint axis are equal.
     """
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     across = np.linalg.svd(axis[None])[2][1:]  # two unit vectors (2, 3) perpendicular to the axis
@@ -193,7 +193,7 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
 
 
 def _parallel_axis(tree: LinkTree, joint: Joint) -> str:
-    """Return the axis of the root frame that a joint axis is parallel to: x, y, z, or "" for none."""
+    """Return the axis of the root frame ("x", "y", or "z") that is parallel to a joint axis, or "" if none is."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
     parts = rotation.compose(Pose3(*joint.axis)).position
     return "".join(name for name, part in zip("xyz", parts, strict=True) if abs(part) >= MIN_AXIS_COSINE)
@@ -204,11 +204,11 @@ ALIGNMENT_CODE = "SC405"
 HEIGHT_TOLERANCE_M = 0.0005
 """Largest difference in m between the heights of parts that stand on the ground."""
 MAX_CASTER_GAP_M = 0.003
-"""Largest gap in m below a caster without a warning; the robot then stands on another caster, or tilts slightly."""
+"""Largest gap in m below a caster without a warning."""
 MAX_CASTER_HEIGHT_M = 0.02
-"""Height in m above the ground up to which a small link is probably meant to be a caster."""
+"""Largest height in m above the ground of a small link that is probably meant to be a caster."""
 MAX_CASTER_SIZE_M = 0.1
-"""Largest length and width of a small link in m."""
+"""Largest length and width in m of a link that is probably meant to be a caster."""
 
 
 def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:

@@ -1,4 +1,4 @@
-"""Writes the body of a robot as URDF, which viewers read from the topic /robot_description of a log."""
+"""Writes the body of a robot as URDF, for the topic /robot_description of a log."""
 
 import math
 from xml.etree import ElementTree as ET
@@ -13,9 +13,9 @@ BASE_LINK = "base_link"
 
 
 def to_urdf(body: RobotBody) -> str:
-    """Return URDF text: the base link with the hull in the base frame, and a continuous joint for each wheel.
+    """Return URDF text: a base link with the hull, and a continuous joint with a link for each wheel.
 
-    Capsules become cylinders, and other shapes that URDF does not support become their bounding boxes.
+    Capsules become cylinders. All other shapes that URDF does not support become bounding boxes.
     """
     robot = ET.Element("robot", name=body.name)
     base = ET.SubElement(robot, "link", name=BASE_LINK)

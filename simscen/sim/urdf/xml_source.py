@@ -1,4 +1,4 @@
-"""Reads URDF and xacro files as XML elements, with errors that refer to the line of an element."""
+"""Reads URDF and xacro files as XML elements. Errors contain the line of an element."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC400"
-"""Code of all errors in a robot's URDF."""
+"""Error code of all problems in a robot's URDF."""
 
 
 class InvalidElement(Exception):
-    """An element is invalid. `problem` contains the reason and the line."""
+    """Error in an XML element. `problem` contains the reason and the line."""
 
     def __init__(self, element: "Element", message: str, hint: str = "") -> None:
         self.problem = element.problem(message, hint)
@@ -42,7 +42,7 @@ class Element(markup.Element):
     def numbers(
         self, attribute: str, count: int, default: tuple[float, ...] | None = None, largest: float = 1e6
     ) -> tuple[float, ...]:
-        """Return the numbers of an attribute, or `default` if the attribute is missing and `default` is not None.
+        """Return the numbers of an attribute, or `default` if the attribute is missing; it is required without default.
 
         Raises InvalidElement unless there are `count` numbers, each from -`largest` to `largest`.
         """
@@ -60,7 +60,7 @@ class Element(markup.Element):
         return values
 
     def positive(self, attribute: str, count: int = 1) -> tuple[float, ...]:
-        """Return the numbers of a required attribute; raises InvalidElement unless there are `count` positive ones."""
+        """Return `count` positive numbers from a required attribute; raises InvalidElement for any other text."""
         values = self.numbers(attribute, count)
         if min(values) <= 0:
             raise InvalidElement(self, f"{attribute} must be greater than 0")
@@ -73,7 +73,7 @@ class Element(markup.Element):
 
 
 def parse_xml(data: bytes, file: str) -> Element:
-    """Parse an XML text; `file` is its path in errors. Raises InvalidInput with the line of an error."""
+    """Parse XML text; `file` is the path for error messages. Raises InvalidInput."""
     try:
         return markup.parse(data, markup.Source.of(data, file), Element)
     except markup.MalformedXml as error:
@@ -82,12 +82,12 @@ def parse_xml(data: bytes, file: str) -> Element:
 
 
 MAX_URDF_BYTES, MAX_MESH_BYTES = 2 * 2**20, 20 * 2**20
-"""Maximum sizes of a URDF or xacro file, and of a mesh file."""
+"""Maximum size of a URDF or xacro file, and maximum size of a mesh file."""
 
 
 @dataclass(frozen=True)
 class RobotFiles:
-    """Located files of a `*.robot.yaml`: the path of its URDF, and the folders of ROS packages by name."""
+    """Path of the URDF of a `*.robot.yaml`, and the folders of ROS packages by package name."""
 
     urdf: Path
     packages: Mapping[str, Path]

@@ -1,4 +1,4 @@
-"""Definitions in xacro files: parses macros, binds the arguments of their calls, and defines properties."""
+"""Definitions in xacro files: parses macros, binds the arguments of macro calls, and defines properties."""
 
 import re
 from collections.abc import Iterator
@@ -19,10 +19,10 @@ PARAMETER = re.compile(
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a macro. If its name begins with `*` or `**`, its argument is a block.
+    """A parameter of a macro.
 
     Without an argument, the value is the caller's property of the same name if the parameter `is_forwarded` (`^`), else
-    `default`. An argument is required if `default` is None.
+    `default` (None: the argument is required).
     """
 
     name: str
@@ -31,13 +31,13 @@ class Parameter:
 
     @property
     def is_block(self) -> bool:
-        """Whether its argument is a block: a child element of the call."""
+        """Whether the argument is a block: a child element of the call. The name then begins with `*` or `**`."""
         return self.name.startswith("*")
 
 
 @dataclass(frozen=True, eq=False)
 class Macro:
-    """A macro and the element that holds its body."""
+    """A macro. `body` is the `<xacro:macro>` element."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -46,9 +46,9 @@ class Macro:
 
 @dataclass(eq=False)
 class MacroScope:
-    """Macros by name that are defined in a scope. Those of its `parent` are visible, too.
+    """Macros that are defined in a scope, by name. The macros of the `parent` scope are visible as well.
 
-    `namespaces` are the scopes of files that are included with a namespace.
+    `namespaces` are the scopes of files that are included with a namespace, by name.
     """
 
     parent: "MacroScope | None" = None
@@ -56,14 +56,15 @@ class MacroScope:
     namespaces: "dict[str, MacroScope]" = field(default_factory=dict)
 
     def find(self, name: str) -> Macro | None:
-        """Return the innermost macro with this name."""
+        """Return the innermost visible macro with this name, or None."""
         return next((scope.macros[name] for scope in self._outwards() if name in scope.macros), None)
 
     def find_namespace(self, name: str) -> "MacroScope | None":
-        """Return the innermost namespace with this name."""
+        """Return the innermost visible namespace with this name, or None."""
         return next((scope.namespaces[name] for scope in self._outwards() if name in scope.namespaces), None)
 
     def _outwards(self) -> "Iterator[MacroScope]":
+        """Yield this scope, its parent, the parent's parent, and so on."""
         scope: MacroScope | None = self
         while scope is not None:
             yield scope
@@ -75,10 +76,10 @@ def parse_macro(element: Element) -> Macro:
     name = element.name.removeprefix("xacro:")
     if not name or name == "call" or "." in name:
         raise ExpansionError(f"{name[:60]!r} is not a valid name of a macro")
-    return Macro(name, tuple(_parameters(element.attributes.get("params", ""))), element)
+    return Macro(name, tuple(_parse_parameters(element.attributes.get("params", ""))), element)
 
 
-def _parameters(text: str) -> list[Parameter]:
+def _parse_parameters(text: str) -> list[Parameter]:
     found = []
     position = 0
     while text[position:].strip():
@@ -91,10 +92,7 @@ def _parameters(text: str) -> list[Parameter]:
 
 
 def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tuple[Macro, Scope, MacroScope]:
-    """Return the macro `name` or `namespace.name`, and the scopes of properties and macros in which it is defined.
-
-    Raises ExpansionError if it does not exist.
-    """
+    """Return the macro `name` or `namespace.name`, and the scopes in which it is defined. Raises ExpansionError."""
     *spaces, name = qualified_name.split(".")
     for space in spaces:
         owner, inner = scope.find_scope(space), macros.find_namespace(space)
@@ -111,9 +109,9 @@ def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tupl
 def bind_parameters(
     macro: Macro, call: Element, blocks: list[Element], scope: Scope, inside: Scope, texts: TextEvaluator
 ) -> Scope:
-    """Add the arguments of a call to `inside`, the scope of the macro's body, and return it. Raises ExpansionError.
+    """Add the arguments of a macro call to `inside`, the scope of the macro's body; return `inside`.
 
-    Arguments are evaluated in the caller's `scope`. `blocks` are the expanded child elements of the call.
+    `scope` is the scope of the caller. `blocks` are the expanded child elements of the call. Raises ExpansionError.
     """
     missing = {parameter.name: parameter for parameter in macro.parameters}
     for name, text in call.attributes.items():
@@ -135,6 +133,7 @@ def bind_parameters(
 
 
 def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> ScopeValue:
+    """Return the value of a parameter without an argument. Raises ExpansionError."""
     if parameter.is_forwarded and scope.find_scope(parameter.name) is not None:
         return texts.property(scope, parameter.name)
     if parameter.default is not None:
@@ -156,10 +155,11 @@ def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None
     if remove and known:
         scope.remove(name)
     elif default is None or not known:
-        _set(source, name, value if default is None else default, scope, texts)
+        _set_property(source, name, value if default is None else default, scope, texts)
 
 
-def _set(source: Element, name: str, value: str | None, scope: Scope, texts: TextEvaluator) -> None:
+def _set_property(source: Element, name: str, value: str | None, scope: Scope, texts: TextEvaluator) -> None:
+    """Set a property to `value`, or to the children of `source` if `value` is None."""
     lazy = parse_bool(texts.value(source.attributes.get("lazy_eval", "true"), scope))
     where = source.attributes.get("scope", "")
     into = {"global": scope.top(), "parent": scope.caller()}.get(where, scope)

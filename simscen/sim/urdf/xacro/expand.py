@@ -1,7 +1,4 @@
-"""Expands a xacro file (wiki.ros.org/xacro) to URDF elements that keep their file and line.
-
-Comments and text between elements are ignored, because they do not describe the robot.
-"""
+"""Expands a xacro file (wiki.ros.org/xacro) to URDF elements that keep their file and line."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -22,7 +19,7 @@ from simscen.sim.urdf.xacro.text import Block, Scope, TextEvaluator, required_at
 from simscen.sim.urdf.xml_source import MAX_URDF_BYTES, Element
 
 MAX_FILES = 200
-"""Maximum number of included files; each may have MAX_URDF_BYTES."""
+"""Maximum number of included files."""
 MAX_ELEMENTS = 100_000
 """Maximum number of elements after expansion."""
 
@@ -31,7 +28,7 @@ FileReader = Callable[[Path], Element]
 
 
 class UnknownArgument(InvalidInput):
-    """The argument `name` is given, but no `<xacro:arg>` declares it; `declared` are the names of those that exist."""
+    """Error for an argument that no `<xacro:arg>` declares. `declared` are the names of the declared arguments."""
 
     def __init__(self, robot: Element, name: str, declared: Iterable[str]) -> None:
         self.name, self.declared = name, sorted(declared)
@@ -44,7 +41,8 @@ def expand(
 ) -> Element:
     """Return the expansion of the element `robot` of a xacro `file`; `arguments` override defaults of `<xacro:arg>`.
 
-    `read` reads included files, which must be in `folders`. Raises InvalidInput, or its subclass UnknownArgument.
+    `read` reads included files; they must be in `folders`. Raises InvalidInput, or UnknownArgument for an argument that
+    is not declared.
     """
     container = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
@@ -63,15 +61,16 @@ def expand(
 
 
 def declared_arguments(element: Element) -> set[str]:
-    """Return the names of all arguments that an element declares, also in parts that are not expanded."""
+    """Return the names of all arguments that an element and its descendants declare."""
     own = {element.name} if element.tag == "xacro:arg" else set()
     return own.union(*map(declared_arguments, element.children))
 
 
 class _Expansion:
-    """Expansion of one file. Each handler appends the expansion of `source` to the children of `into`.
+    """Expansion of one file, with a handler method for each xacro element.
 
-    `scope` has the visible properties, and `macros` the visible macros.
+    A handler appends the expansion of the element `source` to the children of `into`. `scope` has the visible
+    properties, and `macros` has the visible macros.
     """
 
     def __init__(self, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str]) -> None:
@@ -113,6 +112,7 @@ class _Expansion:
             self.element(child, into, scope, macros)
 
     def _plain(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+        """Append a copy of an element that is not a xacro element."""
         own = [(n, text) for n, text in source.attributes.items() if not n.startswith("xacro:") and n != "xmlns:xacro"]
         attributes = {name: self._texts.text(text, scope) for name, text in own}
         self._elements += 1
@@ -197,6 +197,7 @@ class _Expansion:
         self._texts.file = before
 
     def _parse(self, path: Path) -> Element:
+        """Return the root element of an included file; reads each file once."""
         if path not in self._read:
             if len(self._read) >= MAX_FILES:
                 raise ExpansionError(f"more than {MAX_FILES} files are included")

@@ -1,4 +1,4 @@
-"""Evaluates `${…}` expressions in Python's grammar. Only arithmetic and the functions in this module are allowed."""
+"""Evaluates xacro expressions `${…}`: Python expressions with properties and the functions in this module."""
 
 import ast
 import math
@@ -57,6 +57,7 @@ XACRO: Mapping[str, Function] = {
 }  # fmt: skip
 NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {"math": MATH, "python": PYTHON, "xacro": XACRO}
 GLOBALS: Mapping[str, Function | float] = {**MATH, **PYTHON}
+"""Functions and constants that can be used without a namespace."""
 
 
 def _replace(text: str, old: str, new: str) -> str:
@@ -102,14 +103,14 @@ COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
 EXPRESSION_HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
 
 
-class NameLookup(Protocol):
-    """Looks up the properties that an expression uses."""
+class PropertyLookup(Protocol):
+    """Source of the values of xacro properties."""
 
     def value(self, path: tuple[str, ...]) -> Value:
-        """Return the value of a property, given by the dotted parts of its name; raises KeyError if there is none."""
+        """Return the value of the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
 
 
-def evaluate(text: str, names: NameLookup, budget: Budget) -> Value:
+def evaluate(text: str, properties: PropertyLookup, budget: Budget) -> Value:
     """Return the value of an expression, and count its steps in `budget`; raises ExpansionError."""
     if len(text) > MAX_EXPRESSION_CHARACTERS:
         raise ExpansionError(f"an expression is longer than {MAX_EXPRESSION_CHARACTERS} characters")
@@ -117,14 +118,15 @@ def evaluate(text: str, names: NameLookup, budget: Budget) -> Value:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: deeply nested brackets
         raise ExpansionError("not an expression", EXPRESSION_HINT) from None
-    return _Evaluation(names, budget).value(tree.body)
+    return _Evaluation(properties, budget).value(tree.body)
 
 
 class _Evaluation:
-    def __init__(self, names: NameLookup, budget: Budget) -> None:
-        self._names, self._budget = names, budget
+    def __init__(self, properties: PropertyLookup, budget: Budget) -> None:
+        self._properties, self._budget = properties, budget
 
     def value(self, node: ast.expr) -> Value:
+        """Return the value of a node of the syntax tree; raises ExpansionError."""
         with self._budget:
             self._budget.spend()
             try:
@@ -162,7 +164,7 @@ class _Evaluation:
     def _name(self, node: ast.expr) -> object:
         path = _path(node)
         try:
-            return self._names.value(path)
+            return self._properties.value(path)
         except KeyError:
             known = _find_builtin(path)
         if isinstance(known, int | float):
@@ -219,6 +221,7 @@ class _Evaluation:
 
 
 def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
+    """Return the result of a binary operator; raises ExpansionError if the result would be too large."""
     if kind is ast.Mult and isinstance(left, str | list) != isinstance(right, str | list):
         many, times = (left, right) if isinstance(left, str | list) else (right, left)
         if isinstance(times, int) and size(many) * times > MAX_LENGTH:
@@ -231,6 +234,7 @@ def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
 
 
 def _path(node: ast.expr) -> tuple[str, ...]:
+    """Return the parts of a dotted name; raises ExpansionError for any other expression."""
     match node:
         case ast.Name(name):
             return (name,)

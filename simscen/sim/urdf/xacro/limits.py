@@ -1,23 +1,17 @@
-"""Limits of a xacro expansion, its errors, and conversion of property values.
-
-Limits are counted in steps rather than seconds, so that they are the same on every machine.
-"""
+"""Limits and errors of a xacro expansion, and conversion of property values."""
 
 from typing import Union
 
 MAX_STEPS = 300_000
-"""Maximum number of steps: one for each element, part of an expression, or 16 characters, and 10 for a macro call.
-
-A TurtleBot 4 needs 10 000.
-"""
+"""Maximum number of steps: one for each element, part of an expression, or 16 characters, and 10 for a macro call."""
 MAX_DEPTH = 150
-"""Maximum nesting of elements, macros, includes, properties, and expressions; Python's own stack allows 900."""
+"""Maximum nesting of elements, macros, includes, properties, and expressions."""
 MAX_LENGTH = 1 << 16
 """Maximum number of characters in a text, or of values in a list."""
 
 
 class ExpansionError(Exception):
-    """A text or expression cannot be expanded. The message has no line number; `hint` says what to do, if not empty."""
+    """Error in a text or expression. `hint` is advice for the user, or ""."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.message, self.hint = message, hint
@@ -25,14 +19,11 @@ class ExpansionError(Exception):
 
 
 class MissingFile(ExpansionError):
-    """A file or package does not exist. The expansion can continue, to find further problems."""
+    """Error for a file or package that does not exist. The expansion can continue, to find further problems."""
 
 
 class Budget:
-    """Counts steps and nesting depth, and raises ExpansionError above MAX_STEPS or MAX_DEPTH.
-
-    Nested elements, calls, and expressions are evaluated in nested `with budget` statements.
-    """
+    """Counts steps and nested `with budget` statements; raises ExpansionError above MAX_STEPS or MAX_DEPTH."""
 
     def __init__(self) -> None:
         self._steps, self._depth = 0, 0
@@ -54,9 +45,9 @@ class Budget:
 
 
 Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
-"""Value of a property."""
+"""Value of a property or expression."""
 MAX_BITS = 256
-"""Maximum number of bits of an integer, up to which arithmetic takes no noticeable time."""
+"""Maximum number of bits of an integer."""
 
 
 def check_bounds(value: object) -> Value:
@@ -77,7 +68,7 @@ def check_bounds(value: object) -> Value:
 
 
 def size(value: Value) -> int:
-    """Return the total number of characters, lists, dictionaries, and other values that a value consists of."""
+    """Return the length of a text, 1 plus the sizes of all values in a list or dictionary, or 1 for other types."""
     match value:
         case str():
             return len(value)
@@ -90,7 +81,7 @@ def size(value: Value) -> int:
 
 
 def parse_literal(text: str) -> Value:
-    """Return the value of an attribute: a number or boolean if the text is one, else the text without single quotes."""
+    """Return a text as a number or boolean if possible, else as text without enclosing single quotes."""
     if len(text) >= 2 and text[0] == text[-1] == "'":
         return text[1:-1]
     if "_" in text:  # Python would read 1_000 as a number
@@ -104,7 +95,7 @@ def parse_literal(text: str) -> Value:
 
 
 def parse_bool(value: Value) -> bool:
-    """Return the value of `<xacro:if value=…>` as a boolean; raises ExpansionError for texts that are none."""
+    """Return a value as a boolean, as in `<xacro:if value=…>`; raises ExpansionError for any other text."""
     if not isinstance(value, str):
         return bool(value)
     if value in ("true", "True", "false", "False"):

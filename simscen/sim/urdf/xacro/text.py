@@ -1,4 +1,4 @@
-"""Evaluates text with `${expressions}` and `$(substitutions)` in nested scopes of properties."""
+"""Evaluates xacro texts with `${expressions}` and `$(substitutions)` in nested scopes of properties."""
 
 import re
 from collections.abc import Mapping
@@ -14,14 +14,14 @@ from simscen.sim.urdf.xml_source import Element
 
 @dataclass(frozen=True, eq=False)
 class LazyText:
-    """Text of a property that has not been used yet, and is evaluated on first use."""
+    """Text of a property that is evaluated when the property is first used."""
 
     text: str
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Argument for `<xacro:insert_block>`: inserts `element` if `includes_element`, else only its children."""
+    """Block that `<xacro:insert_block>` inserts: `element` if `includes_element`, else only its children."""
 
     element: Element
     includes_element: bool
@@ -29,7 +29,7 @@ class Block:
 
 @dataclass(eq=False)
 class Unfinished:
-    """Marks a property that is being evaluated. Using it meanwhile means that its definition is circular."""
+    """Marker for a property that is being evaluated, to detect circular definitions."""
 
 
 ScopeValue = Union[Value, LazyText, Block, Unfinished, "Scope"]
@@ -37,9 +37,9 @@ ScopeValue = Union[Value, LazyText, Block, Unfinished, "Scope"]
 
 @dataclass(eq=False)
 class Scope:
-    """Properties and blocks of a file, of an included namespace, or of one call of a macro.
+    """Properties and blocks of a file, of an included namespace, or of one macro call, by name.
 
-    Those of its `parent` are visible, too. In `values`, the names of blocks begin with `*` or `**`.
+    The properties and blocks of the `parent` scope are visible as well. The names of blocks begin with `*` or `**`.
     """
 
     parent: "Scope | None" = None
@@ -47,7 +47,7 @@ class Scope:
     values: dict[str, ScopeValue] = field(default_factory=dict)
 
     def find_scope(self, name: str) -> "Scope | None":
-        """Return the innermost scope with a property of this name, or None."""
+        """Return the innermost visible scope with a property of this name, or None."""
         scope: Scope | None = self
         while scope is not None and name not in scope.values:
             scope = scope.parent
@@ -61,14 +61,17 @@ class Scope:
         return scope
 
     def caller(self) -> "Scope":
-        """Return the scope for `scope="parent"`: the parent; in a macro, the innermost one that is not a namespace."""
+        """Return the scope in which `<xacro:property scope="parent">` sets a property.
+
+        This is the parent of a namespace. In a macro call, it is the innermost enclosing scope that is not a namespace.
+        """
         scope = self.parent
         while scope is not None and scope.is_namespace and not self.is_namespace:
             scope = scope.parent
         return scope or self.top()
 
     def remove(self, name: str) -> None:
-        """Remove a property from this scope and all enclosing ones."""
+        """Remove a property from this scope and all enclosing scopes."""
         scope: Scope | None = self
         while scope is not None:
             scope.values.pop(name, None)
@@ -76,11 +79,11 @@ class Scope:
 
 
 TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
-"""Part of a text: an escaped `$${` or `$$(`, an expression, a substitution, or plain text."""
+"""Pattern of a part of a text: an escaped `$${` or `$$(`, an expression, a substitution, or plain text."""
 
 
 class TextEvaluator:
-    """Evaluates texts of the expanded `file`; `arguments` are the values of `<xacro:arg>` by name."""
+    """Evaluates texts of the xacro file `file`. `arguments` are the values of `<xacro:arg>` by name."""
 
     def __init__(self, folders: AllowedFolders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
         self.budget, self.file = budget, file
@@ -88,7 +91,7 @@ class TextEvaluator:
         self._folders = folders
 
     def value(self, text: str, scope: Scope) -> Value:
-        """Return the value of a text: of any type for a single expression, else text. Raises ExpansionError."""
+        """Return the value of a text: a value of any type for a single expression, else text. Raises ExpansionError."""
         self.budget.spend(1 + len(text) // 16)
         if "$" not in text:
             return text
@@ -108,16 +111,19 @@ class TextEvaluator:
         return joined
 
     def text(self, text: str, scope: Scope) -> str:
-        """Return the value of a text as text; raises ExpansionError."""
+        """Return the value of a text as a string; raises ExpansionError."""
         return str(self.value(text, scope))
 
     def literal(self, text: str, scope: Scope) -> Value:
-        """Return the value of a text as a number or boolean if it is one; raises ExpansionError."""
+        """Return the value of a text, converted to a number or boolean if possible; raises ExpansionError."""
         value = self.value(text, scope)
         return parse_literal(value) if isinstance(value, str) else value
 
     def property(self, scope: Scope, name: str) -> "Value | Scope":
-        """Return a property that is visible in a scope, or a namespace; raises KeyError or ExpansionError."""
+        """Return the property or namespace with this name that is visible in `scope`.
+
+        Raises KeyError if it does not exist, and ExpansionError if it cannot be evaluated.
+        """
         owner = scope.find_scope(name)
         if owner is None:
             raise KeyError(name)
@@ -140,6 +146,7 @@ class TextEvaluator:
                 return found
 
     def _part(self, token: str, scope: Scope) -> Value:
+        """Return the value of a part of a text (see TOKEN)."""
         if token.startswith("$$"):
             return token[1:]
         if token.startswith("${"):
@@ -155,6 +162,7 @@ class TextEvaluator:
         return token
 
     def _substitute(self, command: str) -> str:
+        """Return the value of a substitution such as `arg NAME` or `find PACKAGE`; raises ExpansionError."""
         match command.split():
             case ["arg", name] if name in self.arguments:
                 return self.arguments[name]
@@ -181,6 +189,8 @@ class TextEvaluator:
 
 
 class _ScopeLookup:
+    """Implementation of PropertyLookup for the properties that are visible in a scope."""
+
     def __init__(self, texts: TextEvaluator, scope: Scope) -> None:
         self._texts, self._scope = texts, scope
 
@@ -196,7 +206,7 @@ class _ScopeLookup:
 
 
 def required_attribute(element: Element, attribute: str, may_be_empty: bool = False) -> str:
-    """Return the text of a required attribute, not evaluated; raises ExpansionError if it is missing or empty."""
+    """Return the unevaluated text of a required attribute; raises ExpansionError if it is missing or empty."""
     text = element.attributes.get(attribute)
     if text is None or not (text or may_be_empty):
         raise ExpansionError(f'<{element.tag[:60]}> without {attribute}="…"')
