@@ -78,8 +78,8 @@ def _directors(
 ) -> Iterator[Director]:
     """Yield the directors of a run. A director starts events and faults.
 
-    A single robot has one director. With several robots, one director starts all events on the stage of the first robot,
-    and each robot has another director for its faults.
+    A single robot has one director. With several robots, one director starts all events on the stage of the first
+    robot, and each robot has another director for its faults.
     """
     spec = prepared.spec
     first, *_ = agents.values()
