@@ -1,4 +1,7 @@
-"""Decode and validate the ROS messages in an answer of an external stack."""
+"""Decode and validate the ROS messages in an answer of an external stack.
+
+Values on a topic NAME/exact have full precision, and replace the values on the topic NAME.
+"""
 
 from __future__ import annotations
 
@@ -36,25 +39,23 @@ _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 _PLANAR_DIAGONAL = (0, 7, 35)
 """Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Numbers per reading on the odometry topic with EXACT_SUFFIX, which has full precision.
-
-They are: tick (1), x, y, yaw (3), vx, vy, wz (3), the variances of these velocities (3), and the pose covariance (9).
-"""
+"""Number of values per reading of exact odometry: tick, pose (3), velocity (3), its variances (3), pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
-"""Encoded messages of an answer by topic name, in order."""
+"""Encoded messages of an answer by topic name, in the order of arrival."""
 T = TypeVar("T")
 
 MAX_QUATERNION_COMPONENT = 1.01
-"""Largest component of a unit quaternion, with rounding."""
+"""Largest valid component of a unit quaternion, with a margin for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A decoded answer. A field is None or empty if the answer has no such message.
+    """A decoded answer. A field is None or empty if the answer does not contain it.
 
-    A `plan` without poses means that the stack follows none. `correction` is the pose of the odom frame in the map.
+    A `plan` without poses means that the stack follows no plan. `correction` is the pose of the odom frame in the map
+    frame. `lines` are messages on /rosout.
     """
 
     command: Twist | None = None
@@ -69,7 +70,7 @@ class Answer:
 
 
 def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesByTopic:
-    """Return the messages of an answer by topic; `topic_names` has the name of each topic number.
+    """Return the messages of an answer by topic. `topic_names` has the names of topics by number.
 
     Raises ProtocolViolation for an unknown number.
     """
@@ -86,9 +87,9 @@ def decode_answer(
 ) -> Answer:
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
-    `correction` is the last received pose of the odom frame in the map frame; None if the stack never sent one. Then
-    `map_from_odom` of the belief is computed from the belief's pose and an odometry pose: that of the stack's filtered
-    odometry in this answer, or else `dead_reckoned`, that of the wheel odometry.
+    `correction` is the last received pose of the odom frame in the map frame. If it is None, the correction is computed
+    from the estimated pose and the odometry pose: the pose of the stack's filtered odometry, or else `dead_reckoned`
+    (the pose of the wheel odometry).
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
@@ -110,6 +111,7 @@ def decode_answer(
 
 
 def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
+    """Return the pose estimate in an answer, or None; see `decode_answer` for the arguments."""
     name = topics.BELIEF.name
     message = _decode_last(messages, name, _belief_pose)
     if message is None:
@@ -126,7 +128,7 @@ def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: 
 
 
 def _correction(messages: MessagesByTopic) -> Pose2 | None:
-    """Return the pose of the odom frame in the map frame."""
+    """Return the pose of the odom frame in the map frame, or None."""
     exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _pose2d)
     if exact is not None:
         return exact
@@ -140,7 +142,7 @@ def _correction(messages: MessagesByTopic) -> Pose2 | None:
 
 
 def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
-    """Yield the readings of the stack's odometry filter."""
+    """Yield the readings of the stack's odometry filter. `now` is the current tick."""
     name = topics.FILTERED_ODOMETRY.name
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, ODOMETRY_COLUMNS))
     if exact is not None:
@@ -172,6 +174,7 @@ def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> It
 
 
 def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
+    """Return the last path on the topic `name`, or None. A path without a stamp gets the tick `tick`."""
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, 3))
     if message is None and exact is None:
@@ -184,7 +187,7 @@ def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Pat
 
 
 def _costmaps(messages: MessagesByTopic) -> Iterator[CostGrid]:
-    """Yield the newest global and local costmap."""
+    """Yield the last global costmap and the last local costmap, if there are any."""
     for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
         if messages.get(topic):
             yield _decode_message(topic, partial(_costmap, name), messages[topic][-1])
@@ -227,6 +230,7 @@ def _belief_pose(data: bytes) -> StampedPose:
 
 
 def _covariance(data: bytes) -> Array:
+    """Return the covariance (3, 3) of x, y, and yaw in a PoseWithCovarianceStamped."""
     reader = Reader(data)
     reader.take("iI")
     reader.string()
@@ -241,6 +245,7 @@ def _to_pose2(message: StampedPose) -> Pose2:
 
 
 def _particles(data: bytes) -> Array:
+    """Return the particles (n, 4) in a ParticleCloud: x, y, yaw, and weight."""
     reader = Reader(data)
     reader.take("iI")
     reader.string()
@@ -263,6 +268,7 @@ def _pose2d(data: bytes) -> Pose2:
 
 
 def _table(data: bytes, width: int) -> Array:
+    """Return the numbers in a Float64MultiArray as rows (n, width)."""
     numbers = np.array(read(FLOAT64_ARRAY, data), dtype=np.float64)
     if len(numbers) % width:
         raise ProtocolViolation(f"{len(numbers)} numbers, which cannot be split into rows of {width}")
@@ -278,6 +284,7 @@ def _log_line(data: bytes) -> LogLine:
 
 
 def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> T | None:
+    """Decode the last message on the topic `name`; return None if there is none. Raises ProtocolViolation."""
     found = messages.get(name)
     return _decode_message(name, decoder, found[-1]) if found else None
 
@@ -287,6 +294,7 @@ def _decode_all(messages: MessagesByTopic, name: str, decoder: Callable[[bytes],
 
 
 def _decode_message(name: str, decoder: Callable[[bytes], T], data: bytes) -> T:
+    """Decode a message on the topic `name`. Raises ProtocolViolation."""
     try:
         return decoder(data)
     except ProtocolViolation:

@@ -1,7 +1,7 @@
 """Track the goals of an external stack from the events that the stack reports.
 
-A stack reports only which goal it accepts and how each goal ends. The tracker checks these reports, and adds the events
-of preemption and of the end of the task, so that the events of a log are always consistent.
+A stack reports that it accepts a goal, and that a goal ends. The tracker checks these reports, and adds the events of
+preemption and of the end of the task.
 """
 
 from typing import Any
@@ -13,9 +13,9 @@ from simscen.run.external.protocol import ProtocolViolation
 from simscen.stack.tasks import Task
 
 MAX_ERROR_CODE = 65_535
-"""Nav2's error codes are uint16."""
+"""Largest error code; Nav2's error codes are uint16."""
 MAX_TEXT_LENGTH = 4096
-"""Number of characters to which names and messages are cut."""
+"""Largest number of characters of names, messages, and event data."""
 _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
     EventKind.ROBOT_HELD.value,
     EventKind.ROBOT_RELEASED.value,
@@ -24,31 +24,31 @@ _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")
 
 
 class GoalTracker:
-    """Goals of a robot and their state as reported by its stack; collects the events of the log."""
+    """Goals of a robot, and their states as reported by its stack. Collects the events for the log."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
-        """If `stop_on_failure` is true, a failed goal ends the task. `mode` is the action by which goals are sent."""
+        """If `stop_on_failure` is true, a failed goal ends the task. `mode` is the Nav2 action that sends goals."""
         self._events: list[Event] = []
         self._task = Task(stop_on_failure, clock=Clock(tick_rate), mode=mode)
         self._rate = tick_rate
         self._dropped: set[str] = set()
 
     def start(self, goals: tuple[Goal, ...]) -> None:
-        """Start the task with these goals, none of which is accepted yet."""
+        """Start the task with these goals. No goal is accepted yet."""
         self._task.start(goals)
 
     @property
     def goal(self) -> Goal | None:
-        """The current goal; None before the first is accepted and between two goals."""
+        """Current goal; None before the first goal is accepted, between two goals, and after the task."""
         return self._task.goal
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by another one, which the stack must accept next."""
+        """Replace the current goal by `goal`, which the stack must accept next."""
         self._drop()
         self._events += self._task.preempt(tick, goal)
 
     def process(self, tick: int, report: dict[str, Any]) -> None:
-        """Process an event with `kind`, `name`, and `data` from the stack. Raises ProtocolViolation if invalid."""
+        """Process an event from the stack, with the keys `kind`, `name`, and `data`. Raises ProtocolViolation."""
         kind, name, data = report.get("kind"), report.get("name", ""), report.get("data", {})
         if not isinstance(kind, str) or not isinstance(name, str) or not isinstance(data, dict):
             raise ProtocolViolation(f"an invalid event: {str(report)[:100]}")
@@ -77,11 +77,11 @@ class GoalTracker:
                 raise ProtocolViolation(f"an event `{kind[:60]}`, which a stack may not report")
 
     def advance(self, tick: int) -> None:
-        """Advance to a tick; the wait at a goal, and with it the task, can end there."""
+        """End the wait at a goal if its time is over at `tick`. This can end the task."""
         self._events += self._task.end_wait(tick)
 
     def fail_if_timed_out(self, tick: int) -> bool:
-        """Fail the current goal if its timeout has passed; return whether that is so."""
+        """Fail the current goal if its timeout has passed; return whether it has passed."""
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
@@ -95,7 +95,7 @@ class GoalTracker:
         return events
 
     def _drop(self) -> None:
-        """Ignore the `goal.canceled` that the stack will report for the current goal."""
+        """Drop the current goal, so that a later `goal.canceled` for it is ignored."""
         if self._task.goal is not None:
             self._dropped.add(self._task.goal.name)
 
@@ -127,7 +127,7 @@ class GoalTracker:
 
 
 def _to_error_code(value: Any) -> ErrorCode | int:
-    """Return Nav2's error code for a number or name; unknown numbers are kept."""
+    """Return Nav2's error code for a number or name, or the same number if it is unknown. Raises ProtocolViolation."""
     if value is None:
         return ErrorCode.NAVIGATE_UNKNOWN
     if isinstance(value, str) and value in ErrorCode.__members__:
@@ -138,7 +138,7 @@ def _to_error_code(value: Any) -> ErrorCode | int:
 
 
 def _checked_data(data: dict[str, Any]) -> dict[str, Value]:
-    """Return the data of an event, limited in size."""
+    """Return the data of an event. Raises ProtocolViolation if it is longer than MAX_TEXT_LENGTH."""
     if len(str(data)) > MAX_TEXT_LENGTH:
         raise ProtocolViolation("an event with too much data")
     return data

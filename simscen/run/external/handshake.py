@@ -1,4 +1,4 @@
-"""Handshake with an external stack: build the content of HELLO and GOAL, and parse WELCOME.
+"""Handshake with an external stack: build the content of the frames HELLO and GOAL, and parse the frame WELCOME.
 
 docs/reference/stack-protocol.md defines these frames.
 """
@@ -24,12 +24,12 @@ class RunParameters:
 
     Attributes:
         control_period: Ticks between two commands.
-        sensors: Type of the readings by sensor name, a class of simscen.core.messages.sensor_data such as "Scan".
+        sensors: Type of the readings by sensor name, such as "Scan".
         mounts: Pose in the base frame by sensor name; sensors without a mount are missing.
         rates: Readings per second by sensor name; sensors without a known rate are missing.
         robot_description: URDF of the robot.
-        stop_on_failure: Whether the stack must stop after a failed goal instead of driving to the next one.
-        mode: Action by which goals are sent.
+        stop_on_failure: Whether the stack must stop after a failed goal, instead of driving to the next goal.
+        mode: Nav2 action that sends goals.
         robot_name: Name of the robot; "" for a single robot.
         switchable_zones: Zones that events can switch.
     """
@@ -56,8 +56,8 @@ def hello_content(
 ) -> dict[str, Any]:
     """Return the content of HELLO.
 
-    `sensor_topics` has pairs of a sensor name and a topic of that sensor. `zone_masks` says what the values of zone
-    masks mean (see ZoneMasks.meanings). `answer_limit` is the wall time in s that the stack may take for each answer.
+    `sensor_topics` are pairs of a sensor name and a topic with its readings. `zone_masks` describes the values of zone
+    masks (see `ZoneMasks.meanings`). `answer_limit` is the wall time in s that the stack may take for each answer.
     """
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
@@ -94,7 +94,7 @@ def hello_content(
 
 
 def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunParameters) -> dict[str, Any]:
-    """Return the content of GOAL: initial estimate of the pose, all goals, and what to do after a failed one."""
+    """Return the content of GOAL: the initial pose estimate, all goals, and the behavior after a failed goal."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
@@ -105,7 +105,7 @@ def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunPar
 
 
 def goal_data(goal: Goal) -> dict[str, Any]:
-    """Return a goal as JSON data, in the form in which GOAL and PREEMPT contain it."""
+    """Return a goal as JSON data for GOAL and PREEMPT."""
     x, y, yaw = map(float, goal.pose)
     tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
     drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
@@ -145,10 +145,7 @@ def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, An
 
 
 def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
-    """Return the exact resolution (m), size (cells), and origin of a grid, without its cells; None for no grid.
-
-    The cells are sent as nav_msgs/msg/OccupancyGrid, which rounds the resolution to 32 bits.
-    """
+    """Return the exact resolution (m), size (cells), and origin of a grid, without its cells; None if grid is None."""
     if grid is None:
         return None
     height, width = grid.shape
@@ -161,23 +158,23 @@ def _polygon(corners: Any) -> list[list[float]]:
 
 MAX_NAME_LENGTH = 200
 MAX_ABOUT_LENGTH = 1 << 20
-"""Largest numbers of characters of `name` and `version`, and of `about`."""
+"""Largest numbers of characters: of `name` and `version`, and of `about`."""
 MAX_FIRST_ANSWER_S = 3700
-"""Largest value of `first_answer_limit` and `first_answer_until`."""
+"""Largest value of `first_answer_limit` and `first_answer_until` in s."""
 
 
 @dataclass(frozen=True)
 class Welcome:
-    """Content of WELCOME, the first frame of a stack: its name and version, and what it requests.
+    """Content of WELCOME, the first frame of a stack.
 
     Attributes:
         name: Name of the stack.
         version: Version of the stack.
         topics: Names of the topics to send to the stack.
-        every_beat: Whether the stack requests a step at each beat with messages, not only when a command is due.
-        about: Further information that the stack gives about itself, for the log.
-        first_answer_limit: Wall time in s for the first answer, if that is longer than `answer_limit`.
-        first_answer_until: Simulated time in s up to which `first_answer_limit` applies to all answers.
+        every_beat: Whether the stack requests a step at each tick with messages, not only when a command is due.
+        about: Additional information from the stack for the log.
+        first_answer_limit: Wall time in s for the first answer. It applies if it is longer than `answer_limit`.
+        first_answer_until: Simulated time in s until which `first_answer_limit` applies to all answers.
     """
 
     name: str = ""
@@ -190,7 +187,7 @@ class Welcome:
 
     @classmethod
     def parse(cls, kind: int, body: bytes, topic_table: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
-        """Parse the first frame of a stack. Raises Malformed or ProtocolViolation, e.g. for an unsupported `mode`."""
+        """Parse the first frame of a stack. Raises Malformed or ProtocolViolation."""
         if kind != wire.WELCOME:
             raise ProtocolViolation("its first frame is not a WELCOME")
         content = wire.from_json(body)
@@ -221,7 +218,7 @@ class Welcome:
         )  # fmt: skip
 
     def with_bye(self, body: bytes) -> "Welcome":
-        """Return a copy in which the `about` of a BYE frame is added. An invalid BYE is ignored: the run is over."""
+        """Return a copy with the `about` of a BYE frame added. Ignores an invalid frame."""
         try:
             return replace(self, about=self.about | _about(wire.from_json(body)))
         except (ProtocolViolation, wire.Malformed):

@@ -1,8 +1,8 @@
 """Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
-A worker starts this internal program with three file descriptors. It reads the command of the stack from CONTROL,
-starts the stack, which inherits SOCKET, and writes to REPORT how the stack exits. When it reads a byte from CONTROL, or
-when the worker dies, it kills the stack and all of its descendants.
+A worker process starts this internal program with three file descriptors. The launcher reads the command of the stack
+from CONTROL, starts the stack, which inherits SOCKET, and writes the exit code of the stack to REPORT. After another
+byte from CONTROL, or when the worker dies, the launcher kills the stack and all of its descendants.
 """
 
 import errno
@@ -23,11 +23,11 @@ from typing import Any
 from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except
 
 EXIT_GRACE_S = 0.5
-"""Time in which a stack can exit by itself after the run, so that its last output is not lost."""
+"""Time in which a stack can exit by itself after the run."""
 TERM_GRACE_S = 0.5
 """Time between SIGTERM and SIGKILL."""
 MAX_OPEN_FILES = 1024
-"""Soft limit for the stack, the usual default of Linux; that of the worker is lower."""
+"""Soft limit of open files for the stack, the usual default of Linux."""
 
 
 def main() -> None:
@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def _start_failure(error: Exception) -> str:
-    """Explain why the program could not be started."""
+    """Return a message with the reason why the program could not be started."""
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)
     if error.errno == errno.ENOEXEC:
@@ -69,10 +69,9 @@ def _start_failure(error: Exception) -> str:
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
-    """Wait for the end of the run; if the stack exits earlier, report its exit and continue to wait.
+    """Wait for the end of the run, and report the exit of the stack.
 
-    Returns True if the worker requested the end, and False if the worker has died: its end of the pipe `control` is
-    then closed without a byte.
+    Returns True if the worker requested the end of the stack, and False if the worker has died.
     """
     pidfd = os.pidfd_open(process.pid)
     waiting = [control, pidfd]
@@ -86,7 +85,7 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> boo
 
 
 def _end(process: "subprocess.Popen[bytes]", grace: float) -> None:
-    """Terminate the process group of the stack if it does not exit within `grace` s; then kill all descendants."""
+    """Terminate the stack's process group if the stack does not exit within `grace` s; then kill all descendants."""
     _wait(process, grace)
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGTERM)
@@ -101,7 +100,7 @@ def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
 
 
 def _restore_user_limits() -> None:
-    """Restore the resource limits of the user, because the limits of the worker are for the physics engine."""
+    """Raise the soft resource limits of the worker process to the limits of the user."""
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         hard = resource.getrlimit(limit)[1]
         resource.setrlimit(limit, (hard, hard))

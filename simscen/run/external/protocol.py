@@ -1,7 +1,7 @@
 """Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
-ROS messages lose precision: headings become quaternions, ranges become float32. A topic `NAME/exact` carries the values
-of `NAME` in full precision. Its messages have no stamp: in one frame, its n-th message belongs to the n-th on `NAME`.
+ROS messages lose precision: headings become quaternions, and ranges become float32. A topic `NAME/exact` has the values
+of the topic `NAME` in full precision. Its n-th message in a frame belongs to the n-th message on `NAME`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,10 +17,10 @@ EXACT_SUFFIX = "/exact"
 INITIAL_POSE = Topic("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", latched=True)
 KEEPOUT_MASK = Topic("/keepout_filter_mask", topics.MAP.type, latched=True)
 SPEED_MASK = Topic("/speed_filter_mask", topics.MAP.type, latched=True)
-"""The masks of the stack as in their files, without the zones of the scenario."""
+"""Masks of the stack's costmap filters as in their files, without the zones of the scenario."""
 KEEPOUT_ZONES = Topic("/keepout_zones", topics.MAP.type, latched=True)
 SPEED_ZONES = Topic("/speed_zones", topics.MAP.type, latched=True)
-"""The masks of the stack with the enabled zones of the scenario; sent again when an event switches a zone."""
+"""Masks of the stack's costmap filters with the enabled zones of the scenario."""
 
 STACK_TOPICS = (
     *(topics.COMMAND, topics.PLAN, topics.LOCAL_PLAN, topics.BELIEF, topics.PARTICLES, topics.TF),
@@ -38,35 +38,35 @@ STACK_TOPICS = (
 
 @dataclass(frozen=True)
 class TopicTable:
-    """Topics of one run by name: `sent` to the stack, and `accepted` from it, each numbered from 1 in order."""
+    """Topics of one run by name: `sent` to the stack, and `accepted` from the stack. Both are numbered from 1."""
 
     sent: Mapping[str, Topic]
     accepted: Mapping[str, Topic]
 
     @classmethod
     def build(cls, sent: Iterable[Topic]) -> "TopicTable":
-        """Build the table with these topics to the stack and STACK_TOPICS from it."""
+        """Return the table with the topics `sent` to the stack, and STACK_TOPICS from the stack."""
         return cls({topic.name: topic for topic in sent}, {topic.name: topic for topic in STACK_TOPICS})
 
     @property
     def numbers(self) -> dict[str, int]:
-        """The number of each topic that is sent to the stack, by name."""
+        """Number of each topic that is sent to the stack, by name."""
         return {name: number for number, name in enumerate(self.sent, start=1)}
 
     @property
     def accepted_by_number(self) -> dict[int, str]:
-        """The name of each topic that is accepted from the stack, by number."""
+        """Name of each topic that is accepted from the stack, by number."""
         return dict(enumerate(self.accepted, start=1))
 
 
 TIMEOUT = "stack-timeout"
-"""No answer within the limit of wall time."""
+"""Kind of error: no answer within the limit of wall time."""
 CRASHED = "stack-crashed"
-"""The process exited, could not be started, or closed the connection."""
+"""Kind of error: the process exited, could not be started, or closed the connection."""
 PROTOCOL = "stack-protocol"
-"""A message violates the protocol."""
+"""Kind of error: a message violates the protocol."""
 FAILED = "stack-failed"
-"""The stack reported an error itself."""
+"""Kind of error: the stack sent an error message."""
 
 
 class ProtocolViolation(ValueError):

@@ -1,4 +1,4 @@
-"""Encode sensor readings, maps, and masks as ROS messages for an external stack, in the same way as for the log."""
+"""Encode sensor readings, maps, and masks as ROS messages for an external stack."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _FIRST_STAMP = (0, 0)
 
 
 class StepPublisher:
-    """Collects the messages to send to a stack with the next frame STEP."""
+    """Collects the messages that the next frame STEP will send to a stack. Implements MessageSink."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
         """`sensors` are the reading types, such as "Scan", and `mounts` the poses in the base frame, by sensor name."""
@@ -46,17 +46,17 @@ class StepPublisher:
         """Pairs of a sensor name and a topic with readings of that sensor."""
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish `grid` (a map or mask) once, with the first step; None publishes nothing."""
+        """Publish a map or mask once, with the first step (None: publish nothing)."""
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
     def publish_grid(self, tick: int, grid: OccupancyGrid, topic: Topic) -> None:
-        """Publish `grid` with the next step."""
+        """Publish a map or mask with the next step."""
         data = encode_arrays.occupancy_grid(frame_names.MAP, self._time.stamp(tick), grid)
         self.publish(topic, self._time.nanoseconds(tick), data)
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
-        """Publish robot description and initial pose once, with the first step."""
+        """Publish the robot description and the initial pose once, with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
             pack_pose = encode.pose_with_covariance(frame_names.MAP).packer()
@@ -64,7 +64,7 @@ class StepPublisher:
             self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 
     def topic_table(self) -> TopicTable:
-        """Return the table of all topics to and from the stack. Must be called after all calls of `latch`."""
+        """Return the table of all topics to and from the stack. Call it after all calls of `latch`."""
         sent: list[Topic] = []
         for _, topic in self.sensor_topics:
             sent += [topic, *_exact_topics(topic)]
@@ -74,7 +74,7 @@ class StepPublisher:
     def subscribe(self, topic_table: TopicTable, names: Collection[str]) -> None:
         """Select the topics `names` that the stack requests, and queue the latched messages.
 
-        `topic_table` is the table of this publisher, which the stack has received.
+        `topic_table` is the result of `topic_table()`.
         """
         self._numbers, self._requested_topics = topic_table.numbers, frozenset(names)
         self._requested_sensors = {
@@ -87,7 +87,7 @@ class StepPublisher:
             self.publish(topic, 0, data)
 
     def publish_readings(self, tick: int, readings: Readings) -> None:
-        """Publish the readings that arrive at this tick."""
+        """Publish the readings that arrive at `tick`."""
         now = self._time.nanoseconds(tick)
         for reading in readings:
             if reading.sensor not in self._requested_sensors:
@@ -106,15 +106,15 @@ class StepPublisher:
         return messages
 
     def topic_writer(self, topic: Topic) -> TopicWriter:
-        """Return a writer for the messages of one topic (part of the protocol MessageSink)."""
+        """Return a writer for the messages of one topic."""
         return TopicWriter(lambda: partial(self.publish, topic))
 
     def batch_writer(self, layouts: Layouts) -> BatchWriter:
-        """Return a writer for messages that are always published together (part of the protocol MessageSink)."""
+        """Return a writer for messages that are always published together."""
         return BatchWriter(self, layouts)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Publish a message if the stack subscribed to its topic (part of the protocol MessageSink)."""
+        """Publish a message if the stack has subscribed to its topic. `time` is the simulated time in ns."""
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
         self._enqueue(topic.name, data)
@@ -124,7 +124,7 @@ class StepPublisher:
             self._queue.append((self._numbers[name], data))
 
     def _publish_exact(self, reading: Reading) -> None:
-        """Publish a scan or odometry in full precision, if that is requested."""
+        """Publish a scan or odometry in full precision, if the stack has subscribed to the exact topic."""
         if not isinstance(reading, Scan | Odometry):
             return
         name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
@@ -133,12 +133,12 @@ class StepPublisher:
 
 
 def _exact_topics(topic: Topic) -> list[Topic]:
-    """Return the topic with the values of `topic` in full precision, if there is one."""
+    """Return the topic for the values of `topic` in full precision, or an empty list if there is none."""
     kinds = {topics.SCAN_TYPE: FLOAT64_ARRAY, topics.ODOMETRY_TYPE: POSE2D}
     return [Topic(topic.name + EXACT_SUFFIX, kinds[topic.type])] if topic.type in kinds else []
 
 
 def _exact_scan(scan: Scan) -> bytes:
-    """Encode first angle, angle increment, minimum and maximum range, the lidar's x, y, yaw, and the ranges."""
+    """Encode a scan: first angle, angle increment, minimum and maximum range, the lidar's x, y, yaw, and the ranges."""
     head = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max, *scan.mount)
     return messages.float64_array(array("d", np.concatenate((head, scan.ranges)).tobytes()))

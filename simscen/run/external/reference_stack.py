@@ -1,7 +1,7 @@
 """The reference stack as an external process: `python -m simscen.run.external.reference_stack STACK`.
 
-STACK is a `stack:` section as JSON (default: empty). Tests use this program to verify the protocol: the log of a run is
-identical to the log with the stack inside the worker. `simscen bench` uses it to measure the cost of a beat.
+STACK is a `stack:` section as JSON (default: empty). Tests use this program to verify the protocol, and `simscen bench`
+uses it to measure the cost of the protocol.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _EMPTY_IMAGE = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.f
 
 
 class ReferenceStackPeer(Peer):
-    """Client of the stack protocol that passes readings to the reference stack and sends the stack's decisions."""
+    """Client of the stack protocol that passes readings to the reference stack, and sends the stack's decisions."""
 
     def __init__(self, spec: StackSpec) -> None:
         self._spec = spec
@@ -64,6 +64,7 @@ class ReferenceStackPeer(Peer):
             self._send_decision(step, stack.decide(step.tick, tuple(self._readings(step.messages))), stack)
 
     def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
+        """Store the goals (GOAL) or a request (PREEMPT, CANCEL) until the next step."""
         if kind == wire.GOAL:
             self._goal_content = content
         else:
@@ -103,7 +104,7 @@ class ReferenceStackPeer(Peer):
         return self._stack
 
     def _readings(self, received: list[Message]) -> Iterator[Reading]:
-        """Yield the readings in full precision."""
+        """Yield the readings in the received messages in full precision."""
         exact = {m.topic: iter([e.content for e in received if e.topic == m.topic + EXACT_SUFFIX]) for m in received}
         for message in received:
             sensor = self._sensors[message.topic]
@@ -200,7 +201,7 @@ def _numbers(table: Array) -> bytes:
 
 
 def main() -> None:
-    """Serve the stack given on the command line."""
+    """Serve the stack whose section is given on the command line."""
     section = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
     ReferenceStackPeer(StackSpec.model_validate(section, by_alias=True, by_name=False)).serve()
 

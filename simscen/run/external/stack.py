@@ -1,4 +1,4 @@
-"""Implement the Stack protocol by exchanging frames with a stack in another process."""
+"""Stack in another process: implements simscen.stack.protocols.Stack by exchanging frames over a socket."""
 
 import sys
 from collections.abc import Callable
@@ -52,13 +52,9 @@ _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANC
 class ExternalStack:
     """A stack in another process.
 
-    The order of calls is `begin` (start the process), `start` (handshake), `decide` at each beat, `end` (announce the
-    end), `finish` (wait for the exit), and `close`. `release` and `close` also end the process after an error.
-
-    With several robots, call each method for all stacks before the next one, so that the processes start and end
-    concurrently.
-
-    Raises RunError of a kind in simscen.run.external.protocol from all methods that use the process.
+    Order of calls: `begin` (start the process), `start` (handshake), `decide` at each beat (tick at which the robot
+    acts), `end` (send END), `finish` (wait for the exit), and `close`. `release` and `close` also end the process after
+    an error. All methods that use the process raise RunError of a kind in simscen.run.external.protocol.
     """
 
     def __init__(
@@ -69,9 +65,9 @@ class ExternalStack:
         parameters: RunParameters,
         log_file: FilePath | None = None,
     ) -> None:
-        """`name` is the stack's name in error messages, and `command` its program, whose output goes to `log_file`.
+        """`name` is the name of the stack in error messages. The output of `command` goes to `log_file`.
 
-        `surroundings` and `parameters` are what the stack receives in HELLO.
+        The stack receives `surroundings` and `parameters` in HELLO.
         """
         self._name, self._command, self._log_file = name, command, log_file
         self._surroundings, self._parameters = surroundings, parameters
@@ -93,7 +89,7 @@ class ExternalStack:
         )
 
     def begin(self, estimate: Estimate) -> None:
-        """Start the process and send HELLO; `estimate` is the initial pose to publish."""
+        """Start the process and send HELLO. `estimate` is the initial pose estimate."""
         surroundings, publisher = self._surroundings, self._publisher
         publisher.latch(surroundings.map, topics.MAP)
         publisher.latch(surroundings.masks.keepout, KEEPOUT_MASK)
@@ -117,7 +113,7 @@ class ExternalStack:
         self._process.send(wire.json_frame(wire.HELLO, hello))
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Call `begin` if that was not done, receive WELCOME, and send GOAL with all goals."""
+        """Receive WELCOME, and send GOAL with all goals. Calls `begin` if the process is not running."""
         if self._process is None:
             self.begin(estimate)
         assert self._process is not None
@@ -135,33 +131,33 @@ class ExternalStack:
         self._goals.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by this one; the stack answers at the next call of `decide`."""
+        """Replace the current goal by `goal`. The stack answers at the next call of `decide`."""
         self._goals.preempt(tick, goal)
         self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
 
     def cancel(self, tick: int) -> None:
-        """Cancel the current goal and all goals after it; the stack answers at the next call of `decide`."""
+        """Cancel the current goal and all following goals. The stack answers at the next call of `decide`."""
         self._canceling = True
         self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
 
     @property
     def can_switch_zones(self) -> bool:
-        """Whether the stack subscribed to masks of zones, through which it learns of switched zones."""
+        """Whether the stack has subscribed to the topic of a zone mask."""
         return not {KEEPOUT_ZONES.name, SPEED_ZONES.name}.isdisjoint(self._welcome.topics)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Send the masks that the enabled `zones` change, together with the next step."""
+        """Send the masks that change with the enabled `zones`, together with the next step."""
         for topic, mask in self._zone_masks.changed_masks(zones):
             self._publisher.publish_grid(tick, mask, topic)
 
     @property
     def plan(self) -> Path | None:
-        """The last plan that the stack sent; None if it follows no plan."""
+        """Last plan that the stack has sent; None if it follows no plan."""
         return self._plan
 
     @property
     def goal(self) -> Goal | None:
-        """The current goal as reported by the stack; None without one, and after `cancel`."""
+        """Current goal as reported by the stack; None if there is none, and after `cancel`."""
         return None if self._canceling else self._goals.goal
 
     @property
@@ -175,10 +171,10 @@ class ExternalStack:
         return {**self.facts, "about": self._welcome.about}
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Send the readings of this beat and return the stack's decision.
+        """Send the readings and return the stack's decision.
 
-        The stack is asked only if a command is due, after `preempt` or `cancel`, or if it requested every beat with
-        messages. Otherwise, the readings wait for the next step, and the last command is returned.
+        If no command is due, returns the last command, and sends the readings later. After `preempt` and `cancel`, and
+        for a stack that has requested every beat with messages, the stack always decides.
         """
         self._publisher.publish_readings(tick, readings)
         self._odometry = next(
@@ -197,12 +193,12 @@ class ExternalStack:
             self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
-        """Wait until the stack exits after END, for at most END_GRACE_S."""
+        """Wait until the stack exits, for at most END_GRACE_S after `end`."""
         if self._process is not None:
             self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
 
     def release(self) -> None:
-        """Request the end of the process without waiting for it."""
+        """Request the end of the process, without waiting for it."""
         if self._process is not None:
             self._process.release()
 
@@ -213,7 +209,7 @@ class ExternalStack:
             self._process = None
 
     def _request_answer(self, tick: int, due: bool) -> Answer:
-        """Send a step and return the answer."""
+        """Send a step and return the answer. `due` states whether a command is due."""
         assert self._process is not None
         limit = self._command.answer_limit
         if self._awaits_first_answer or tick <= self._welcome.first_answer_until * self._time.rate:
@@ -229,7 +225,7 @@ class ExternalStack:
 
     def _decode_answer_frame(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
         if kind != wire.ANSWER:
-            raise ProtocolViolation(f"a frame {_name(kind)} instead of an ANSWER")
+            raise ProtocolViolation(f"a frame {_frame_name(kind)} instead of an ANSWER")
         answered_tick, messages = wire.from_answer(body)
         if answered_tick != tick:
             raise ProtocolViolation(f"it answers tick {answered_tick} instead of {tick}")
@@ -249,6 +245,7 @@ class ExternalStack:
         return answer
 
     def _to_decision(self, tick: int, answer: Answer, due: bool) -> Decision:
+        """Return the decision in an answer, with the events of goals."""
         self._goals.advance(tick)
         if due and self._goals.fail_if_timed_out(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._parameters.stop_on_failure, "reason": "timeout"})
@@ -265,7 +262,7 @@ class ExternalStack:
         )
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
-        """Send a request that makes the next call of `decide` ask the stack."""
+        """Send a request, and let the stack decide at the next call of `decide`."""
         self._interrupted, self._plan = True, None
         self._send(kind, content)
 
@@ -274,6 +271,7 @@ class ExternalStack:
             self._process.send(wire.json_frame(kind, content))
 
     def _checked(self, what: str, function: Callable[[], T]) -> T:
+        """Call a function, and convert errors in the frame `what` to RunError."""
         assert self._process is not None
         try:
             return function()
@@ -281,7 +279,7 @@ class ExternalStack:
             raise self._process.error(protocol.PROTOCOL, f"{what}: {error}") from error
 
 
-def _name(kind: int) -> str:
+def _frame_name(kind: int) -> str:
     return wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"
 
 
@@ -292,9 +290,9 @@ def build_external_stack(
     seed: int,
     log_file: FilePath | None,
 ) -> ExternalStack:
-    """Build the external stack of a scenario. Its output goes to `log_file`, renamed by `robot_file`.
+    """Build the external stack of a robot. Raises InvalidInput if the name of the stack is not defined.
 
-    Raises InvalidInput if the name of the stack is not defined.
+    The output of the stack goes to `log_file` (None: no file); see `robot_file` for its name with several robots.
     """
     command = prepared.loaded.external_command
     if command is None:
@@ -316,12 +314,12 @@ def build_external_stack(
 
 
 def robot_file(file: FilePath, robot: str) -> FilePath:
-    """Return the file name for one of several robots, e.g. `stack.a.log`."""
+    """Return the file name for one of several robots, such as stack.a.log for the robot "a"."""
     return file.with_stem(f"{file.stem}.{robot}") if robot else file
 
 
 def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
-    """Return the scenario with the reference stack of each robot as an external process, for tests and benchmarks."""
+    """Return the scenario with the reference stack of each robot in an external process, for tests and benchmarks."""
     if prepared.robots:
         parts = {name: with_external_reference(part) for name, part in prepared.robots.items()}
         loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})

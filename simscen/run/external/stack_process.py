@@ -21,29 +21,26 @@ from simscen.run.external import protocol
 from simscen.run.process.isolation import READ_BYTES, TAIL_BYTES, CappedLog, clean_environment, output_tail
 
 EXIT_TIMEOUT_S = 2.0
-"""Time in which a process is expected to exit after it closed its socket."""
+"""Time to wait for the exit of a stack that has closed its socket."""
 CLEANUP_TIMEOUT_S = 5.0
-"""Time in which the launcher (see StackProcess) is expected to end the stack and all of its descendants."""
+"""Time to wait until the launcher (see StackProcess) has ended the stack and all of its descendants."""
 MAX_MESSAGE_LENGTH = 2000
 """Number of characters to which error messages of a stack are cut."""
 PEER_PATH_VARIABLE = "SIMSCEN_PEER_PATH"
-"""The environment variable with the folder of `simscen_peer`."""
+"""Environment variable with the folder of the Python module `simscen_peer`."""
 ROBOT_VARIABLE = "SIMSCEN_ROBOT"
-"""The environment variable with the name of the robot, if there are several."""
+"""Environment variable with the name of the robot, if there are several robots."""
 
 
 class StackProcess:
     """A running stack. Its output goes to `log_file`; error messages contain the last lines of the output.
 
-    The stack is the child of a launcher: a process of simscen.run.external.launcher that receives the command of the
-    stack, starts it, reports its exit, and ends it with all of its descendants.
-
-    All waits have a time limit in wall time. Frames in both directions and output are transferred concurrently, so that
-    none blocks another.
+    The stack is the child of a launcher: a process of simscen.run.external.launcher that starts the stack, reports its
+    exit, and ends the stack and all of its descendants.
     """
 
     def __init__(self, name: str, command: ExternalCommand, log_file: Path | None, robot: str = "") -> None:
-        """Start the command of the stack with this name; `robot` is the robot's name if there are several."""
+        """Start the command of the stack `name`. `robot` is the name of the robot if there are several robots."""
         self._name = f"{name} of robot `{robot}`" if robot else name
         self._send_buffer, self._receive_buffer, self._report_buffer = bytearray(), bytearray(), bytearray()
         self._exit_message = ""
@@ -88,9 +85,10 @@ class StackProcess:
         os.write(self._control, struct.pack("<I", len(encoded)) + encoded)
 
     def exchange(self, frame: bytes, limit_s: float, what: str) -> tuple[int, bytes]:
-        """Send a frame and return kind and body of the next one; `what` names the expected answer in errors.
+        """Send a frame, and return the kind and the body of the next received frame.
 
-        Raises RunError of a kind in simscen.run.external.protocol, e.g. if there is no answer within `limit_s` seconds.
+        Raises RunError of a kind in simscen.run.external.protocol, for example if no frame arrives within `limit_s`
+        seconds. `what` describes the expected frame in the error message.
         """
         self.send(frame)
         self._pump(lambda: self._disconnected or self._has_frame(), limit_s)
@@ -104,17 +102,17 @@ class StackProcess:
         return kind, body
 
     def send(self, frame: bytes) -> None:
-        """Queue a frame and send as much as possible."""
+        """Queue a frame, and send as much as possible."""
         self._send_buffer += frame
         self._flush()
 
     def send_end(self, frame: bytes) -> None:
-        """Send the frame END; the grace period of `receive_bye` starts now."""
+        """Send the frame END, and start the grace period of `receive_bye`."""
         self.send(frame)
         self._end_sent_at = time.monotonic()
 
     def receive_bye(self, grace_s: float) -> bytes:
-        """Wait up to `grace_s` after `send_end` until the stack disconnects; return the body of BYE or "{}"."""
+        """Wait until the stack disconnects, up to `grace_s` after `send_end`; return the body of its BYE, or "{}"."""
         self._pump(lambda: self._disconnected, max(0.0, self._end_sent_at + grace_s - time.monotonic()))
         with suppress(RunError):
             if self._has_frame():
@@ -129,7 +127,7 @@ class StackProcess:
         return RunError(kind, f"stack {self._name}: {message}", output_tail(output), by_stack=True)
 
     def release(self) -> None:
-        """Ask the launcher to end the stack and its descendants, without waiting for it."""
+        """Let the launcher end the stack and its descendants, without waiting for it."""
         if self._control >= 0:
             with suppress(BrokenPipeError):
                 os.write(self._control, b"\0")
@@ -137,7 +135,7 @@ class StackProcess:
             self._control = -1
 
     def close(self) -> None:
-        """End the stack and its descendants, wait for it, and free all resources. Includes `release`."""
+        """End the stack and its descendants, wait for their end, and free all resources. Includes `release`."""
         self.release()
         self._pump(lambda: self._output not in self._readers and self._report not in self._readers, CLEANUP_TIMEOUT_S)
         self._launcher.kill()
@@ -148,13 +146,14 @@ class StackProcess:
         self._log.close()
 
     def _crash_error(self) -> RunError:
+        """Return the error of a stack that has disconnected, with its exit code if it exits soon."""
         self._pump(lambda: bool(self._exit_message) or self._report not in self._readers, EXIT_TIMEOUT_S)
         launcher_runs = self._report in self._readers
         reason = "its process has closed its socket, but still runs" if launcher_runs else "its launcher has ended"
         return self.error(protocol.CRASHED, self._exit_message or reason)
 
     def _pump(self, done: Callable[[], bool], limit_s: float) -> None:
-        """Transfer data until `done` or until `limit_s` seconds have passed."""
+        """Transfer frames and output until `done` returns True or `limit_s` seconds have passed."""
         end = time.monotonic() + limit_s
         while not done():
             remaining = end - time.monotonic()
@@ -172,7 +171,7 @@ class StackProcess:
             del self._readers[descriptor]
 
     def _flush(self) -> None:
-        """Send as much as the socket accepts."""
+        """Send as many queued bytes as the socket accepts."""
         try:
             while self._send_buffer and not self._disconnected:
                 del self._send_buffer[: self._stream.send(self._send_buffer[:READ_BYTES])]
@@ -211,6 +210,7 @@ class StackProcess:
         return received >= wire.SIZE.size and received >= wire.SIZE.size + self._frame_size()
 
     def _frame_size(self) -> int:
+        """Return the size of the next frame in bytes. Raises RunError if it is invalid."""
         (size,) = wire.SIZE.unpack_from(self._receive_buffer)
         if not 1 <= size <= wire.MAX_FRAME_BYTES:
             raise self.error(
@@ -226,7 +226,7 @@ class StackProcess:
 
 
 def _describe_exit(report: dict[str, Any]) -> str:
-    """Describe the launcher's report that the stack could not be started or has exited."""
+    """Return a message for a report of the launcher: the stack could not be started, or has exited."""
     if "failed" in report:
         return f"its process cannot be started: {report['failed']}"
     code = report["exit"]
@@ -234,6 +234,7 @@ def _describe_exit(report: dict[str, Any]) -> str:
 
 
 def _error_message(body: bytes) -> str:
+    """Return the message in the body of a frame ERROR."""
     try:
         return str(wire.from_json(body)["message"])[:MAX_MESSAGE_LENGTH]
     except (wire.Malformed, KeyError):

@@ -1,7 +1,6 @@
 """Draw the zones of a scenario into masks of Nav2's costmap filters, for stacks that do not support polygons.
 
-The zones and the mask file of a stack are drawn into one mask for each filter. A mask changes when an event switches a
-zone.
+Each filter (keepout, speed) has one mask with the enabled zones and the mask file of the stack.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 CELL_M = 0.05
 """Cell size of masks for robots without a map."""
 SPEED_STEP_M_S = 0.01
-"""Smallest difference between two speed limits in a mask."""
+"""Smallest difference between two speed limits in a mask, for stacks without a mask file."""
 
 
 def switchable_zones(prepared: PreparedScenario) -> Zones:
@@ -50,10 +49,10 @@ def switchable_zones(prepared: PreparedScenario) -> Zones:
 
 
 class ZoneMasks:
-    """Masks with the enabled zones of one robot. They cover its map or, without a map, all zones."""
+    """Masks with the enabled zones of one robot. The masks cover the map or, without a map, all zones."""
 
     def __init__(self, surroundings: Surroundings, switchable: Zones) -> None:
-        """`surroundings` contains the zones at the start of the run, and `switchable` those that events can switch."""
+        """`surroundings` has the zones at the start of the run. `switchable` are the zones that events can switch."""
         keepout = (*surroundings.keepout, *switchable.keepout)
         speed = (*surroundings.speed_zones, *switchable.speed)
         masks = surroundings.masks
@@ -64,7 +63,7 @@ class ZoneMasks:
         self._drawn: dict[Topic, OccupancyGrid] = {}
 
     def changed_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
-        """Draw `zones`, the enabled ones, and yield the masks that changed since the last call (at first all masks)."""
+        """Yield the masks with the enabled `zones` that have changed since the last call; at first, all masks."""
         for topic, grid in self._masks(zones):
             before = self._drawn.get(topic)
             if before is None or not np.array_equal(before.cells, grid.cells):
@@ -82,7 +81,7 @@ class ZoneMasks:
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """`topic` and `filter` of each mask; for speed limits also `percent`, `base`, and `multiplier`, as in Nav2."""
+        """`topic` and `filter` of each mask; for the speed filter also `percent`, `base`, `multiplier` as in Nav2."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [
@@ -92,7 +91,7 @@ class ZoneMasks:
 
 
 class _SpeedMask:
-    """Mask of speed limits. `grid` defines its cells; None without any limit. `scale` converts its values to speeds."""
+    """Mask of speed limits. `grid` defines its cells (None: there are no limits)."""
 
     def __init__(
         self,
@@ -109,9 +108,11 @@ class _SpeedMask:
 
     @property
     def scale(self) -> dict[str, Any]:
+        """Parameters that convert values of the mask to speeds: `percent`, `base`, and `multiplier` as in Nav2."""
         return {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
 
     def draw(self, grid: OccupancyGrid, zones: Zones) -> OccupancyGrid:
+        """Return the mask of the enabled zones in the cells of `grid`."""
         if not zones.speed and zones.masks.speed is not None and grid is zones.masks.speed.grid:
             return grid
         limits: Array = np.full(grid.shape, np.inf)
@@ -131,6 +132,7 @@ class _SpeedMask:
 
 
 def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
+    """Return a free grid that covers all polygons."""
     corners = np.array([corner for polygon in polygons for corner in polygon] or [(0.0, 0.0)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.maximum(1, np.ceil((high - low) / CELL_M)).astype(int)
@@ -139,7 +141,7 @@ def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
 
 
 def _cells_of(mask: OccupancyGrid | None, grid: OccupancyGrid) -> npt.NDArray[np.int8]:
-    """Return the values of a mask file in the cells of another grid; FREE outside of it, and without it."""
+    """Return the values of a mask in the cells of `grid`; FREE outside of the mask, and if `mask` is None."""
     if mask is None:
         return np.full(grid.shape, FREE, dtype=np.int8)
     if mask is grid:
@@ -149,7 +151,7 @@ def _cells_of(mask: OccupancyGrid | None, grid: OccupancyGrid) -> npt.NDArray[np
 
 
 def _cells_inside(grid: OccupancyGrid, polygon: Polygon) -> Cells:
-    """Return rows and columns of the cells whose center is inside a polygon."""
+    """Return the rows and columns of the cells whose centers are inside a polygon."""
     corners = grid.cell_of(np.array(polygon))
     low = np.maximum(corners.min(axis=0), 0)
     high = np.minimum(corners.max(axis=0) + 1, grid.shape)
@@ -160,6 +162,7 @@ def _cells_inside(grid: OccupancyGrid, polygon: Polygon) -> Cells:
 
 
 def _centers(grid: OccupancyGrid) -> Array:
+    """Return the centers (n, 2) in m of all cells, row by row."""
     rows, columns = np.indices(grid.shape)
     return grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
 

@@ -1,7 +1,7 @@
-"""Inject the faults of a robot into its readings, beliefs, and commands while the run goes on.
+"""Inject the faults of a robot into its readings, beliefs (pose estimates), and commands during a run.
 
-Several faults of one sensor or actuator form a chain in the order of the scenario: each receives the output of the one
-before. A reading that a fault delays continues along the rest of the chain when it arrives.
+Several faults of one sensor or actuator form a chain in the order of the scenario: each fault receives the output of
+the previous fault.
 """
 
 import math
@@ -26,18 +26,18 @@ from simscen.run.stream_names import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
 MAX_ROUNDING_ERROR = 1e-9
-"""Largest change of a number that counts as rounding and not as an effect of the fault."""
+"""Largest change of a number that does not count as an effect of a fault."""
 
 
 @dataclass
 class _ActiveFault:
-    """A fault that disturbs messages now, or that has ended but still holds delayed ones.
+    """A fault that is active, or that has ended but still holds delayed messages.
 
     index:          index of the fault in the scenario
     sensor:         name of the affected sensor or actuator
-    kind:           its kind: the class of a sensor's readings such as "Scan", or COMMAND, WHEELS, or BELIEF
-    effect:         what the fault does
-    changed_count:  number of messages and commands that the fault has changed or withheld so far
+    kind:           kind of the sensor or actuator: class of readings such as "Scan", or COMMAND, WHEELS, or BELIEF
+    effect:         implementation of the fault
+    changed_count:  number of messages that the fault has changed or withheld
     has_ended:      whether only delayed messages remain
     """
 
@@ -49,7 +49,7 @@ class _ActiveFault:
     has_ended: bool = False
 
     def affects(self, reading: Reading) -> bool:
-        """Return whether the fault affects this reading. A fault of the wheels affects all wheel odometry."""
+        """Return whether the fault affects a reading. A fault of the wheels affects all wheel odometry."""
         if self.kind == WHEELS:
             return isinstance(reading, Odometry) and reading.sensor != TRUTH
         return reading.sensor == self.sensor
@@ -67,11 +67,11 @@ class FaultInjector:
         emit: Callable[[Event], None],
         map_faults: Collection[int] = (),
     ) -> None:
-        """Prepare the `faults` of a scenario; none is active until `begin`.
+        """Prepare the `faults` of a scenario. A fault is inactive until `begin`.
 
-        `setting` returns what a fault knows of its target. Commands reach the base through `link`. `emit` receives an
-        event when a fault changes its first message or command. `map_faults` are the indices in `faults` of those that
-        changed the map before the run; while active, each of them counts this as one change.
+        `setting` returns information about the target of a fault. `link` transmits commands to the base. `emit`
+        receives an event when a fault changes its first message. `map_faults` are the indices of the faults that
+        changed the map before the run.
         """
         self._map_faults = set(map_faults)
         self._faults, self._streams, self._setting, self._link, self._emit = faults, streams, setting, link, emit
@@ -85,10 +85,7 @@ class FaultInjector:
         self._last_belief: tuple[int, Belief, Belief] | None = None
 
     def begin(self, index: int) -> str:
-        """Start the fault with this index. Each activation draws from a random stream of its own.
-
-        Returns the kind of the affected sensor or actuator.
-        """
+        """Start the fault with this index; return the kind of the affected sensor or actuator."""
         entry = self._faults[index]
         self._activations[index] += 1
         rng = self._streams.generator(f"fault{self._names[index]}#{self._activations[index]}")
@@ -101,7 +98,7 @@ class FaultInjector:
         return setting.kind
 
     def end(self, index: int) -> int:
-        """End a fault and return how many messages and commands it changed. Delayed messages still arrive later."""
+        """End a fault, and return the number of messages that it changed. Delayed messages still arrive later."""
         key = index, self._activations[index]
         active = self.active.pop(key)
         if remaining := active.effect.end():
@@ -109,7 +106,7 @@ class FaultInjector:
         return active.changed_count
 
     def disturb(self, readings: Readings) -> Readings:
-        """Return the readings that the stack receives, including delayed ones that arrive now."""
+        """Return the readings that the stack receives: disturbed readings, and delayed readings that arrive now."""
         if not self.active:
             return readings
         for active in self._in_order():
@@ -126,9 +123,8 @@ class FaultInjector:
     def command(self, tick: int, command: Twist) -> Twist:
         """Send the stack's command to the base, and return the command that the wheels execute.
 
-        Faults of cmd_vel act on the messages in `link`. The base executes the last message that it has received, or
-        STOP after its timeout; faults of the wheels change what it executes. Must be called exactly once at each beat
-        of the robot, that is, each tick at which one of its sensors, its stack, or a truth sample is due.
+        Faults of cmd_vel change the message to the base. Faults of the wheels change the command that the base
+        executes. Call it exactly once at each beat (tick at which a sensor, the stack, or a truth sample is due).
         """
         is_sent = self._link.send(tick, command)
         if not self._affects_commands and not self.active:
@@ -146,7 +142,7 @@ class FaultInjector:
         return command
 
     def belief(self, tick: int, belief: Belief) -> Belief:
-        """Return the belief that the navigator receives, after faults of the localizer."""
+        """Return the belief that the navigator receives: `belief` with the effects of faults of the localizer."""
         if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._last_belief is None or self._last_belief[:2] != (tick, belief):
@@ -158,11 +154,13 @@ class FaultInjector:
         return self._last_belief[2]
 
     def _in_order(self) -> list[_ActiveFault]:
+        """Return the active faults in the order of the scenario."""
         if not self.active:
             return []
         return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
 
     def _delayed_readings(self, active: _ActiveFault) -> Sequence[Reading]:
+        """Return the delayed readings that arrive now. Raises RunError if the fault returns anything else."""
         arriving: object = active.effect.arriving_readings()
         if not isinstance(arriving, list | tuple):
             self._raise_invalid(
@@ -177,6 +175,7 @@ class FaultInjector:
         return arriving
 
     def _disturb_reading(self, active: _ActiveFault, reading: Reading) -> Reading | None:
+        """Return the disturbed reading, or None if the fault withholds it. Raises RunError if it is invalid."""
         disturbed = active.effect.reading(_read_only(reading))
         if disturbed is not None and _type_and_sensor(disturbed) != _type_and_sensor(reading):
             problem = f"returned an object of type {type(disturbed).__name__} for a {type(reading).__name__} reading"
@@ -186,7 +185,7 @@ class FaultInjector:
         return disturbed
 
     def _transmit_command(self, tick: int, command: Twist | None) -> None:
-        """Send a message (None for no new one) through the faults of cmd_vel, which may replace it by a delayed one."""
+        """Send a command (None: no new command) through all faults of cmd_vel to the base."""
         for active in self._in_order():
             if active.kind == COMMAND:
                 late = active.effect.arriving_command()
@@ -198,6 +197,7 @@ class FaultInjector:
             self._link.receive(tick, command)
 
     def _disturb_command(self, active: _ActiveFault, command: Twist) -> Twist | None:
+        """Return the disturbed command, or None if the fault withholds it. Raises RunError if it is invalid."""
         disturbed = active.effect.command(command)
         if disturbed is None and active.kind == COMMAND:
             self._count(active)
@@ -229,6 +229,7 @@ class FaultInjector:
         raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.added_by}")
 
     def _count(self, active: _ActiveFault) -> None:
+        """Count a change by a fault, and emit an event for the first change."""
         if active.has_ended:
             return
         if not active.changed_count:
@@ -238,7 +239,7 @@ class FaultInjector:
 
 
 def _read_only(reading: Reading) -> Reading:
-    """Make the arrays of a reading read-only, so that a fault cannot change them in place unnoticed."""
+    """Make the arrays of a reading read-only, so that a fault cannot change them in place."""
     for array in (getattr(reading, field.name) for field in fields(reading)):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False

@@ -1,4 +1,4 @@
-"""Connect faults with a robot: what a fault knows of its target, and how it changes commands and beliefs."""
+"""Interfaces between faults and a robot: information for faults, simulated readings, commands, and the localizer."""
 
 from collections.abc import Callable, Collection
 from functools import cache
@@ -21,11 +21,11 @@ from simscen.sensors.sensor import SensorView
 from simscen.stack.protocols import Localizer
 
 CreateRayCaster = Callable[[TriangleMesh, frozenset[str]], RayCaster]
-"""Function that creates a ray caster for a static mesh and all moving objects except those with these names."""
+"""Function that creates a ray caster for a static mesh and all moving objects, except objects with some names."""
 
 
 class FaultSettingFactory:
-    """Creates the FaultSetting of each fault of one robot, that is, what the fault knows of its target."""
+    """Creates the FaultSetting (information about the affected sensor or actuator) of each fault of one robot."""
 
     def __init__(
         self,
@@ -36,12 +36,12 @@ class FaultSettingFactory:
         mesh: TriangleMesh,
         create_ray_caster: CreateRayCaster,
     ) -> None:
-        """`now` returns the current tick, `view` gives true poses and pictures, and `mesh` is the static world."""
+        """`now` returns the current tick. `view` gives true poses and images. `mesh` is the static world."""
         self._robot, self._clock, self._now, self._view = robot, clock, now, view
-        self._ray_caster_without = cache(lambda names: create_ray_caster(_without(mesh, names), names))
+        self._ray_caster_without = cache(lambda names: create_ray_caster(_without_objects(mesh, names), names))
 
     def __call__(self, entry: FaultEntry) -> FaultSetting:
-        """Return the FaultSetting for the fault in this entry of the scenario."""
+        """Return the FaultSetting of a fault in the scenario."""
         sensor = self._robot.sensors.get(entry.sensor)
         return FaultSetting(
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
@@ -55,19 +55,19 @@ class FaultSettingFactory:
         return HypotheticalSensor(spec, self._view, self._ray_caster_without, self._now, name)
 
 
-def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
-    """Return the mesh without the named objects."""
+def _without_objects(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
+    """Return the mesh without the objects with these names."""
     removed = [number for number, name in enumerate(mesh.names) if name in names]
     kept = ~np.isin(mesh.owners, removed)
     return TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
 
 
 CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
-"""Function that returns a ray caster for the world without the objects with these names, static or moving."""
+"""Function that returns a ray caster for the world without the static and moving objects with some names."""
 
 
 class HypotheticalSensor:
-    """Computes readings from another pose or without some objects, as faults.base.SensorSimulator promises."""
+    """Computes the readings of a sensor at another pose, or without some objects. Implements SensorSimulator."""
 
     def __init__(
         self,
@@ -77,16 +77,16 @@ class HypotheticalSensor:
         now: Callable[[], int],
         name: str,
     ) -> None:
-        """`spec` and `name` are those of the sensor, `view` gives the robot's true pose, and `now` the current tick."""
+        """`spec` and `name` belong to the sensor. `view` gives the true pose, and `now` returns the current tick."""
         self._spec, self._view, self._now, self._name = spec, view, now, name
         self._ray_caster_without = ray_caster_without
         mount = getattr(spec, "mount", None)
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges (n,) in m that `scan` would have if the lidar's pose differed from the nominal by `error`.
+        """Return the ranges (n,) in m of `scan` if the pose of the lidar had an `error` (in the nominal lidar frame).
 
-        Beams pass through the objects named in `without`.
+        Beams pass through the objects with the names in `without`.
         """
         pose = self._view.base_pose().compose(self._assumed_mount(error))
         angles = scan.angles()
@@ -99,7 +99,7 @@ class HypotheticalSensor:
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
-        """Return the picture that the camera would take now if its pose differed from the nominal by `error`."""
+        """Return the current image of the camera if its pose had an `error` (in the nominal camera frame)."""
         spec = self._spec
         assert isinstance(spec, Camera)
         captured = self._view.image(
@@ -108,28 +108,26 @@ class HypotheticalSensor:
         return Image(self._name, self._now(), *captured)
 
     def _assumed_mount(self, error: Pose3 | None) -> Pose3:
+        """Return the pose of the sensor with an error in the base frame."""
         mount_pose = self._mount.pose
         return mount_pose if error is None else mount_pose.compose(error)
 
 
 class CommandLink:
-    """The cmd_vel connection between stack and base, in which faults can delay or drop messages.
+    """The cmd_vel connection between stack and base.
 
-    At each beat, call `send` once, and call `receive` for each message that arrives at the base.
-
-    The stack sends one message each `period` ticks, and another one whenever the command changes. The base stops if no
-    message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). A timeout shorter than one
-    period is extended to one period; otherwise the base would stop between any two messages.
+    The stack sends a message every `period` ticks, and whenever the command changes. The base stops if no message
+    arrives for `timeout` ticks, as in ros2_control (`cmd_vel_timeout`). The timeout is at least one period.
     """
 
     def __init__(self, period: int, timeout: int) -> None:
-        """Both in ticks."""
+        """`period` and `timeout` are in ticks."""
         self._period, self._timeout = period, max(period, timeout)
         self._sent: Twist | None = None
         self._received, self._received_at = STOP, 0
 
     def send(self, tick: int, command: Twist) -> bool:
-        """Take the stack's command at this beat, and return whether the stack sends a message with it now."""
+        """Return whether the stack sends a message with its command at this tick. Call it once at each tick."""
         sent = tick % self._period == 0 or command != self._sent
         self._sent = command
         return sent
@@ -139,12 +137,12 @@ class CommandLink:
         self._received, self._received_at = command, tick
 
     def active_command(self, tick: int) -> Twist:
-        """Return the command that the base executes: the last received one, or STOP after the timeout."""
+        """Return the command that the base executes: the last received command, or STOP after the timeout."""
         return self._received if tick - self._received_at <= self._timeout else STOP
 
 
 class LocalizerWithFaults:
-    """Localizer whose published belief is changed by faults. The internal state of the `inner` one is not affected."""
+    """Localizer whose published belief (pose estimate) `disturb` changes. The state of `inner` is not affected."""
 
     def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
         self._inner, self._disturb = inner, disturb

@@ -1,4 +1,4 @@
-"""Apply the faults of a robot's map before the run starts."""
+"""Apply the faults that change a robot's map, before the run starts."""
 
 from dataclasses import replace
 
@@ -16,10 +16,10 @@ from simscen.run.stream_names import stream_names
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
-    """Return the scenario with the maps of its robots changed by map faults, whose random values depend on `seed`.
+    """Return the scenario with the maps of its robots changed by faults, which draw random numbers from `seed`.
 
-    The field `map_faults` of the result lists the indices of the faults that changed the map. Raises RunError if a
-    fault returns no map.
+    The field `map_faults` of the result has the indices of the faults that changed the map. Raises RunError if a fault
+    returns no map.
     """
     if not prepared.robots:
         return _apply_to_robot(prepared, Streams(seed))

@@ -1,4 +1,4 @@
-"""Track which zones of a stack's costmap filters are enabled, because events can switch them during a run."""
+"""Enabled zones of a stack's costmap filters. Events can switch zones during a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,22 +10,22 @@ from simscen.model.stack_base import StackBase
 
 @dataclass
 class _Filter:
-    """State of one filter. `zones` has the speed limit in m/s (0 for none) and "is enabled" of each zone by region."""
+    """State of one filter. `zones` has the speed limit in m/s (0: none) and the enabled state of zones by region."""
 
     zones: dict[str, tuple[float, bool]]
     has_mask: bool
     enabled: bool = True
 
     def is_enabled(self, region: str) -> bool:
-        """Return whether the filter and its zone in this region are enabled."""
+        """Return whether the filter and its zone in `region` are enabled."""
         return self.enabled and self.zones.get(region, (0.0, False))[1]
 
 
 class CostmapFilters:
-    """Zones and masks of the filters of one stack; `zones` is the current state to send to it."""
+    """Zones and masks of the costmap filters of one stack."""
 
     def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
-        """`stack` names the zones at the start of the run, and `regions` has the polygons of all regions by name."""
+        """Take the initial zones from the specification of the stack. `regions` has all polygons by name."""
         self._regions, self._masks = regions, masks
         keepout = dict.fromkeys(stack.keepout, (0.0, True))
         speed = {zone.region: (zone.speed_limit, True) for zone in stack.speed_zones}
@@ -35,7 +35,7 @@ class CostmapFilters:
         }
 
     def rejection_reason(self, order: ZoneSwitch) -> str:
-        """Return why an order would have no effect; "" if it would have one. Changes nothing."""
+        """Return the reason why an order would have no effect, or "" if it would have an effect. Changes nothing."""
         target, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
             if not target.zones and not target.has_mask:
@@ -50,7 +50,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Carry out an order that has an effect; return the names of the switched regions, and "" for the mask."""
+        """Execute an order that has an effect; return the names of the switched regions ("" is the mask)."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled
@@ -60,12 +60,12 @@ class CostmapFilters:
         return (order.region,)
 
     def speed_limit(self, region: str) -> float:
-        """Return the speed limit of a zone in m/s; 0 for none."""
+        """Return the speed limit in m/s of the zone in `region`, or 0 if there is none."""
         return self._filters["speed"].zones.get(region, (0.0, False))[0]
 
     @property
     def zones(self) -> Zones:
-        """The zones and masks that are enabled."""
+        """Enabled zones and masks."""
         keepout, speed = self._filters["keepout"], self._filters["speed"]
         return Zones(
             tuple(self._regions[name] for name in keepout.zones if keepout.is_enabled(name)),

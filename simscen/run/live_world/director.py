@@ -19,7 +19,7 @@ _AT_ONCE = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Evaluates all triggers at each beat: first those of events, then of faults, both in the order of the scenario."""
+    """Evaluates all triggers at each beat (tick at which a robot acts), and starts due events and faults."""
 
     def __init__(
         self,
@@ -29,9 +29,9 @@ class Director:
         stage: LiveStage,
         injector: FaultInjector,
     ) -> None:
-        """Triggers observe `stage`, and the actions of `steps` change it; `injector` starts and ends the `faults`.
+        """Prepare the events `steps` and the `faults`. Triggers observe `stage` (the world), and actions change it.
 
-        Triggers with a probability draw from `streams`.
+        `injector` starts and ends the faults. `streams` gives random numbers for triggers with a probability.
         """
         self._stage, self._injector, self._faults = stage, injector, faults
         self._steps = [
@@ -47,11 +47,11 @@ class Director:
 
     @property
     def has_disturbances(self) -> bool:
-        """Whether there is any event or fault."""
+        """Whether the director has any event or fault."""
         return bool(self._steps or self._starts)
 
     def process_beat(self) -> None:
-        """Perform the events and start and end the faults that are due at this beat."""
+        """Perform all due events, end and start all due faults. Call it once at each beat."""
         for index, (step, trigger) in enumerate(self._steps):
             situation = self._situations.get(index)
             for _ in range(0 if situation is None or trigger.is_exhausted else trigger.count_firings(situation)):
@@ -73,7 +73,7 @@ class Director:
         )
 
     def _observe_next_step(self, index: int) -> None:
-        """Start to evaluate the trigger of the step that follows this one."""
+        """Start to evaluate the trigger of the next step of the same sequence, if there is one."""
         if index + 1 < len(self._steps) and self._steps[index + 1][0].after == index:
             self._situations[index + 1] = cast(Situation, RelativeSituation(self._stage))
 
@@ -97,8 +97,7 @@ class Director:
 class TriggerState:
     """Evaluates one trigger at each beat.
 
-    A rising trigger fires when its condition becomes true, also at the first beat. A falling trigger fires when its
-    condition becomes false after it was true.
+    A rising trigger fires when its condition becomes true, a falling trigger when its condition becomes false.
     """
 
     def __init__(self, trigger: Trigger, rng: np.random.Generator) -> None:
@@ -109,7 +108,7 @@ class TriggerState:
         self._scheduled: list[int] = []
 
     def count_firings(self, now: Situation) -> int:
-        """Evaluate the trigger in the state `now` and return how often it fires; call it once at each beat."""
+        """Evaluate the trigger in the state `now`, and return how many times it fires. Call it once at each beat."""
         if self._remaining and self._has_edge(now) and self._passes_probability():
             self._remaining -= 1
             self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
@@ -123,6 +122,7 @@ class TriggerState:
         return not self._remaining and not self._scheduled
 
     def _has_edge(self, now: Situation) -> bool:
+        """Return whether the condition has changed in the direction that fires the trigger."""
         before, self._was_true = self._was_true, self._condition.holds(now)
         return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
 
@@ -131,10 +131,7 @@ class TriggerState:
 
 
 class ConditionState:
-    """Tracks for how long a condition and each of its parts have held, because their key `for` can require a duration.
-
-    `holds` must be called at each beat.
-    """
+    """Tracks how long a condition and its parts have been true, for the key `for`. Call `holds` at each beat."""
 
     def __init__(self, test: AnyCondition) -> None:
         self._test = test
@@ -143,7 +140,7 @@ class ConditionState:
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
-        """Update with the state `now`; return whether the condition has held for as long as required."""
+        """Return whether the condition has been true for the required duration, up to the state `now`."""
         if not self._is_true(now):
             self._since = None
             return False
@@ -152,7 +149,7 @@ class ConditionState:
         return self._test.for_ is None or now.tick - self._since >= now.clock.ticks(self._test.for_)
 
     def _is_true(self, now: Situation) -> bool:
-        """Return whether the condition holds at this beat. Evaluates all parts, since each tracks its own duration."""
+        """Return whether the condition is true at this beat. Evaluates all parts, because each tracks its duration."""
         if not self._parts:
             return self._test.holds(now)
         now = self._test.situation_of_robot(now)
@@ -163,10 +160,10 @@ class ConditionState:
 
 
 class RelativeSituation:
-    """View of the run for a step of a sequence, in which time, distance, and events start at the previous step."""
+    """View of the run for a step of a sequence: time, distance, and events start at the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Start the view at the state `now`. `others` are the views of the other robots by name; None creates them."""
+        """Start the view at the state `now`. `others` are the views of the other robots by name (None: create them)."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
@@ -194,11 +191,11 @@ class RelativeSituation:
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick of the last scan that the stack received, relative to the start of the view.
 
-        The tick is negative if the scan was before the view. Without a scan, it is that of the start of the run.
+        Returns the start of the run, relative to the start of the view, if there was no scan.
         """
         last = self._now.last_scan_tick(sensor)
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
-        """Return any other attribute of the state, such as the robot's pose, which is the same in this view."""
+        """Return any other attribute of the state, such as the robot's pose."""
         return getattr(self._now, name)

@@ -1,4 +1,4 @@
-"""Simulate the pedestrians of a run among the walls of the static world."""
+"""Simulate the pedestrians of a run."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -20,17 +20,17 @@ from simscen.worlds.geometry.cross_section import cross_section
 from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
-"""Heights at which walls block pedestrians; walls at the last height also block their view."""
+"""Heights at which walls block the way of pedestrians. Walls at the last height also block their view."""
 BODY_HEIGHT_RANGE_M = (0.05, 1.7)
-"""Range of heights above the ground in which movable objects block pedestrians."""
+"""Range of heights above the ground in which objects block the way of pedestrians."""
 PATH_CELL_M = 0.1
 """Cell size of the grid for path planning."""
 PREFERRED_CLEARANCE_M = 0.2
-"""Clearance between pedestrian and walls that planned paths keep where there is enough space."""
+"""Clearance between pedestrians and walls on planned paths, if there is enough space."""
 
 
 class PedestrianMap:
-    """Walls that block pedestrians in a world, and paths around them. Both are computed when first needed."""
+    """Walls that block pedestrians, and paths around these walls. Both are computed when first needed."""
 
     def __init__(self, built: BuiltWorld) -> None:
         self._built = built
@@ -45,9 +45,9 @@ class PedestrianMap:
         return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
 
     def plan_path(self, start: Point, goal: Point, radius: float) -> list[Point]:
-        """Return the corners of a path around walls, without `start`; only `goal` if there is no path. All in m.
+        """Return the corners of a path around walls, without `start`; only `goal` if there is no path.
 
-        The path keeps PREFERRED_CLEARANCE_M from walls if possible.
+        `radius` is the radius of the pedestrian in m.
         """
         for clearance in (radius + PREFERRED_CLEARANCE_M, radius):
             if clearance not in self._planners:
@@ -71,7 +71,7 @@ EVENT_KINDS = {
 
 
 class PedestrianSimulation:
-    """Steps all pedestrians of a run and passes their events to `listeners`. The crowd is built for the first one."""
+    """Steps all pedestrians of a run, and passes their events to `listeners`."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._map, self._simulation = PedestrianMap(built), simulation
@@ -99,7 +99,7 @@ class PedestrianSimulation:
         return body
 
     def simulates(self, name: str) -> bool:
-        """Return whether a body with this name is a pedestrian."""
+        """Return whether the body with this name is a pedestrian."""
         return name in self._behaviors
 
     def remove(self, name: str) -> None:
@@ -108,7 +108,7 @@ class PedestrianSimulation:
             self._crowd.remove(name)
 
     def has_room(self, center: Point, radius: float, walls_only: bool) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a position; `walls_only` ignores all but walls."""
+        """Return whether a pedestrian of `radius` m fits at `center`. `walls_only` ignores objects and robots."""
         if walls_only or self._map.walls.distance(center) < radius:
             return self._map.walls.distance(center) >= radius
         surroundings = self._surroundings()
@@ -121,6 +121,7 @@ class PedestrianSimulation:
         return all(position.distance(pose) >= radius + other for pose, other in others)
 
     def _step(self) -> None:
+        """Advance all pedestrians by one time step of the pedestrian model."""
         crowd, step_s = self._crowd, self._step_s
         before = crowd.poses()
         actions = crowd.step(self._surroundings(), step_s)
@@ -141,6 +142,7 @@ class PedestrianSimulation:
     # Perception of the pedestrians
 
     def _surroundings(self) -> Surroundings:
+        """Return the robots and objects that pedestrians observe."""
         robots = tuple(self._observe_robot(robot) for robot in self._simulation.robots.values())
         bodies = self._simulation.bodies_and_poses()
         others = [(name, body, pose) for name, (body, pose) in bodies.items() if name not in self._behaviors]

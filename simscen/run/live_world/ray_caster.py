@@ -13,14 +13,14 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 REFRESH_DISTANCE_M = 4.0
-"""Distance that the origin of the rays may move before the reachable objects are determined again."""
+"""Distance that the origin of the rays moves between two updates of the reachable objects."""
 
 
 class LiveRayCaster(RayCaster):
     """Casts the rays of a robot's sensors against the static world and all moving objects at their current poses."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
-        """Cast rays for a robot, ignoring the moving objects named in `without`."""
+        """Cast rays for a robot in the static world `scene`, ignoring moving objects with the names in `without`."""
         self._scene, self._robot, self._without = scene, robot, without
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}
@@ -29,7 +29,7 @@ class LiveRayCaster(RayCaster):
         self._state: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3); inf beyond `reach`."""
+        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3); inf beyond `reach` m."""
         self._update_scene((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
@@ -53,7 +53,7 @@ class LiveRayCaster(RayCaster):
             self._scene.set_bodies({name: (self._meshes[name], poses[name]) for name in names}, rest_poses)
 
     def _reachable_names(self, predicted: PredictedPoses, origin: Vector, reach: float) -> Iterable[str]:
-        """Return the objects that can be in reach according to their scripted paths."""
+        """Return the names of the objects that can be within `reach` m of `origin`, according to predicted poses."""
         reachable = self._reachable
         if reachable is None or not reachable.is_valid_for(predicted, origin, reach):
             # 1 % more, because rays end slightly beyond their reach.
@@ -63,7 +63,7 @@ class LiveRayCaster(RayCaster):
         return reachable.names
 
     def _build_meshes(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
-        """Return the surface of each body by name; bodies of equal shape share one mesh."""
+        """Return the surface of each body by name. Bodies of equal shape share one mesh."""
         previous = self._bodies or {}
         known = [(_parts(previous[name]), mesh) for name, mesh in self._meshes.items()]
         meshes = dict[str, TriangleMesh]()
@@ -77,7 +77,7 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """Names of the moving objects that rays of `reach` m from `origin` can hit, if paths stay as `predicted`."""
+    """Names of the moving objects that rays of `reach` m from `origin` can hit, according to `predicted` poses."""
 
     predicted: PredictedPoses
     origin: Vector
@@ -85,12 +85,12 @@ class ReachableObjects(NamedTuple):
     names: list[str]
 
     def is_valid_for(self, predicted: PredictedPoses, origin: Vector, reach: float) -> bool:
-        """Return whether the names include all objects that these rays, perhaps from another origin, can hit."""
+        """Return whether `names` has all objects that rays with these predicted poses, origin, and reach can hit."""
         return predicted is self.predicted and math.dist(origin, self.origin) + reach <= self.reach
 
 
 def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
-    """Return shapes and poses of the parts of a body, without their names."""
+    """Return the shape and pose of each solid of a body."""
     return [(solid.shape, solid.pose) for solid in body.solids]
 
 

@@ -1,4 +1,4 @@
-"""The world during a run, as triggers observe it and actions change it, with the events and orders of each robot."""
+"""View of the world during a run, for triggers that observe it and actions that change it."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -28,12 +28,10 @@ from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 
 class LiveStage:
-    """The world from the point of view of one robot: implements core.stage.Stage and keeps the robot's events.
+    """The world from the point of view of one robot. Implements core.stage.Stage, and keeps the robot's events.
 
-    An event of the world, such as a moved door, is added to the events of all robots.
-
-    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. It is
-    delivered at once at a beat of this robot, and otherwise at the robot's next beat.
+    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. Orders
+    are delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
     """
 
     def __init__(
@@ -49,9 +47,9 @@ class LiveStage:
         streams: Streams,
         stages: "dict[str, LiveStage]",
     ) -> None:
-        """`goals` are those that events send, and actions draw from `streams`.
+        """Add the stage to `stages`, the stages of all robots by name.
 
-        The stage adds itself to `stages`, the stages of all robots by name.
+        `goals` are the goals that events can send. `streams` gives random numbers for actions.
         """
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
         self._filters, self.clock = filters, clock
@@ -62,28 +60,28 @@ class LiveStage:
         self._goals = {goal.name: goal for goal in goals}
         self._update_pose()
         self.belief: Belief | None = None
-        """The last belief that the stack published; None before the first."""
+        """Last belief (pose estimate) of the stack, or None."""
         self.clearance: float | None = None
-        """Distance in m from the robot's hull to the nearest obstacle in the newest truth sample; None before it."""
+        """Distance in m from the robot's hull to the nearest obstacle at the last truth sample, or None."""
         self.travelled = 0.0
-        """Distance driven in m; a teleportation of the robot does not count."""
+        """Driven distance in m, without teleportations."""
         self._scan_ticks: dict[str, int] = {}
         self._is_due = True
         self.pending_orders: list[Callable[[int], None]] = []
-        """Orders to deliver to the stack at the robot's next beat; each is called with the current tick."""
+        """Orders for the robot's next beat: functions that take the current tick."""
         self.events: tuple[Event, ...] = ()
         """All events so far."""
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
-        """Whether a Director observes this stage. If not, the stage need not be updated at each beat."""
+        """Whether a Director observes this stage, so that it must be updated at each beat."""
 
     # Updates by the lockstep loop
 
     def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
-        """Update the robot's pose at a beat, from the truth sample if there is one.
+        """Update the robot's pose at a beat, from a truth sample if there is one.
 
-        `is_due` states whether the beat is one of this robot, so that orders are delivered at once.
+        `is_due` states whether the beat belongs to this robot, so that orders can be delivered at once.
         """
         self._is_due = is_due
         previous = self._pose
@@ -91,25 +89,26 @@ class LiveStage:
         self.travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
 
     def deliver_orders(self, tick: int) -> None:
-        """Deliver the pending orders to the stack. Called at a beat of this robot."""
+        """Deliver the pending orders to the stack. Call it at a beat of this robot."""
         orders, self.pending_orders = self.pending_orders, []
         for order in orders:
             order(tick)
 
     def _send_order(self, order: Callable[[int], None]) -> None:
+        """Deliver an order now if a beat of this robot is due, else at its next beat."""
         self.pending_orders.append(order)
         if self._is_due:
             self.deliver_orders(self.tick)
 
     def _update_pose(self, truth: Truth | None = None) -> None:
-        """Update the true pose, the twist in the base frame, and, from a truth sample, the clearance."""
+        """Update the true pose and the twist in the base frame, and the clearance if there is a truth sample."""
         if truth is not None:
             self._pose, self.twist, self.clearance = truth.pose, truth.twist, truth.clearance
         else:
             self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
 
     def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
-        """Update from the readings that the stack received and from its decision."""
+        """Update the belief, the events, and the ticks of scans from the stack's decision and the stack's readings."""
         for reading in readings:
             if isinstance(reading, Scan):
                 self._scan_ticks[reading.sensor] = self.tick
@@ -125,17 +124,17 @@ class LiveStage:
     # Observed by triggers
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick at which the stack last received a scan of this lidar, or of any lidar for None."""
+        """Return the tick at which the stack last received a scan of a lidar (None: any lidar), or None."""
         return max(self._scan_ticks.values(), default=None) if sensor is None else self._scan_ticks.get(sensor)
 
     @property
     def tick(self) -> int:
-        """The simulated time in ticks."""
+        """Simulated time in ticks."""
         return self._simulation.tick
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of all robots; empty if there is only one."""
+        """Names of all robots; empty if there is only one robot."""
         return tuple(self._stages) if len(self._stages) > 1 else ()
 
     def of(self, robot: str) -> "LiveStage":
@@ -144,32 +143,32 @@ class LiveStage:
 
     @property
     def robot(self) -> Pose2:
-        """The true pose of the robot."""
+        """True pose of the robot."""
         return self._pose.plane
 
     @property
     def plan(self) -> Path | None:
-        """The plan that the robot follows."""
+        """Plan that the robot follows, or None."""
         return self._stack.plan
 
     @property
     def goal(self) -> Goal | None:
-        """The goal that the robot drives to."""
+        """Goal that the robot drives to, or None."""
         return self._stack.goal
 
     def region(self, name: str) -> Polygon:
-        """Return a named region of the world."""
+        """Return the polygon of a region of the world."""
         return self._world.regions[name]
 
     def object(self, name: str) -> Pose2 | None:
-        """Return the pose of a named object, or None if it does not exist."""
+        """Return the pose of an object, or None if it does not exist."""
         pose = self._simulation.object_pose(name)
         return pose.plane if pose else None
 
     # Changed by actions
 
     def spawn(self, body: Body) -> None:
-        """Add a body to the world, replacing one of the same name."""
+        """Add a body to the world; replaces a body of the same name."""
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
@@ -182,26 +181,29 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.OBJECT_REMOVED, name))
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
-        """Add a pedestrian, replacing a body of the same name."""
+        """Add a pedestrian; replaces a body of the same name."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)
         data = {**body_data(self._pedestrians.add(walker)), "person": True, "behavior": walker.behavior}
         self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, walker.name, data))
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a place; `walls_only` ignores all but walls."""
+        """Return whether a pedestrian with this radius in m fits at a position (x, y) in m.
+
+        `walls_only` ignores objects and robots.
+        """
         return self._pedestrians.has_room(place, radius, walls_only)
 
     def rng(self, name: str) -> np.random.Generator:
-        """Return a new generator for the random stream of this name."""
+        """Return a new generator for the random stream with this name."""
         return self._streams.generator(name)
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """Return the poses of a door panel when closed and when open."""
+        """Return the closed pose and the open pose of a door panel."""
         return self._world.doors[name]
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Move a body along a path that starts now."""
+        """Let a body follow a path from now on."""
         self._pedestrians.remove(name)
         self._simulation.move(name, path)
         self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
@@ -214,7 +216,7 @@ class LiveStage:
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
-        """Return the mass of a pushable object in kg; 0 for others."""
+        """Return the mass of an object in kg, or 0 if it cannot be pushed."""
         return self._simulation.mass(name)
 
     def place(self, name: str, pose: Pose2) -> None:
@@ -230,7 +232,7 @@ class LiveStage:
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push the robot or, if `name` is given, an object, with an impulse in N s that is spread over `seconds`."""
+        """Push an object (None: the robot) with an impulse in N s (x, y in the world frame), spread over `seconds`."""
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
         elif seconds:
@@ -242,7 +244,7 @@ class LiveStage:
         (self.record_event if name is None else self.record_world_event)(Event(0, kind, name or "", data))
 
     def add_friction_patch(self, name: str, patch: Patch) -> None:
-        """Change the friction of a patch of floor."""
+        """Change the friction of an area of the floor; replaces a patch of the same name."""
         self._simulation.add_friction_patch(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
         data: dict[str, Value] = {"outline": outline, "friction": patch.friction}
@@ -250,7 +252,7 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.FLOOR_CHANGED, name, data))
 
     def send_goal(self, name: str) -> None:
-        """Preempt the current goal with another one."""
+        """Preempt the current goal by the goal with this name."""
         goal = self._goals[name]
         self._send_order(lambda tick: self._stack.preempt(tick, goal))
 
@@ -264,7 +266,7 @@ class LiveStage:
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Switch a zone of a costmap filter; return why that has no effect, or "" if it has one."""
+        """Switch a zone of a costmap filter. Returns the reason if this has no effect, else ""."""
         if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
@@ -279,7 +281,7 @@ class LiveStage:
         return ""
 
     def record_event(self, event: Event) -> None:
-        """Add an event of this robot. An event with tick 0 gets the current tick."""
+        """Add an event to the events of this robot. An event with tick 0 gets the current tick."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
         self.events += (stamped,)
@@ -293,7 +295,7 @@ def path_data(path: MotionPath) -> dict[str, Value]:
 
 
 def body_data(body: Body) -> dict[str, Value]:
-    """Return pose, first shape, and contact outlines (in the body frame) of a body as event data."""
+    """Return the pose, the first shape, and the outlines (in the body frame) of a body as event data."""
     pose = body.pose.plane
     fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [

@@ -1,7 +1,7 @@
-"""Fork server: imports the engines and builds worlds once, then forks a worker process for each run.
+"""Fork server: imports PyBullet and OMPL and builds worlds once, then forks a worker process for each run.
 
-The fork server never creates an OMPL object and never steps a Bullet client, so that every worker starts from the same
-state. It receives pickled jobs from the supervisor over one pipe and sends one line of JSON per message over another.
+The fork server receives pickled jobs from the supervisor over one pipe, and sends messages, one line of JSON each, over
+another pipe.
 """
 
 import contextlib
@@ -31,26 +31,26 @@ from simscen.run.process.jobs import Job, json_line, receive_job
 from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 
 MAX_MESSAGE_BYTES = 1 << 20
-"""Longest valid message of a worker."""
+"""Maximum size of a message from a worker."""
 DUMP_TIME_S = 0.5
-"""Time for a run that exceeded its wall limit to dump its stack before SIGTERM."""
+"""Time for a worker that exceeded its wall limit to dump its stack, before SIGTERM."""
 TERM_GRACE_S = 2.0
-"""Time between SIGTERM and SIGKILL for a run that exceeded its wall limit."""
+"""Time between SIGTERM and SIGKILL for a worker that exceeded its wall limit."""
 
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
 _TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
-"""Signals that end a run at its wall limit, each with the seconds until the next: dump the stack, terminate, kill."""
+"""Signals that end a worker at its wall limit, each with the time in s until the next: dump, terminate, kill."""
 
 SendMessage = Callable[[dict[str, Any]], None]
 """Function that sends a message to the supervisor."""
 
 
 class WorkerHandle:
-    """A running worker process, its pipes, and its deadline, as the fork server sees them.
+    """A running worker process, its pipes, and its deadline.
 
-    `report` is the pipe for messages of the worker, `output` the pipe for its standard output and error, which are
-    copied to `log`. Progress messages are forwarded by `send_message`. The end record is kept for `exit_message`.
+    `report` is the pipe for messages of the worker. `output` is the pipe for its standard output and error, which are
+    copied to `log`. `send_message` forwards progress messages to the supervisor.
     """
 
     def __init__(self, job: Job, pid: int, report: int, output: int, log: CappedLog, send_message: SendMessage) -> None:
@@ -67,7 +67,7 @@ class WorkerHandle:
             os.set_blocking(end, False)
 
     def read_messages(self) -> bool:
-        """Read messages of the worker; return False at the end of the pipe."""
+        """Read and process messages of the worker; return False at the end of the pipe."""
         data = os.read(self.report, READ_BYTES)
         self._buffer += data
         *lines, rest = self._buffer.split(b"\n")
@@ -77,13 +77,13 @@ class WorkerHandle:
         return bool(data)
 
     def read_output(self) -> bool:
-        """Read output of the worker; return False at the end of the pipe."""
+        """Read output of the worker and append it to its log; return False at the end of the pipe."""
         data = os.read(self.output, READ_BYTES)
         self._log.append(data)
         return bool(data)
 
     def _process_message(self, text: bytes) -> None:
-        """Parse a message. Ignore anything else, such as stray bytes of a library."""
+        """Process a message; ignores invalid messages."""
         try:
             message = json.loads(text)
         except (ValueError, RecursionError):
@@ -95,7 +95,7 @@ class WorkerHandle:
                 self._send_message({"job": self.job.number, "seconds": seconds})
 
     def escalate(self) -> None:
-        """Take the next step to end a worker that exceeded its deadline: dump its stack, SIGTERM, or SIGKILL."""
+        """Send the next signal to a worker that exceeded its deadline: dump the stack, SIGTERM, or SIGKILL."""
         signal_number, timeout = next(self._steps, _TERMINATION_STEPS[-1])
         self._killed_for, self.deadline = "timeout", time.monotonic() + timeout
         if signal_number is signal.SIGUSR1:
@@ -117,7 +117,7 @@ class WorkerHandle:
             os.close(descriptor)
 
     def exit_message(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Close the pipes and return the message for the supervisor. Must be called after the worker was reaped.
+        """Close the pipes, and return the message about the end of the worker. Call it after the worker was reaped.
 
         `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory. The
         message has the fields of jobs.ProcessEnd, with `exit` instead of `number`.
@@ -145,29 +145,29 @@ class WorkerHandle:
 
 
 def enlarge_pipe(pipe: int) -> None:
-    """Enlarge the buffer of a pipe, so that a worker need not wait while the fork server prepares a scenario."""
+    """Enlarge the buffer of a pipe, so that a worker can write while the fork server prepares a scenario."""
     with suppress(OSError):  # the user's limit of pipe memory is reached; a smaller buffer works as well
         fcntl.fcntl(pipe, _F_SETPIPE_SZ, READ_BYTES)
 
 
 HEARTBEAT_S = 1.0
-"""Longest time between two messages to the supervisor while the fork server is not preparing a scenario."""
+"""Longest time between two messages to the supervisor, except while the fork server prepares a scenario."""
 
 
 class ForkServer:
-    """Prepares jobs and forks a worker for each, until the supervisor closes the pipe; then kills all workers."""
+    """Prepares jobs, and forks a worker process for each job."""
 
     def __init__(self, jobs: int, replies: int, warm_up: Callable[[Job], object], execute: ExecuteJob) -> None:
-        """`jobs` and `replies` are file descriptors of pipes from and to the supervisor.
+        """`jobs` and `replies` are the file descriptors of the pipes from and to the supervisor.
 
-        `warm_up` prepares the scenario of a job before the fork, and `execute` runs the job in the worker.
+        `warm_up` prepares the scenario of a job before the fork. `execute` runs the job in the worker.
         """
         self._jobs, self._replies, self._warm_up, self._execute = jobs, replies, warm_up, execute
         self._selector = selectors.DefaultSelector()
         self._children: dict[int, WorkerHandle] = {}
 
     def serve(self) -> None:
-        """Run jobs and watch their workers until the supervisor closes the pipe."""
+        """Run jobs until the supervisor closes the pipe, then kill all workers."""
         die_with_parent(os.getppid())
         faulthandler.enable()
         limit_memory()
@@ -185,6 +185,7 @@ class ForkServer:
             self._enforce_deadlines()
 
     def _start_job(self) -> bool:
+        """Receive a job, prepare its scenario, and fork its worker; return False at the end of the pipe."""
         job = receive_job(self._jobs)
         if job is None:
             return False
@@ -226,15 +227,13 @@ class ForkServer:
         os.close(self._replies)
 
     def _read(self, pipe: int, read: Callable[[], bool]) -> bool:
+        """Read from a pipe, and stop watching it at its end; return True."""
         if not read():
             self._selector.unregister(pipe)
         return True
 
     def _reap(self, child: WorkerHandle) -> bool:
-        """Reap a worker that has exited, and report its end.
-
-        Its process group is killed before, because another process could get its id afterwards.
-        """
+        """Kill the process group of a worker that has exited, reap the worker, and report its end; return True."""
         for descriptor in (child.pidfd, child.report, child.output):
             if descriptor in self._selector.get_map():
                 self._selector.unregister(descriptor)
@@ -266,10 +265,7 @@ class ForkServer:
 
 
 def _take_own_output() -> bytes:
-    """Remove and return the output of this process since the last call, from the file to which it is redirected.
-
-    Output during the preparation of a scenario belongs to the log of its run.
-    """
+    """Return the output of this process since the last call, and truncate the file to which it is redirected."""
     size = os.fstat(2).st_size
     data = os.pread(2, size, 0)
     os.ftruncate(2, 0)
@@ -279,10 +275,7 @@ def _take_own_output() -> bytes:
 
 @contextlib.contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError inside a block that takes longer than `seconds`.
-
-    The supervisor ends a fork server that hangs in C code, which this cannot interrupt.
-    """
+    """Raise TimeoutError inside a `with` block that takes longer than `seconds`."""
 
     def raise_timeout(*_: object) -> None:
         raise TimeoutError

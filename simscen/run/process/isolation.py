@@ -17,17 +17,17 @@ from simscen.spec.registry import Entry, search_path
 
 MAX_HEAD_BYTES = 1 << 20
 MAX_TAIL_BYTES = 1 << 18
-"""Sizes of the first and the last part of a process's output that its log keeps."""
+"""Sizes of the first and the last part of a process's output that CappedLog keeps."""
 READ_BYTES = 1 << 20
 """Largest number of bytes that are read from a pipe at once."""
 TAIL_BYTES = 16_384
-"""Number of bytes at the end of a process's output that messages about its end contain."""
+"""Number of bytes of output that a message about the end of a process contains."""
 
 
 class CappedLog:
     """Log file with the first MAX_HEAD_BYTES and the last MAX_TAIL_BYTES of the output of a process.
 
-    If `path` is None or cannot be written, `tail` still returns the last part of the output.
+    Writes no file if `path` is None or cannot be written.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -44,7 +44,7 @@ class CappedLog:
             self._head_bytes_left = 0  # the run reports the unusable folder itself
 
     def append(self, data: bytes) -> None:
-        """Add output."""
+        """Append output of the process."""
         head = data[: self._head_bytes_left]
         self._head_bytes_left -= len(head)
         self._write(head)
@@ -86,14 +86,14 @@ _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<nam
 
 
 def innermost_frame(output: str) -> str:
-    """Return the innermost frame of a dumped stack, e.g. "step (simulation.py:88)"; "" without a dump."""
+    """Return the innermost frame of a stack dump in the output, such as "step (simulation.py:88)", or ""."""
     heads = list(_DUMP_HEADER.finditer(output))
     frame = _DUMP_FRAME.search(output, heads[-1].end()) if heads else None
     return f"{frame['name']} ({PurePath(frame['file']).name}:{frame['line']})" if frame else ""
 
 
 def output_tail(output: str) -> str:
-    """Return the last TAIL_LINES lines of the output, or the first lines of the stack if one was dumped."""
+    """Return the last TAIL_LINES lines of the output, or the first lines of a stack dump if there is one."""
     heads = list(_DUMP_HEADER.finditer(output))
     if heads:
         before = output[: heads[-1].start()].splitlines()[-3:]
@@ -104,31 +104,25 @@ def output_tail(output: str) -> str:
 MAX_MEMORY_BYTES = 4 << 30
 MAX_FILE_BYTES = 2 << 30
 MAX_OPEN_FILES = 256
-"""Resource limits of a worker, so that one run cannot exhaust the machine."""
+"""Resource limits of a worker process."""
 _PR_SET_PDEATHSIG = 1
 _INHERITED_VARIABLES = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
 _ARITHMETIC_VARIABLES = {
     *("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"),
     *("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES", "GLIBC_TUNABLES"),
 }
-"""Variables that select processor instructions and so affect the last bits of results."""
+"""Environment variables that affect the last bits of results, because they select processor instructions."""
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process when `parent` ends for any reason.
-
-    Exits at once if the parent has already ended.
-    """
+    """Let the kernel kill this process when the process `parent` ends. Exits if the parent has already ended."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def limit_memory() -> None:
-    """Limit the memory of this process and its future children, and disable core dumps.
-
-    The hard limits stay, so that an external stack can have its original limits restored.
-    """
+    """Limit the memory of this process and its future children, and disable core dumps. Sets only soft limits."""
     _set_soft_limit(resource.RLIMIT_AS, MAX_MEMORY_BYTES)
     _set_soft_limit(resource.RLIMIT_CORE, 0)
 
@@ -139,20 +133,23 @@ def _set_soft_limit(limit: int, maximum: int) -> None:
 
 
 def prefer_for_oom_kill() -> None:
-    """Make this process the preferred victim of the OOM killer, so that the supervisor survives."""
+    """Let the kernel kill this process first when the machine runs out of memory."""
     with suppress(OSError):  # not permitted in some sandboxes
         Path("/proc/self/oom_score_adj").write_text("500")
 
 
 def limit_resources() -> None:
-    """Limit memory as `limit_memory` does, and also the file size and the number of open files of this process."""
+    """Limit the memory (see `limit_memory`), the file size, and the number of open files of this process."""
     limit_memory()
     _set_soft_limit(resource.RLIMIT_FSIZE, MAX_FILE_BYTES)
     _set_soft_limit(resource.RLIMIT_NOFILE, MAX_OPEN_FILES)
 
 
 def clean_environment() -> dict[str, str]:
-    """Return the environment of worker processes: no secrets, fixed CPU kernels and hash seed, one BLAS thread."""
+    """Return the environment variables of worker processes: fixed CPU kernels and hash seed, and one BLAS thread.
+
+    Only a few variables of this process are inherited, so that workers see no secrets.
+    """
     inherited = {
         k: v for k, v in os.environ.items() if k in _INHERITED_VARIABLES | _ARITHMETIC_VARIABLES or k.startswith("LC_")
     }
@@ -164,15 +161,12 @@ _PR_SET_CHILD_SUBREAPER = 36
 
 
 def adopt_orphans() -> None:
-    """Become the parent of descendants whose own parent exits (PR_SET_CHILD_SUBREAPER).
-
-    A descendant can leave its process group or session, but not its subreaper. Children do not inherit the setting.
-    """
+    """Make this process the parent of all descendants whose parent exits (PR_SET_CHILD_SUBREAPER)."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def has_descendants() -> bool:
-    """Return whether a child or adopted process still runs, after reaping all that have exited."""
+    """Return whether a child of this process still runs. Reaps the children that have exited."""
     while True:
         try:
             ended, _ = os.waitpid(-1, os.WNOHANG)
@@ -183,9 +177,9 @@ def has_descendants() -> bool:
 
 
 def kill_children_except(kept: Iterable[int]) -> None:
-    """Kill and reap all children of this process but those with the process ids `kept`, and their descendants.
+    """Kill and reap all children of this process and their descendants, except the children with the ids `kept`.
 
-    Repeats until none is left, because `adopt_orphans` turns the descendants of a killed child into new children.
+    Call `adopt_orphans` once before.
     """
     excluded = set(kept)
     while children := _children_except(excluded):
@@ -195,22 +189,19 @@ def kill_children_except(kept: Iterable[int]) -> None:
 
 
 def _children_except(excluded: Collection[int]) -> list[int]:
-    """Return the children of this process that are not `excluded`, including zombies.
-
-    The kernel's list of children may lack some while others exit (proc(5)). An empty list is therefore confirmed by
-    the list of all processes.
-    """
+    """Return the ids of the children of this process that are not `excluded`, including zombies."""
     own = os.getpid()
     with suppress(FileNotFoundError):  # a kernel without CONFIG_PROC_CHILDREN
         listed = map(int, Path(f"/proc/{own}/task/{own}/children").read_text().split())
         if found := [pid for pid in listed if pid not in excluded]:
             return found
+    # The kernel's list of children can be incomplete while some of them exit (proc(5)).
     everything = (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
     return [pid for pid in everything if pid not in excluded and _parent(pid) == own]
 
 
 def _parent(pid: int) -> int:
-    """Return the parent of a process, or 0 if the process has ended."""
+    """Return the id of a process's parent, or 0 if the process has ended."""
     try:
         return int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
     except OSError:
@@ -218,7 +209,7 @@ def _parent(pid: int) -> int:
 
 
 def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
-    """Return the arguments with which a fork server finds these plug-ins (see apply_plugin_path); empty without any."""
+    """Return the command-line argument for `apply_plugin_path` in a fork server; empty without plug-ins."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     if not used:
         return ()
@@ -231,10 +222,9 @@ def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
 
 
 def apply_plugin_path(argument: str) -> None:
-    """Extend sys.path in the fork server by the folders in `argument`, so that it finds the plug-ins of its parent.
+    """Extend sys.path in a fork server, so that it finds the plug-ins of its parent process.
 
-    New folders come last, so that simscen and its dependencies stay the same. A folder comes first only if another
-    version of a used package would be found otherwise.
+    New folders come last. A folder comes first only if another version of a used package would be found otherwise.
     """
     configuration = json.loads(argument)
     for folder in configuration["path"]:

@@ -1,4 +1,4 @@
-"""Jobs (runs to execute), the protocol of the backends that execute them, and the updates and ends of jobs."""
+"""Jobs (runs to execute), the interface of backends that execute jobs, and the updates that backends report."""
 
 import json
 import os
@@ -18,14 +18,14 @@ _LENGTH = struct.Struct("<I")
 
 
 class KeptLogs(str, Enum):
-    """Which runs keep their log, picture, and other files besides result.json."""
+    """Option: the runs that keep their log, picture, and other files besides result.json."""
 
     ALL = "all"
     FAILED = "failed"
 
 
 class ReplayMode(str, Enum):
-    """Which runs get a replay page."""
+    """Option: the runs that get a replay page."""
 
     NONE = "none"
     FAILED = "failed"
@@ -38,7 +38,14 @@ class ReplayMode(str, Enum):
 
 @dataclass(frozen=True)
 class Job:
-    """One run to execute: its number in the session, scenario, key with seed, output folder, and wall limit in s."""
+    """One run to execute.
+
+    Attributes:
+        number: Number of the job in the session.
+        key: Scenario name, seed, variation, and stack, which identify the run.
+        folder: Output folder of the run.
+        wall_limit: Limit of the wall time in s.
+    """
 
     number: int
     scenario: LoadedScenario
@@ -50,7 +57,7 @@ class Job:
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How a worker process ended.
+    """End of a worker process.
 
     Attributes:
         number: Number of the job.
@@ -61,8 +68,8 @@ class ProcessEnd:
         wall: Wall time in s.
         cpu: Processor time in s.
         peak_bytes: Peak memory.
-        left_processes: Whether the worker left processes behind, which were killed.
-        output: The last part of its output.
+        left_processes: Whether child processes of the worker were still running, and were killed.
+        output: Last part of the worker's output.
     """
 
     number: int
@@ -79,10 +86,13 @@ class ProcessEnd:
 
 @dataclass(frozen=True)
 class ForkServerDeath:
-    """The fork server died while a job was running, or was killed because it did not respond.
+    """End of a job because the fork server died.
 
-    `description` says how it ended. `was_preparing` means that it was preparing this job, `timed_out` that it did not
-    respond. `output` is the last part of its output.
+    Attributes:
+        description: How the fork server ended.
+        was_preparing: Whether the fork server was preparing this job.
+        timed_out: Whether the fork server was killed because it did not respond while it prepared this job.
+        output: Last part of the fork server's output.
     """
 
     description: str
@@ -92,13 +102,13 @@ class ForkServerDeath:
 
 
 def pack_job(job: Job) -> bytes:
-    """Return a job as bytes for `receive_job`. Pickle is safe here, because both ends are simscen processes."""
+    """Return a job as bytes for `receive_job`."""
     data = pickle.dumps(job)
     return _LENGTH.pack(len(data)) + data
 
 
 def receive_job(pipe: int) -> Job | None:
-    """Read one job; return None at the end of the pipe. Reads nothing of the next one, so that `select` reports it."""
+    """Read one job from a pipe; return None at the end of the pipe."""
     head = _read_exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -150,12 +160,12 @@ JobUpdate = Started | Progressed | Ended
 
 
 def always() -> bool:
-    """Return True; the default of `should_continue`."""
+    """Return True."""
     return True
 
 
 class Backend(Protocol):
-    """Executes jobs in processes, which it keeps between two calls of `run`. Leaving its context ends them."""
+    """Executes jobs in worker processes. Leaving its context ends all processes."""
 
     def __enter__(self) -> "Backend": ...
 
@@ -164,9 +174,9 @@ class Backend(Protocol):
     def run(
         self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
-        """Execute jobs, several at a time, and yield their updates: exactly one Ended for each that was started.
+        """Execute jobs, several at a time, and yield their updates: exactly one Ended for each started job.
 
-        `plugins` are those that the jobs use. `should_continue` is called before each job; no job starts once it
-        returns False. If the caller stops iterating or an exception is raised, all running processes are killed.
+        `plugins` are the plug-ins that the jobs use. No job starts after `should_continue` has returned False. If the
+        caller stops iterating or an exception is raised, all running processes are killed.
         """
         ...

@@ -1,4 +1,4 @@
-"""Backend that runs jobs on a Ray cluster, by one runner on each node, which supervises the processes there."""
+"""Backend that runs jobs on a Ray cluster. One runner (a Ray actor) on each node supervises the processes there."""
 
 import logging
 import shutil
@@ -36,9 +36,9 @@ from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry
 
 MAX_ATTEMPTS = 2
-"""Largest number of attempts at a job whose runner or node is lost, for example by a crash of the machine."""
+"""Largest number of attempts at a job whose runner or node is lost."""
 QUEUED_JOBS_PER_WORKER = 2
-"""Number of jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
+"""Number of jobs in the queue for each worker."""
 NODE_SEARCH_PERIOD_S = 5.0
 """Time between two searches for nodes that have joined the cluster."""
 CONNECT_TIMEOUT_S = 5.0
@@ -46,14 +46,14 @@ START_TIMEOUT_S = 120.0
 """Time to wait until the first runner has started."""
 POLL_PERIOD_S = 0.5
 MAX_UNREAD_UPDATES = 64
-"""Number of updates that a runner sends ahead of the reader before it pauses."""
+"""Number of unread updates after which a runner pauses."""
 
 
 @dataclass
 class _Runner:
     """A Ray actor of the class NodeRunner with `workers` workers.
 
-    `call` is its pending remote call: of `software` until `is_ready`, then of `run`; None while it has no jobs.
+    `call` is its pending remote call: `software` until `is_ready`, afterwards `run`. It is None without jobs.
     """
 
     name: str
@@ -68,12 +68,12 @@ class _Runner:
 class RayBackend:
     """Runs jobs on all nodes of a running Ray cluster, at most `workers` at a time.
 
-    Each node needs the same version of simscen and the plug-ins of the scenarios. Input files are sent to it. A job
-    whose node or runner is lost is tried once more. Results do not depend on the number of nodes.
+    Each node needs the same version of simscen and of the plug-ins. Input files are sent to the nodes. A job whose node
+    or runner is lost is repeated once.
     """
 
     def __init__(self, address: str, workers: int, entry: Sequence[str]) -> None:
-        """`address` is that of the cluster, and `entry` are the Python arguments that start a fork server on a node."""
+        """`address` is the address of the cluster. `entry` are the Python arguments that start a fork server."""
         self._address, self._workers, self._entry = address, workers, tuple(entry)
         self._runners: list[_Runner] = []
         self._files: dict[Path, SentFile] = {}
@@ -83,7 +83,7 @@ class RayBackend:
         self._last_search = 0.0
 
     def __enter__(self) -> "RayBackend":
-        """Connect to the cluster. Raises UsageError if there is none."""
+        """Connect to the cluster. Raises UsageError if this fails."""
         connect(self._address)
         here = ray.get_runtime_context().get_node_id()
         self._queue = (
@@ -101,7 +101,7 @@ class RayBackend:
     def run(
         self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
-        """Run jobs and yield their updates, as described in Backend. Raises UsageError for an unusable cluster."""
+        """Run jobs and yield their updates (see `Backend.run`). Raises UsageError for an unusable cluster."""
         batch, start_time = _Batch(jobs, should_continue), time.monotonic()
         try:
             while batch.is_unfinished():
@@ -124,7 +124,7 @@ class RayBackend:
         self._finish_calls()
 
     def _add_runners(self) -> None:
-        """Start a runner on each node that has none. Raises UsageError if there is no node."""
+        """Start a runner on each node without a runner. Raises UsageError if there is no node."""
         if self._runners and time.monotonic() < self._last_search + NODE_SEARCH_PERIOD_S:
             return
         self._last_search = time.monotonic()
@@ -139,7 +139,7 @@ class RayBackend:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
 
     def _require_free_cpus(self, start_time: float) -> None:
-        """Raise UsageError if no runner has started for too long, because Ray waits without limit for free CPUs."""
+        """Raise UsageError if no runner has started within START_TIMEOUT_S after `start_time`."""
         if time.monotonic() > start_time + START_TIMEOUT_S and not any(runner.is_ready for runner in self._runners):
             raise UsageError(
                 f"no node of the Ray cluster at {self._address} has become free in {START_TIMEOUT_S:g} s: other "
@@ -158,14 +158,14 @@ class RayBackend:
         runner.call = call.remote(self._queue, runner.name, list(plugins))
 
     def _send(self, batch: "_Batch") -> None:
-        """Put jobs into the queue until enough of them wait."""
+        """Put jobs into the queue until it has QUEUED_JOBS_PER_WORKER jobs for each worker."""
         limit = QUEUED_JOBS_PER_WORKER * sum(runner.workers for runner in self._runners)
         while len(batch.sent) < limit and (job := batch.next()) is not None:
             batch.sent[job.number] = job
             ray.get(self._queue.add.remote(pack(job, self._sent_file)))
 
     def _sent_file(self, path: Path) -> SentFile:
-        """Put the content of a file into the cluster, once for all files with the same content."""
+        """Put the content of a file into the cluster, unless it is there already."""
         if path not in self._files:
             data = path.read_bytes()
             digest = digest_of(data)
@@ -175,7 +175,7 @@ class RayBackend:
         return self._files[path]
 
     def _process_reply(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
-        """Process the next reply of a runner. Raises UsageError if its software does not match."""
+        """Process the next reply of a runner. Raises UsageError if its version of simscen or a plug-in differs."""
         try:
             if not runner.is_ready:
                 self._require_same_software(runner, ray.get(runner.call))
@@ -202,7 +202,7 @@ class RayBackend:
             )
 
     def _remove_lost_runner(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
-        """Forget a runner that has died, and repeat its jobs, once each."""
+        """Remove a runner that has died, and queue its jobs again or report them as ended."""
         self._runners.remove(runner)
         ray.kill(runner.actor)  # it may only be unreachable
         self._last_search = 0.0
@@ -210,7 +210,7 @@ class RayBackend:
             yield from batch.retry_or_fail(number, runner.address)
 
     def _finish_calls(self) -> None:
-        """Wait for the ends of all calls, which come at once, because the queue is empty."""
+        """Wait for the ends of all remote calls. The queue must be empty."""
         for runner in [runner for runner in self._runners if runner.is_ready and runner.call is not None]:
             try:
                 ray.get(list(runner.call))
@@ -226,7 +226,7 @@ class RayBackend:
 
 
 def connect(address: str) -> None:
-    """Connect to a running Ray cluster, unless this process is already connected. Raises UsageError if that fails."""
+    """Connect to a running Ray cluster, unless this process is already connected. Raises UsageError if this fails."""
     if ray.is_initialized():
         return
     # Ray would report lost nodes on standard output, which is for results.
@@ -242,7 +242,7 @@ def connect(address: str) -> None:
 
 
 def _require_answer(address: str) -> None:
-    """Raise OSError if nothing listens at the address, because Ray would wait for it for minutes."""
+    """Raise OSError if nothing listens at the address. Ray itself would wait for minutes."""
     known = services.canonicalize_bootstrap_address(address)
     host, colon, port = (known or "").rpartition(":")
     if colon and port.isdigit() and "//" not in host:
@@ -250,7 +250,7 @@ def _require_answer(address: str) -> None:
 
 
 def cluster_cpus(address: str) -> int:
-    """Return the number of CPUs of a running Ray cluster. Raises UsageError if there is none."""
+    """Return the number of CPUs of a running Ray cluster. Raises UsageError if connecting fails."""
     connect(address)
     return sum(int(node["Resources"].get("CPU", 0)) for node in _nodes() if node["Alive"])
 
@@ -261,7 +261,7 @@ def _nodes() -> list[dict[str, Any]]:
 
 
 class _Batch:
-    """The jobs of one call of `run`. `sent` are those in the queue and `running` those on a node, by number."""
+    """Jobs of one call of `run`. `sent` are the jobs in the queue, and `running` the jobs on a node, by number."""
 
     def __init__(self, jobs: Iterable[Job], should_continue: Callable[[], bool]) -> None:
         self._jobs, self._should_continue = iter(jobs), should_continue
@@ -272,7 +272,7 @@ class _Batch:
         self.running: dict[int, Job] = {}
 
     def next(self) -> Job | None:
-        """Return the next job to send, or None."""
+        """Return the next job to send, or None if there is none."""
         if not self._should_continue():
             return None
         job, self._next_job = self._next_job, None
@@ -281,7 +281,7 @@ class _Batch:
         return job
 
     def is_unfinished(self) -> bool:
-        """Return whether a job runs or has yet to start."""
+        """Return whether any job is running or has not started."""
         if self.running:
             return True
         if not self._should_continue():
@@ -291,7 +291,7 @@ class _Batch:
         return bool(self.sent) or self._next_job is not None
 
     def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
-        """Write the files of a job, and yield its updates."""
+        """Process an update from a node: write file chunks to the job's folder, and yield all other updates."""
         match update:
             case JobStarted(number):
                 if (job := self.sent.pop(number, None)) is not None:
@@ -311,7 +311,7 @@ class _Batch:
                 yield Ended(job, end)
 
     def retry_or_fail(self, number: int, address: str) -> Iterator[JobUpdate]:
-        """Queue a job of a lost runner again, or report it as ended if it was lost too often."""
+        """Queue a job of a lost runner again, or yield its end after MAX_ATTEMPTS."""
         job = self.running.pop(number, None) or self.sent.pop(number, None)
         if job is None:
             return

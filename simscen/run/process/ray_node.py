@@ -1,7 +1,6 @@
-"""Transfer jobs to the nodes of a cluster, and run them there.
+"""Transfer jobs to the nodes of a Ray cluster, and run them there.
 
-NodeRunner, which runs jobs on a node, and JobQueue, from which all runners take jobs, are plain classes. The backend
-makes Ray actors of them. A job is sent with the content of the files from which its scenario was loaded.
+RayBackend makes Ray actors of the classes NodeRunner and JobQueue. A job is sent with its input files.
 """
 
 import hashlib
@@ -26,12 +25,12 @@ from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry, find
 
 PACKAGE_FOLDER = Path(__file__).parents[2]
-"""Folder of the installed package, which can differ between machines."""
+"""Folder of the installed package simscen, which can differ between machines."""
 
 
 @dataclass(frozen=True)
 class SentFile:
-    """An input file: SHA-256 of its content, and a handle with which a machine gets the content."""
+    """An input file: the SHA-256 of its content, and a Ray reference to the content."""
 
     digest: str
     content: Any
@@ -39,7 +38,7 @@ class SentFile:
 
 @dataclass(frozen=True)
 class PackedJob:
-    """A job for another machine: `data` is its pickle with marked paths, `files` its input files by absolute path."""
+    """A job for another machine: `data` is the pickled job, and `files` has its input files by absolute path."""
 
     number: int
     data: bytes
@@ -47,10 +46,7 @@ class PackedJob:
 
 
 def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
-    """Return a job for another machine, without its output folder, which differs there.
-
-    `send` puts the content of an input file into the cluster.
-    """
+    """Return a job for another machine, without its output folder. `send` puts an input file into the cluster."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(replace(job, folder=Path()))
@@ -68,17 +64,17 @@ def _input_files(scenario: LoadedScenario) -> Iterable[Path]:
 class Unpacker:
     """Restores packed jobs on another machine.
 
-    If all input files of a job exist there at the same paths with the same content, as in a shared folder, they are
-    used in place. Otherwise all of them are written below `folder`.
+    Writes the input files of a job below `folder`, unless all of them exist at their original paths with the same
+    content.
     """
 
     def __init__(self, folder: Path, receive: Callable[[Any], bytes]) -> None:
-        """`receive` returns the content of a file for its handle."""
+        """`receive` returns the content of a file for a Ray reference."""
         self._folder, self._receive = folder, receive
         self._is_here: dict[tuple[str, str], bool] = {}
 
     def unpack(self, packed: PackedJob, output: Path) -> Job:
-        """Return the job with the output folder `output`, and with paths that are valid on this machine."""
+        """Return the job with the output folder `output` and with paths that are valid on this machine."""
         moved: frozenset[str] = frozenset()
         if not all(self._has(path, file.digest) for path, file in packed.files.items()):
             for path, file in packed.files.items():
@@ -110,7 +106,10 @@ def digest_of(data: bytes) -> str:
 
 
 class _Pickler(pickle.Pickler):
-    """Pickler that marks each path: "package" for one in the package, else "path". Collects the latter in `paths`."""
+    """Pickler that stores each path as ("package", relative path) inside PACKAGE_FOLDER, else as ("path", path).
+
+    `paths` collects the paths outside of PACKAGE_FOLDER.
+    """
 
     def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
@@ -126,7 +125,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Unpickler that restores marked paths. Files whose paths are in `moved` are found below `folder` instead."""
+    """Unpickler for the output of _Pickler. Replaces the paths in `moved` by paths below `folder`."""
 
     def __init__(self, file: io.BytesIO, moved: frozenset[str], folder: Path) -> None:
         super().__init__(file)
@@ -140,7 +139,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 CHUNK_BYTES = 8 << 20
-"""Largest part of a file that is sent at once."""
+"""Largest part of an output file that is sent at once."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +159,7 @@ class JobProgressed:
 
 @dataclass(frozen=True)
 class FileChunk:
-    """The next chunk of a file in the output folder of a job; `name` is relative to the folder."""
+    """Next part of a file in the output folder of a job. `name` is the path of the file relative to the folder."""
 
     number: int
     name: str
@@ -169,7 +168,7 @@ class FileChunk:
 
 @dataclass(frozen=True)
 class JobEnded:
-    """A job has ended, and all of its files were sent."""
+    """A job has ended, and all its files have been sent."""
 
     number: int
     end: ProcessEnd | ForkServerDeath
@@ -179,7 +178,7 @@ NodeUpdate = JobStarted | JobProgressed | FileChunk | JobEnded
 
 
 class JobQueue:
-    """Jobs that wait for a runner, and a record of the jobs that each runner has taken."""
+    """Queue of jobs for all runners, and a record of the jobs that each runner has taken."""
 
     def __init__(self) -> None:
         self._waiting: deque[PackedJob] = deque()
@@ -190,7 +189,7 @@ class JobQueue:
         self._waiting.append(job)
 
     def take(self, runner: str) -> PackedJob | None:
-        """Remove and return the next job, for the runner with this name; None if no job waits."""
+        """Remove and return the next job, for the runner with the name `runner`; return None if the queue is empty."""
         if not self._waiting:
             return None
         job = self._waiting.popleft()
@@ -198,20 +197,20 @@ class JobQueue:
         return job
 
     def taken_by(self, runner: str) -> list[int]:
-        """Return the numbers of the jobs that a runner took since the last call of `clear`."""
+        """Return the numbers of the jobs that a runner has taken since the last call of `clear`."""
         return self._taken.get(runner, [])
 
     def clear(self) -> None:
-        """Remove all jobs."""
+        """Remove all jobs and records."""
         self._waiting.clear()
         self._taken.clear()
 
 
 class NodeRunner:
-    """Runs jobs on one node, `workers` at a time, as processes below a supervisor of its own."""
+    """Runs jobs on one node in processes of its own supervisor, `workers` at a time."""
 
     def __init__(self, workers: int, entry: Sequence[str], receive: Callable[[Any], Any]) -> None:
-        """`entry` are the Python arguments that start a fork server; `receive` is `ray.get`."""
+        """`entry` are the Python arguments that start a fork server. `receive` is `ray.get`."""
         self._temporary = TemporaryDirectory(prefix="simscen-")
         self._folder = Path(self._temporary.name)
         self._supervisor = Supervisor(workers, entry)
@@ -223,12 +222,12 @@ class NodeRunner:
         return __version__, source_digest()
 
     def run(self, queue: Any, runner: str, plugins: Sequence[Entry]) -> Iterator[NodeUpdate]:
-        """Run jobs from the queue until it is empty, and yield their updates and files; `runner` is this runner's name.
+        """Run jobs from the queue until it is empty, and yield their updates and files.
 
-        Raises UsageError if a plug-in is missing or has another version on this node.
+        `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here.
         """
         jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._job)
-        for update in self._supervisor.run(jobs, [_same_plugin(entry) for entry in plugins]):
+        for update in self._supervisor.run(jobs, [_installed_plugin(entry) for entry in plugins]):
             job = update.job
             match update:
                 case Started():
@@ -245,7 +244,7 @@ class NodeRunner:
 
 
 class _JobsOfQueue:
-    """Iterator over the jobs of the queue. After its end, it can continue with jobs that were added later."""
+    """Iterator over the jobs of the queue. It continues after its end if jobs were added to the queue."""
 
     def __init__(self, take: Callable[[], PackedJob | None], unpack: Callable[[PackedJob], Job]) -> None:
         self._take, self._unpack = take, unpack
@@ -261,7 +260,7 @@ class _JobsOfQueue:
 
 
 def _files(job: Job) -> Iterator[FileChunk]:
-    """Yield all files in the output folder of a job."""
+    """Yield the content of all files in the output folder of a job."""
     for path in sorted(job.folder.rglob("*")):
         if path.is_file():
             name = path.relative_to(job.folder).as_posix()
@@ -271,7 +270,7 @@ def _files(job: Job) -> Iterator[FileChunk]:
                     yield FileChunk(job.number, name, data)
 
 
-def _same_plugin(entry: Entry) -> Entry:
+def _installed_plugin(entry: Entry) -> Entry:
     """Return the plug-in as installed on this node. Raises UsageError if it is missing or has another version here."""
     installed = find(entry.group, entry.name)
     required = requirement_of(entry)

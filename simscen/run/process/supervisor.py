@@ -1,6 +1,6 @@
-"""Supervisor: sends jobs to the fork server, follows their progress, and reports exactly one end for each.
+"""Supervisor: sends jobs to the fork server, and reports their progress and exactly one end for each job.
 
-The process of the supervisor never imports PyBullet or OMPL, so that a crash in these cannot end it.
+The supervisor's process never imports PyBullet or OMPL, so that a crash in these libraries cannot end it.
 """
 
 import json
@@ -30,15 +30,15 @@ from simscen.run.process.jobs import (
 from simscen.spec.registry import Entry
 
 PIPE_BYTES = 1 << 16
-"""Largest number of bytes that are written to or read from a pipe at once: the default capacity of a pipe."""
+"""Largest number of bytes that are written to or read from a pipe at once."""
 
 
 class Unresponsive(Exception):
-    """The fork server sent no message for too long."""
+    """Error: the fork server has sent no message for too long."""
 
 
 class ProcessDeath(NamedTuple):
-    """How the fork server ended: description, return code of Popen, and the last part of its output."""
+    """End of the fork server: a description, the return code of Popen, and the last part of its output."""
 
     description: str
     code: int
@@ -46,13 +46,10 @@ class ProcessDeath(NamedTuple):
 
 
 class ForkServerProcess:
-    """A fork server and the pipes to it. `close` ends it and all of its workers.
-
-    All waits have a time limit, so that a hanging fork server cannot block the session.
-    """
+    """A fork server and the pipes to it. `close` ends the fork server and all of its workers."""
 
     def __init__(self, entry: Sequence[str]) -> None:
-        """Start the fork server. `entry` are its Python arguments, e.g. `-m module`."""
+        """Start the fork server. `entry` are its Python arguments, such as `-m module`."""
         self._output = TemporaryFile()  # noqa: SIM115 - stays open as long as the process runs
         self._receive_pipe, replies = os.pipe()
         jobs, self._send_pipe = os.pipe()
@@ -71,11 +68,14 @@ class ForkServerProcess:
         self._send_buffer, self._receive_buffer = bytearray(), bytearray()
 
     def send(self, data: bytes) -> None:
-        """Queue a message, which `receive_line` sends as soon as the pipe has room."""
+        """Queue a message. `receive_line` sends it."""
         self._send_buffer += data
 
     def receive_line(self, timeout: float) -> bytes:
-        """Return the next line. Raises EOFError if the process has exited, Unresponsive after `timeout` seconds."""
+        """Return the next message, and meanwhile send queued messages.
+
+        Raises EOFError if the process has exited, and Unresponsive after `timeout` seconds.
+        """
         end = time.monotonic() + timeout
         while b"\n" not in self._receive_buffer:
             readable, writable, _ = select.select(
@@ -107,7 +107,7 @@ class ForkServerProcess:
         return data
 
     def close(self) -> None:
-        """Close the input of the fork server, so that it kills its workers and exits; kill it if it does not exit."""
+        """Let the fork server kill its workers and exit; kill it if it does not exit in time."""
         os.close(self._send_pipe)
         try:
             self._process.wait(timeout=5)
@@ -121,7 +121,7 @@ class ForkServerProcess:
         self._process.send_signal(signal.SIGABRT)
 
     def collect_death(self) -> ProcessDeath:
-        """Wait a second for the end of the process, or kill it; return how it ended."""
+        """Wait one second for the end of the process, then kill it; return a description of its end."""
         try:
             self._process.wait(timeout=1)
         except subprocess.TimeoutExpired:
@@ -138,12 +138,11 @@ class ForkServerProcess:
 
 
 MAX_SILENCE_S = 30.0
-"""Wall time without a message after which the fork server counts as dead. It sends one each second or
-more often, except while it prepares a job."""
+"""Wall time without a message after which the fork server counts as dead, except while it prepares a job."""
 
 
 class Interrupted(BaseException):
-    """The session was interrupted by the signal `number`. Raised by a signal handler."""
+    """Exception that a signal handler raises to end the session. `number` is the number of the signal."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -153,14 +152,12 @@ class Interrupted(BaseException):
 class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
-    The fork server starts with the first job, is kept until the context is left, and is restarted if it dies.
-
-    If the fork server crashes or hangs while it prepares a job, this job fails, and the others that ran are repeated.
-    After any other death, each running job is a suspect: it is repeated alone, and fails if the fork server dies again.
+    If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. After any
+    other death, each running job is a suspect: it is repeated alone, and fails if the fork server dies again.
     """
 
     def __init__(self, workers: int, entry: Sequence[str]) -> None:
-        """`entry` are the Python arguments that start the fork server, e.g. `-m module`."""
+        """`entry` are the Python arguments that start the fork server, such as `-m module`."""
         self._workers, self._entry = workers, tuple(entry)
         self._plugins: frozenset[Entry] = frozenset()
         self._server: ForkServerProcess | None = None
@@ -182,7 +179,7 @@ class Supervisor:
     def run(
         self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
-        """Run jobs and yield their updates, as described in Backend. Takes a job from `jobs` only when it can start."""
+        """Run jobs and yield their updates (see `Backend.run`). Takes a job from `jobs` only when it can start."""
         if not self._plugins.issuperset(plugins):
             self.close()
             self._plugins |= frozenset(plugins)
@@ -204,14 +201,14 @@ class Supervisor:
             jobs.clear()
 
     def _ensure_server(self) -> ForkServerProcess:
-        """Return the fork server; start it if it does not run."""
+        """Return the fork server; starts it if it is not running."""
         if self._server is None:
             self._responded = False
             self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
         return self._server
 
     def _run_jobs(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
-        """Run `first` and further jobs until none runs, or until the fork server dies."""
+        """Run the job `first` and all following jobs, or until the fork server dies."""
         job: Job | None = first
         try:
             while True:
@@ -235,7 +232,7 @@ class Supervisor:
         yield from self._after_death(death, unresponsive)
 
     def _next(self) -> Job | None:
-        """Return the job to start now, or None. A suspect runs alone."""
+        """Return the job to start now, or None if no job can start now."""
         if not self._should_continue():
             return None
         running_suspects = self._suspect_numbers & self._running.keys()
@@ -246,10 +243,11 @@ class Supervisor:
         return self._retries.popleft() if self._retries else next(self._jobs, None)
 
     def _message_timeout(self) -> float:
-        """Return how long to wait for a message. Preparing a job may take its wall limit, without heartbeats."""
+        """Return the time in s to wait for a message. Preparing a job may take as long as the job's wall limit."""
         return MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
 
     def _process_message(self, text: bytes) -> JobUpdate | None:
+        """Process a message of the fork server; return the update of a job, if the message contains one."""
         message: dict[str, Any] = json.loads(text)
         match message:
             case {"started": number}:
@@ -269,7 +267,7 @@ class Supervisor:
         return None
 
     def _after_death(self, death: ProcessDeath, unresponsive: bool) -> Iterator[JobUpdate]:
-        """Report the jobs that caused the death as ended, and queue the others again."""
+        """Yield the ends of the jobs that caused the death of the fork server, and queue all other jobs again."""
         running, prepared = list(self._running.values()), self._preparing
         self._running.clear()
         self._preparing = None

@@ -1,4 +1,4 @@
-"""Execute one run in a worker process, and send its progress and its end record to the fork server."""
+"""Execute one run in a worker process, and send its progress and its end record (a summary) to the fork server."""
 
 import errno
 import faulthandler
@@ -27,7 +27,7 @@ PROGRESS_INTERVAL_S = 5.0
 ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
 """Function that runs a job, passes the simulated time in s to a callback, and returns the end record.
 
-The end record has the keys `outcome` and `sha256` (of the log). After an error, run_worker sends `error` and `message`.
+The end record has the keys `outcome` and `sha256` (of the log).
 """
 
 _DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
@@ -35,7 +35,7 @@ _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run exceeded its mem
 
 
 class WorkerPipes(NamedTuple):
-    """File descriptors to which a worker writes messages (`report`), and standard output and error (`output`)."""
+    """File descriptors of the pipes for a worker's messages (`report`), and for its stdout and stderr (`output`)."""
 
     report: int
     output: int
@@ -44,8 +44,7 @@ class WorkerPipes(NamedTuple):
 def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -> NoReturn:
     """Run the job, send the end record, and exit. `parent` is the process id of the fork server.
 
-    Uses `os._exit`, because the worker is a copy of the fork server and must not return into its code, and to suppress
-    exit messages of nanobind and Bullet.
+    After an error, the end record has the keys `error` and `message`.
     """
     code = 1
     try:
@@ -58,11 +57,11 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -
     except BaseException:
         traceback.print_exc()
     finally:
-        os._exit(code)
+        os._exit(code)  # the worker is a copy of the fork server, and must not return into its code
 
 
 def _set_up_process(parent: int, output: int) -> None:
-    """Set up session, signals, output, resource limits, and the fault handler."""
+    """Set up the session, signals, output, resource limits, and fault handler of this process."""
     os.setsid()
     die_with_parent(parent)
     adopt_orphans()
@@ -76,6 +75,7 @@ def _set_up_process(parent: int, output: int) -> None:
 
 
 def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
+    """Run the job and return its end record; an exception becomes a record with `error` and `message`."""
     try:
         job.folder.mkdir(parents=True, exist_ok=True)
         return execute(job, lambda seconds: _send_progress(report, seconds))
@@ -109,7 +109,7 @@ def _send_progress(report: int, seconds: float) -> None:
 
 
 def _redirect_output(output: int) -> None:
-    """Redirect standard output and error, also of C libraries, to the log of the run."""
+    """Redirect stdout and stderr, also of C libraries, to the pipe `output`."""
     null = os.open(os.devnull, os.O_RDONLY)
     os.dup2(null, 0)
     os.dup2(output, 1)
@@ -119,14 +119,14 @@ def _redirect_output(output: int) -> None:
 
 
 class ProgressReporter:
-    """A MomentSink that reports the progress of a run: `send` receives the simulated time in s."""
+    """MomentSink (log of a run) that passes the simulated time in s to `send` every PROGRESS_INTERVAL_S."""
 
     def __init__(self, tick_rate: int, send: Callable[[float], None]) -> None:
         self._rate, self._send = tick_rate, send
         self._next = 0.0
 
     def append(self, moment: Moment) -> None:
-        """Report the simulated time at regular intervals."""
+        """Report the simulated time if PROGRESS_INTERVAL_S has passed since the last report."""
         seconds = moment.tick / self._rate
         if seconds >= self._next:
             self._next = seconds + PROGRESS_INTERVAL_S

@@ -1,4 +1,4 @@
-"""Create the output folder of a session, name the folders of its runs, and write files safely."""
+"""Create the output folder of a session and the names of its run folders, and write files atomically."""
 
 import os
 import secrets
@@ -13,13 +13,13 @@ from simscen.core.records.run_result import RunKey
 
 DEFAULT_FOLDER = Path("simscen-out")
 RUNS_FOLDER = "runs"
-"""Folder of all run folders, so that no scenario name collides with a report."""
+"""Name of the folder of all run folders in the output folder."""
 
 
 def create_output_folder(out: Path | None) -> Path:
-    """Create the folder `out`; if None, simscen-out/<UTC time>-<4 hex digits> and the link simscen-out/latest to it.
+    """Create and return the folder `out`. Raises UsageError if it is not empty or cannot be written to.
 
-    Raises UsageError if `out` is not empty, or if the folder cannot be created or written to.
+    If `out` is None, creates simscen-out/<UTC time>-<4 hex digits>, and the link simscen-out/latest to this folder.
     """
     folder = out or DEFAULT_FOLDER / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
     try:
@@ -40,7 +40,7 @@ def run_folder(folder: Path, key: RunKey) -> Path:
 
 
 def probe_writable(path: Path) -> None:
-    """Raise OSError unless a regular file can be written at `path`. Leaves no file behind."""
+    """Raise OSError unless a regular file can be written at `path`. Does not change the file system."""
     require_regular_file(path)
     existed = path.exists()
     with path.open("ab"):
@@ -50,9 +50,9 @@ def probe_writable(path: Path) -> None:
 
 
 def write_atomically(path: Path, data: bytes | Iterable[bytes]) -> None:
-    """Replace a file atomically, so that readers see the old or the new content, even after a crash.
+    """Replace a file atomically: readers see the old or the new content, even after a crash.
 
-    `data` is the content, or its parts in order. Raises OSError if the file cannot be written or is not a regular file.
+    `data` is the content or its parts in order. Raises OSError if the file cannot be written or is not a regular file.
     """
     require_regular_file(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def write_atomically(path: Path, data: bytes | Iterable[bytes]) -> None:
 
 
 def _link_latest(folder: Path) -> None:
-    """Link `latest` to the folder if the file system supports links."""
+    """Create the link `latest` to the folder, if the file system supports links."""
     link = folder.parent / "latest"
     part = folder.parent / f".latest.{os.getpid()}"
     if link.exists() and not link.is_symlink():

@@ -1,4 +1,4 @@
-"""Build the result of a run from how its worker ended, and the command that repeats the run."""
+"""Build the result of a run from the end of its worker process, and the command that repeats the run."""
 
 import json
 import os
@@ -19,15 +19,15 @@ from simscen.run.process.isolation import MAX_MEMORY_BYTES, innermost_frame, out
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
 
 MAX_RECOVER_BYTES = 64 << 20
-"""Largest log that is recovered during the session; larger ones would delay other runs."""
+"""Size of the largest partial log that is recovered during the session."""
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
-    """Return the result of a run that was started; an error unless its worker exited 0 and sent an end record."""
+    """Return the result of a run whose worker process has ended: an error if the worker did not finish the run."""
     failure = _with_log(_failure(end), job.folder)
     output = output_tail(end.output)
     result = (
-        _result(job, output)
+        _read_result(job, output)
         if failure is None
         else error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     )
@@ -43,25 +43,25 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
 
 
 def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
-    """Return the result of a run that was interrupted or never started: the error `failure`."""
+    """Return the error `failure` as the result of a run that was interrupted or never started."""
     result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
-    return _result_without_log(job, result)
+    return _without_log(job, result)
 
 
 def skipped_run(job: Job, reason: str) -> RunFinished:
-    """Return the result of a run whose scenario has `skip`."""
+    """Return the result of a run that is skipped because its scenario has the key `skip`."""
     result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
-    return _result_without_log(job, result)
+    return _without_log(job, result)
 
 
-def _result_without_log(job: Job, result: RunResult) -> RunFinished:
-    """Return the result of a run without a log."""
+def _without_log(job: Job, result: RunResult) -> RunFinished:
+    """Return `result` as a finished run that has no log."""
     again, file = repeat_command(job.scenario, job.key.seed), display_path(job.scenario.file)
     return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 
 
-def _result(job: Job, output: str) -> RunResult:
-    """Read result.json of a run. The key is replaced, since both runs of a pair of twins store the key of the first."""
+def _read_result(job: Job, output: str) -> RunResult:
+    """Return the result in result.json with the key of the job, or an error if the file cannot be read."""
     try:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
@@ -77,7 +77,7 @@ def _artifacts(folder: Path) -> Artifacts:
 
 
 def _stack_warnings(folder: Path) -> tuple[str, ...]:
-    """Return the distinct `warnings` about themselves that external stacks have sent, from stack.json."""
+    """Return the distinct `warnings` that external stacks have sent, from stack.json."""
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
         given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
@@ -88,6 +88,7 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
 
 
 def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
+    """Return the failure that the end of a process means, or None if the run was finished."""
     if isinstance(end, ForkServerDeath):
         when = "while it prepared this one" if end.was_preparing else "while this run was active"
         kind = "timeout" if end.timed_out else "crashed"
@@ -115,7 +116,7 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
 
 
 def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
-    """Recover the partial log of a failed run, and name the log in the message of the failure."""
+    """Recover the partial log of a failed run; return the failure with the name of the log in its message."""
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
@@ -137,13 +138,13 @@ def _worker_failure(end: ProcessEnd, message: str, kind: str = "crashed") -> Run
 
 
 def _place(end: ProcessEnd | ForkServerDeath) -> str:
-    """Return ", in " and the innermost Python frame if the process dumped its stack, else ""."""
+    """Return ", in FRAME" with the innermost Python frame if the process dumped its stack, else ""."""
     place = innermost_frame(end.output)
     return f", in {place}" if place else ""
 
 
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
-    """Return the command that repeats a run from the working folder, with only the necessary options."""
+    """Return the shell command that repeats a run from the working folder."""
     words = ["simscen", "run", display_path(scenario.file), "--seed", str(seed)]
     if scenario.variation:
         words += ["--variation", scenario.variation]

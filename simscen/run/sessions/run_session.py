@@ -1,4 +1,4 @@
-"""Run a session: plan the runs, supervise their processes, and report exactly one result for each."""
+"""Run a session: plan the runs, execute them, and report exactly one result for each run."""
 
 import filecmp
 from collections.abc import Sequence
@@ -25,13 +25,14 @@ class SessionOptions:
     """Options of a session.
 
     Attributes:
-        seed: First of the `repeat` consecutive seeds; None for each scenario's own seed.
+        workers: Largest number of concurrent runs.
+        seed: First of the `repeat` consecutive seeds (None: the seed of each scenario).
         twice: Whether each run is repeated with the same seed and must give the same log.
-        fail_fast: Whether no run starts after one that did not pass.
+        fail_fast: Whether the session ends after the first run that does not pass.
         wall_limit: Limit of the wall time of each run in s.
-        against: Output folder of an earlier session with which each run is compared.
-        only: The runs to execute; None for all.
-        cluster: Address of the Ray cluster that executes the runs; "" for this machine.
+        against: Output folder of an earlier session with which each run is compared (None: no comparison).
+        only: Runs to execute (None: all).
+        cluster: Address of the Ray cluster that executes the runs ("": this machine).
     """
 
     workers: int = 1
@@ -48,7 +49,7 @@ class SessionOptions:
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
-    """Return the seeds with which a scenario runs. Raises UsageError if one exceeds the largest seed."""
+    """Return the seeds with which a scenario runs. Raises UsageError if a seed exceeds MAX_SEED."""
     first = options.seed if options.seed is not None else scenario.spec.seed
     if first + options.repeat - 1 > MAX_SEED:
         runs = f"{options.repeat} runs of {scenario.title} from seed {first} on"
@@ -57,7 +58,7 @@ def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
 
 
 def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path) -> list[Job]:
-    """Return all runs of a session in the order in which they start: by scenario, seed, variation, and stack.
+    """Return all runs of a session, ordered by scenario, seed, variation, and stack; skipped scenarios are last.
 
     `out` is the output folder of the session.
     """
@@ -83,7 +84,7 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
 
 
 def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Sequence[int]:
-    """Return the seeds of a scenario, restricted to `only` if that is given."""
+    """Return the seeds of a scenario, or only the seeds in `options.only`."""
     if options.only is None:
         return scenario_seeds(scenario, options)
     return sorted({key.seed for key in options.only if key.test == title})
@@ -92,7 +93,7 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 def run_session(
     jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
 ) -> tuple[RunStore, Exit | None]:
-    """Run all jobs, and pass exactly one result for each to `listen`, in the order in which they finish.
+    """Run all jobs, and pass the session's events to `listen`, with exactly one result for each job.
 
     Returns the results, and the exit code if the session was interrupted, else None.
     """
@@ -140,7 +141,7 @@ def run_session(
 
 
 def delete_log(run: RunFinished) -> RunFinished:
-    """Delete the log, the picture, and all other files of a run but its result."""
+    """Delete all files of a run except its result.json; return the run without paths of deleted files."""
     kept = Path(run.artifacts.result)
     for file in Path(run.artifacts.folder).iterdir():
         if file.is_file() and file != kept:
@@ -149,9 +150,9 @@ def delete_log(run: RunFinished) -> RunFinished:
 
 
 def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
-    """Return `run`, or an error with the first difference if its log differs from that of `twin`.
+    """Return `run`, or an error with the first difference if its log differs from the log of `twin`.
 
-    `twin` is the first of two runs with the same seed, and `run` the second; without their logs, `run` is returned.
+    `twin` is an earlier run with the same scenario and seed. Returns `run` if there is no twin or a log is missing.
     """
     if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
         return run
@@ -171,16 +172,16 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
 
 
 def _unfinished_reason(started: bool, stopped: Exit | None) -> RunFailure:
+    """Return the failure of a run without a result; `stopped` is the exit code of an interrupted session."""
     if started:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
 
 
 def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
-    """Return the run, or an error if it differs from the same run of the session in the folder `earlier`.
+    """Return the run, or an error if it differs from the same run in the output folder `earlier`, or if none is there.
 
-    The logs need not be equal byte for byte, because the last bits differ between machines: equal verdicts and nearly
-    equal trajectories are enough. A run that is missing in the earlier session is an error.
+    Verdicts must be equal, and trajectories nearly equal, because the last bits differ between machines.
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
@@ -200,14 +201,14 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Return the folder of the run in the earlier session. Its name contains the stack if that session had several."""
+    """Return the folder of the run in the earlier session, whose name can contain the name of the stack."""
     stack = run.result.stack.partition("=")[0]
     labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
     return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)
 
 
 def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
-    """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
+    """Return a description of the first difference of two logs, or None. Raises InvalidInput for an unreadable log."""
     from simscen.record.log_reader import read_log
     from simscen.record.trace_difference import first_pose_difference
 
@@ -224,4 +225,5 @@ def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
 
 
 def _statuses(result: RunResult) -> dict[str, str]:
+    """Return the status of each verdict by its id."""
     return {verdict.id: verdict.status.value for verdict in result.verdicts}

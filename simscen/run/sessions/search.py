@@ -1,6 +1,6 @@
-"""Search methods of `simscen falsify`: propose parameter values, and learn from the margins of the runs with them.
+"""Search methods of `simscen falsify`: propose parameter values with which a scenario may fail.
 
-Values are proposed and run in batches of a fixed size, so that a search does not depend on the number of workers.
+The margin of a run is the smallest distance between a measured value and its limit. It is negative if the run fails.
 """
 
 import math
@@ -13,13 +13,13 @@ import numpy as np
 from simscen.core.errors import UsageError
 
 Point = tuple[float, ...]
-"""Parameter values to run: the cumulative probability of each value in its distribution, above 0 and below 1."""
+"""One value for each parameter, given as its cumulative probability in the parameter's distribution (0 < p < 1)."""
 STARTUP_POINTS = 16
-"""Number of random points before TPE uses what it has learned; its authors use 10 to 20."""
+"""Number of random points at the start of TPE."""
 
 
 class SearchMethod(str, Enum):
-    """How `simscen falsify` chooses values."""
+    """Method by which `simscen falsify` chooses values."""
 
     AUTO = "auto"
     TPE = "tpe"
@@ -31,19 +31,18 @@ class Search(Protocol):
     """A search for the smallest margin. Calls of `ask` and `tell` alternate."""
 
     def ask(self, count: int) -> list[Point]:
-        """Return the next points to run."""
+        """Return the next `count` points."""
         ...
 
     def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
-        """Learn from the margins of the points of the last `ask`, in the same order; nan if a margin is unknown."""
+        """Learn from the margins of the points that the last `ask` returned (nan: unknown)."""
         ...
 
 
 def make_search(method: SearchMethod, choices: Sequence[int], seed: int) -> Search:
-    """Return a search whose random choices depend on `seed`. AUTO is TPE if Optuna is installed, else SOBOL.
+    """Return a search. AUTO is TPE if Optuna is installed, else SOBOL. Raises UsageError for TPE without Optuna.
 
-    `choices` has one number for each parameter: how many values its list has, or 0 for a continuous parameter. Raises
-    UsageError for TPE without Optuna.
+    `choices` has the number of values of each discrete parameter, and 0 for a continuous parameter.
     """
     if method is SearchMethod.RANDOM:
         return RandomSearch(len(choices), seed)
@@ -72,7 +71,7 @@ class RandomSearch:
 
 
 class SobolSearch:
-    """Points of a Sobol sequence with a random shift, which cover the space more evenly than random ones."""
+    """Points of a Sobol sequence with a random shift. They cover the space more evenly than random points."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         from scipy.stats.qmc import Sobol  # the import takes half a second
@@ -90,13 +89,10 @@ class SobolSearch:
 
 
 class TpeSearch:
-    """Optuna's multivariate tree-structured Parzen estimator.
-
-    (Bergstra et al.: Algorithms for Hyper-Parameter Optimization, 2011.)
-    """
+    """Optuna's multivariate tree-structured Parzen estimator (Bergstra et al. 2011)."""
 
     def __init__(self, choices: Sequence[int], seed: int) -> None:
-        """Make an empty study. Raises ImportError if Optuna is not installed."""
+        """Create an empty Optuna study. Raises ImportError if Optuna is not installed."""
         import optuna
 
         optuna.logging.set_verbosity(optuna.logging.WARNING)
@@ -112,7 +108,7 @@ class TpeSearch:
         self._trials: list[Any] = []
 
     def ask(self, count: int) -> list[Point]:
-        """Return points where small margins are likely."""
+        """Return `count` points where small margins are likely."""
         self._trials = [self._study.ask(self._distributions) for _ in range(count)]
         return [self._point(trial.params) for trial in self._trials]
 
@@ -125,6 +121,7 @@ class TpeSearch:
                 self._study.tell(trial, margin)
 
     def _point(self, parameters: dict[str, Any]) -> Point:
+        """Return the point for parameters of an Optuna trial."""
         values = (parameters[f"x{index}"] for index in range(len(self._choices)))
         return tuple(
             (value + 0.5) / count if count else _clip(value) for value, count in zip(values, self._choices, strict=True)
@@ -132,5 +129,5 @@ class TpeSearch:
 
 
 def _clip(u: float) -> float:
-    """Return `u` limited to the open interval from 0 to 1."""
+    """Return `u` clipped to the open interval from 0 to 1."""
     return min(max(u, 2.0**-53), 1 - 2.0**-53)
