@@ -27,8 +27,8 @@ def build_sensors(
 ) -> tuple[Sensor, ...]:
     """Return the sensors of a robot, sorted by name, with the sensors from plugins last.
 
-    Each sensor has its own random stream `sensor.<name>`. `view` and `rays` are the inputs of all sensors. Raises
-    ValueError if a rate does not divide the clock rate, and RunError if a plugin does not provide a valid sensor.
+    Each sensor has its own random stream `sensor.<name>`. `view` gives the true state, and `rays` measures distances.
+    Raises ValueError if a rate does not divide the clock rate, and RunError if a plugin's sensor is invalid.
     """
     return tuple(
         _build_sensor(name, spec, clock, streams, view, rays)
@@ -51,7 +51,7 @@ def _build_sensor(
 
 
 class PluginSensor:
-    """Wrapper of a plugin's sensor that checks each reading. `kind` is the name of the sensor's type in YAML.
+    """Sensor from a plugin (an installed package), with a check of each reading. `kind` is its key in YAML.
 
     Raises RunError if the plugin's sensor raises an exception or has no method `read`.
     """

@@ -11,7 +11,7 @@ from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 MAX_NOISE_STDS = 10.0
-"""Largest assumed noise in standard deviations. Rays end where even this noise gives no range below the maximum."""
+"""Largest assumed noise in standard deviations; determines the length of the rays."""
 NOISE_BUFFER_SCANS = 8
 """Number of scans whose noise is drawn at once, to save time."""
 

@@ -28,7 +28,7 @@ FIRMWARE_RATE_HZ = 60
 REST_UPDATE_PERIOD_S = 5.0
 """Time between two updates of the poses in which pushable objects have come to rest."""
 SETTLING_TICKS = 60
-"""Number of ticks before tick 0 in which everything comes to rest on the ground."""
+"""Number of ticks before tick 0 in which all_scripted comes to rest on the ground."""
 
 
 class RobotPlacement(NamedTuple):
@@ -184,10 +184,10 @@ class Simulation:
         """Simulate one tick: first move the objects that follow a path, afterwards record the contacts of robots."""
         scene = self._scene
         if scene.tick < min([robot.no_contact_before for robot in self._robots]):  # only objects can touch each other
-            scene.actors.begin_step(scene.tick, everything=False)
+            scene.actors.begin_step(scene.tick, all_scripted=False)
             pybullet.stepSimulation(scene.client)
             scene.tick += 1
-            scene.actors.end_step(scene.tick, everything=False)
+            scene.actors.end_step(scene.tick, all_scripted=False)
             return
         scene.activate_actors()
         scene.actors.begin_step(scene.tick)
@@ -211,7 +211,7 @@ class Simulation:
                     robot.add_bodies(dict.fromkeys(new_walls))
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call `function` before each step that begins at a multiple of `period` ticks; replaces the last function."""
+        """Call `function` before each step that begins at a multiple of `period` ticks, instead of an earlier one."""
         self._periodic_call = period, function
 
     # Changing the world

@@ -39,7 +39,7 @@ _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 _PLANAR_DIAGONAL = (0, 7, 35)
 """Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Number of values per reading of exact odometry: tick, pose (3), velocity (3), its variances (3), pose covariance (9)."""
+"""Numbers per reading of exact odometry: tick, pose (3), twist (3), twist variances (3), pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]

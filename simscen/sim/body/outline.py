@@ -12,7 +12,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 MIN_POINTS_TO_FILTER = 200
-"""Number of points above which `convex_hull` first discards points that cannot be corners."""
+"""Smallest number of points for which `convex_hull` first discards points that cannot be corners."""
 _CIRCLE_CORNERS = 64
 """Number of corners of the polygon that approximates a circle."""
 

@@ -126,7 +126,7 @@ def center_of_mass(body: RobotBody) -> Vector:
 
 
 def is_stable(body: RobotBody) -> bool:
-    """Return whether the center of mass is above the support polygon. Always true for omnidirectional and mecanum."""
+    """Return whether the center of mass is above the support polygon. True for omnidirectional and mecanum drives."""
     points = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
     x, y, _ = center_of_mass(body)
     return len(points) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(points)), (x, y))

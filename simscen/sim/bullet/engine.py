@@ -158,7 +158,7 @@ def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
     return _checked_shape(shape)
 
 
-def create_convex_hull_shape(client: int, solids: Iterable[Solid]) -> int:
+def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
     """Create the shape of the common convex hull of solids."""
     return create_convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
 
@@ -173,19 +173,19 @@ def create_robot_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
     primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
     others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
     first = [create_compound_shape(client, primitives)] if primitives else []
-    return first + [create_convex_hull_shape(client, [solid]) for solid in others]
+    return first + [create_hull_of_solids(client, [solid]) for solid in others]
 
 
 def create_body_shape(client: int, solids: Sequence[Solid], is_pushable: bool, triangulate: Triangulate) -> int:
     """Create the collision shape of a movable object.
 
-    If not all solids are PRIMITIVES, the shape of a pushable object is its convex hull. Otherwise, the shape is the
-    exact surface, which can be concave.
+    If all solids are PRIMITIVES, the shape consists of these primitives. If not, the shape of a pushable object is its
+    convex hull, and the shape of any other object is its surface, which can be concave.
     """
     if are_primitives(solids):
         return create_compound_shape(client, solids)
     return (
-        create_convex_hull_shape(client, solids)
+        create_hull_of_solids(client, solids)
         if is_pushable
         else create_concave_shape(client, fuse_surfaces(solids, triangulate))
     )

@@ -110,7 +110,7 @@ class Clearance:
     def measure(self, tick: int, period: int = NEVER) -> float:
         """Return the clearance in m at the current `tick`, at most `max_range`; negative inside an object.
 
-        `period` is the number of ticks until the next call. `no_contact_before` is updated only if it is before then.
+        `period` is the number of ticks until the next call. `no_contact_before` is updated only if it is earlier.
         """
         if self._measured_tick == tick:
             return self._distance
@@ -137,10 +137,9 @@ class Clearance:
         return self._distance
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
-        """Return whether `static_clearance(pose)` can compute the clearance at the current `tick` later.
+        """Return whether the clearance at the current `tick` can be computed later, as `static_clearance(pose)`.
 
-        True if the static world is nearest and no contact is possible for `period` ticks. Uses upper bounds of motions
-        since the last measurement, and measures nothing.
+        This is possible if the static world is nearest and no contact is possible for `period` ticks.
         """
         if tick + period <= self._deferrable_until:
             return True

@@ -14,7 +14,7 @@ END_DELAY_S = 0.1
 MIN_CAUSING_SPEED_M_S = 0.02
 """Smallest speed of a robot that has caused a collision.
 
-Towards a movable object, only motion along the contact normal counts.
+For a collision with a movable object, this is the speed along the contact normal.
 """
 NO_BODY = -1
 """Invalid body id."""
@@ -78,7 +78,7 @@ class CollisionTracker:
         self._events: list[Event] = []
 
     def has_contact_at(self, tick: int) -> bool:
-        """Return whether the robot touched anything at `tick`, the tick of the last update or a later one."""
+        """Return whether the robot touched anything at `tick`. Valid for the tick of the last update and later ticks."""
         return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property

@@ -39,7 +39,7 @@ ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 PartBound = tuple[float, int, tuple[float, float, float, float]]
 """Bound, index, and bounding rectangle (left, low, right, high) in m of a part of the static mesh.
 
-The bound minus the robot's current travel is a lower bound in m of the distance to the part.
+The bound minus the distance that the robot has moved since the start is a lower bound of the distance to the part in m.
 """
 
 

@@ -240,20 +240,20 @@ class Actors:
 
     # Stepping
 
-    def begin_step(self, tick: int, everything: bool = True) -> None:
+    def begin_step(self, tick: int, all_scripted: bool = True) -> None:
         """Set the poses and velocities of scripted actors in the engine before the step that begins at `tick`.
 
-        Without `everything`, affects only the scripted actors that may push something soon.
+        Without `all_scripted`, affects only the scripted actors that may push something soon.
         """
-        for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
+        for actor in self._scripted_colliding if all_scripted else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
             velocity, turn_rate = actor.path_velocity(tick, self._tick_rate)
             if turn_rate or any(velocity):
                 pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turn_rate), physicsClientId=self._client)
 
-    def end_step(self, tick: int, everything: bool = True) -> None:
+    def end_step(self, tick: int, all_scripted: bool = True) -> None:
         """Set the poses of scripted actors in the engine after the step that ended at `tick`; see `begin_step`."""
-        for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
+        for actor in self._scripted_colliding if all_scripted else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def move_rendered(self, tick: int) -> None:

@@ -96,7 +96,10 @@ def find_nearby(
 
 
 class ProximityQuery(NamedTuple):
-    """Position of a robot and two radii in m: actors in `radius` must collide, in `observed_radius` be measurable."""
+    """Position of a robot and two radii in m.
+
+    Actors within `radius` must be able to collide. Actors within `observed_radius` must be measurable.
+    """
 
     point: Vector
     radius: float

@@ -11,7 +11,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.bullet.engine import create_convex_hull_shape, create_static_body, split_into_tiles
+from simscen.sim.bullet.engine import create_hull_of_solids, create_static_body, split_into_tiles
 from simscen.sim.contact.static_distance import (
     StaticDistance,
     encloses,
@@ -184,7 +184,7 @@ def test_every_face_is_in_one_tile():
 def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
     made = StaticDistance(merge_solids([]), build_robot_body(shipped("turtlebot")), 2.0)
-    shape = create_convex_hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
+    shape = create_hull_of_solids(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
     low, high = pybullet.getAABB(create_static_body(made._client, shape), physicsClientId=made._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
