@@ -28,7 +28,7 @@ FIRMWARE_RATE_HZ = 60
 REST_UPDATE_PERIOD_S = 5.0
 """Time between two updates of the poses in which pushable objects have come to rest."""
 SETTLING_TICKS = 60
-"""Number of ticks before tick 0 in which all_scripted comes to rest on the ground."""
+"""Number of ticks before tick 0 in which everything comes to rest on the ground."""
 
 
 class RobotPlacement(NamedTuple):
