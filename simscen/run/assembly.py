@@ -49,32 +49,34 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
     simulation = Simulation(
         prepared.built.mesh,
         world.bodies,
-        {name: RobotPlacement(part.body, part.start, part.obstacles) for name, part in prepared.each.items()},
+        {name: RobotPlacement(part.body, part.start, part.obstacles) for name, part in prepared.by_robot.items()},
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
-        has_images=any(sensor.may_render for part in prepared.each.values() for sensor in part.robot.sensors.values()),
+        has_images=any(
+            sensor.may_render for part in prepared.by_robot.values() for sensor in part.robot.sensors.values()
+        ),
     )
     for region, friction in world.friction.items():
         simulation.add_friction_patch(region, Patch(world.regions[region], friction))
     scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
     pedestrians = PedestrianSimulation(prepared.built, simulation, clock)
-    agents = {
+    robots = {
         name: _build_robot(name, part, simulation, scene, seed, pedestrians, stages, stack_log)
-        for name, part in prepared.each.items()
+        for name, part in prepared.by_robot.items()
     }
     for name, stage in stages.items():
         for body in (*world.bodies, *(robot.body for robot in simulation.robots[name].others)):
             stage.record_event(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
-    directors = tuple(director for director in _directors(prepared, streams, agents) if director.has_disturbances)
+    directors = tuple(director for director in _directors(prepared, streams, robots) if director.has_disturbances)
     for stage in stages.values():
         stage.is_observed = bool(directors)
-    return RunSetup(simulation, tuple(agents.values()), directors, clock.period(spec.physics.truth_rate))
+    return RunSetup(simulation, tuple(robots.values()), directors, clock.period(spec.physics.truth_rate))
 
 
 def _directors(
-    prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
+    prepared: PreparedScenario, streams: Streams, robots: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
     """Yield the directors of a run. A director starts events and faults.
 
@@ -82,14 +84,14 @@ def _directors(
     robot, and each robot has another director for its faults.
     """
     spec = prepared.spec
-    first, *_ = agents.values()
+    first, *_ = robots.values()
     if not prepared.robots:
         yield Director(spec.steps, spec.faults, streams, first.stage, first.faults)
         return
     yield Director(spec.steps, [], streams, first.stage, first.faults)
-    for name, agent in agents.items():
+    for name, robot in robots.items():
         robot_streams = Streams(streams.seed, name)
-        yield Director([], prepared.robots[name].spec.faults, robot_streams, agent.stage, agent.faults)
+        yield Director([], prepared.robots[name].spec.faults, robot_streams, robot.stage, robot.faults)
 
 
 def _build_robot(

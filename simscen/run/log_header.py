@@ -79,15 +79,15 @@ DECIMALS = 3
 
 def world_scenery(prepared: PreparedScenario) -> Scenery:
     """Return the objects, regions, and zones that viewers show."""
-    world, each = prepared.built.world, prepared.each
-    diameter = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
-    same = all(part.map is prepared.built.map for part in each.values())
+    world, by_robot = prepared.built.world, prepared.by_robot
+    diameter = max((2 * wheel.radius for part in by_robot.values() for wheel in part.body.wheels), default=0.0)
+    same = all(part.map is prepared.built.map for part in by_robot.values())
     return Scenery(
         places=dict(world.places),
         things=tuple(_movable_object(body, world) for body in world.bodies),
         ground=tuple(_drivable_surfaces(prepared.built.mesh, diameter)),
         floors=tuple(FrictionRegion(name, world.regions[name], friction) for name, friction in world.friction.items()),
-        zones=tuple(zone for name, part in each.items() for zone in _zones(part, name)),
+        zones=tuple(zone for name, part in by_robot.items() for zone in _zones(part, name)),
         map=None if same else CompressedGrid.of(prepared.built.map),
     )
 

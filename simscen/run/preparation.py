@@ -76,7 +76,7 @@ class PreparedScenario:
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
 
     @property
-    def each(self) -> Mapping[str, "PreparedScenario"]:
+    def by_robot(self) -> Mapping[str, "PreparedScenario"]:
         """Prepared scenario of each robot by name. The name of a single robot is ""."""
         return self.robots or {ROBOT_NAME: self}
 
@@ -185,7 +185,7 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
-    """Return the largest clearance in m that a criterion or trigger needs to distinguish."""
+    """Return the largest clearance in m that a criterion or trigger uses."""
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
     ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]

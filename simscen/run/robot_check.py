@@ -69,7 +69,7 @@ class RestingState:
 
 @dataclass(frozen=True)
 class _Leg:
-    """A motion from rest to rest at a constant ratio: forward in m, left in m, and turn in rad (counterclockwise)."""
+    """A motion from rest to rest: forward (m), left (m), and turn (rad, counterclockwise) at the same time."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -214,7 +214,7 @@ class TurnLimits(NamedTuple):
 
 ROLLING_LIMITS = TurnLimits(angle=0.02, odometry=0.02, square_end=0.02, offset=0.05)
 SKID_STEER_LIMITS = TurnLimits(angle=0.10, odometry=0.03, square_end=0.04, offset=0.50)
-"""Limits for robots without and with skid steering, whose turns depend on load and speed (Mandow et al., IROS 2007)."""
+"""Limits without and with skid steering. Skid-steer turns depend on load and speed (Mandow et al., IROS 2007)."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from simscen.run.log_header import log_header
 from simscen.run.preparation import PreparedScenario
 from simscen.spec.registry import Entry
 
-Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
+AttachLogs = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
 """Function that receives the setup of a run and the logs of its first robot; returns additional logs for this robot."""
 
 
@@ -37,7 +37,7 @@ def simulate(
     seed: int | None = None,
     *,
     log: Path | None = None,
-    attach: Attach | None = None,
+    attach: AttachLogs | None = None,
     stack_log: Path | None = None,
 ) -> Run:
     """Run a prepared scenario with a seed (default: the scenario's own) and judge the run.
@@ -60,7 +60,7 @@ def simulate(
 
 
 def _run_and_judge(
-    prepared: PreparedScenario, seed: int, log: Path | None, attach: Attach | None, stack_log: Path | None = None
+    prepared: PreparedScenario, seed: int, log: Path | None, attach: AttachLogs | None, stack_log: Path | None = None
 ) -> Run:
     prepared = apply_map_faults(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
@@ -70,16 +70,16 @@ def _run_and_judge(
         delay, robot_logs = 0 if prepared.plugins else clock.ticks(MOMENT_DELAY_S), recorder.robots if recorder else {}
         backlog = cleanup.enter_context(MomentBuffer(delay, next(iter(robot_logs.values()), None)))
         thinnings = {name: one.thinning for name, one in robot_logs.items()}
-        builders = {name: TraceBuilder(clock, thinnings.get(name)) for name in prepared.each}
+        builders = {name: TraceBuilder(clock, thinnings.get(name)) for name in prepared.by_robot}
         setup = assemble(prepared, seed, stack_log)
         cleanup.callback(setup.simulation.close)
-        agents = dict(zip(prepared.each, setup.robots, strict=True))
+        agents = dict(zip(prepared.by_robot, setup.robots, strict=True))
         externals = {name: agent.stack for name, agent in agents.items() if isinstance(agent.stack, ExternalStack)}
         cleanup.callback(_close, externals.values())
         for name, stack in externals.items():
-            stack.begin(prepared.each[name].estimate)
+            stack.begin(prepared.by_robot[name].estimate)
         for name, agent in agents.items():
-            part = prepared.each[name]
+            part = prepared.by_robot[name]
             agent.stack.start(part.estimate, part.case.goals)
         logs = [(builders[name], robot_logs[name]) if robot_logs else (builders[name],) for name in agents]
         for agent, robot_sinks in zip(setup.robots, logs, strict=True):

@@ -42,7 +42,7 @@ from simscen.worlds.raycasting import ray_scene
 
 def import_components(prepared: PreparedScenario) -> None:
     """Import the shipped components of the scenario's stacks and sensors, so that the workers need not."""
-    for part in prepared.each.values():
+    for part in prepared.by_robot.values():
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
         if isinstance(part.stack, StackSpec):
@@ -58,7 +58,7 @@ def precompute(prepared: PreparedScenario) -> None:
 
     ray_scene.build_mesh_scene(prepared.built.mesh)
     walls.prepare_walls(prepared.built.mesh)
-    for part in prepared.each.values():
+    for part in prepared.by_robot.values():
         walls.prepare_walls(part.obstacles)
         if part.map is not None and isinstance(part.stack, StackSpec):
             grid = part.map.refined(part.stack.costmap.resolution)

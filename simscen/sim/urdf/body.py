@@ -34,12 +34,12 @@ from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import LinkTree, MeshReader, MeshSource, build_tree
 from simscen.sim.urdf.wheels import WheelJoint, examine_joints, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
-from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
+from simscen.sim.urdf.xml_source import URDF_ERROR_CODE, RobotFiles, read_xml
 
 AXLE_TOLERANCE_M = 0.02
 """Largest distance in m along x between wheels on the same axle."""
 MAX_UPSIDE_DOWN_Z = -0.9
-"""Cosine of the angle between the z axes of lidar and robot, below which the lidar is mounted upside down."""
+"""Largest z component of the z axis of a lidar that is mounted upside down."""
 DEFAULT_MAX_STEERING_RAD = 0.5
 """Largest steering angle of a car whose steering joints have no limits below 90 degrees."""
 MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
@@ -185,7 +185,7 @@ def read_spec_tree(
         path = located.urdf if located else folders.find(spec.urdf, folder)
     except UnusableFile as trouble:
         shown = folders.display_path(file.resolve()) if file else ""
-        raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
+        raise InvalidInput([Problem(shown, 0, 0, URDF_ERROR_CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
     return read_tree(path, folders, read_mesh, {name: _xml_text(value) for name, value in spec.arguments.items()})
 
 

@@ -10,7 +10,7 @@ from simscen.assets import markup
 from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 
-CODE = "SC400"
+URDF_ERROR_CODE = "SC400"
 """Error code of all problems in a robot's URDF."""
 
 
@@ -69,7 +69,7 @@ class Element(markup.Element):
     def problem(self, message: str, hint: str = "") -> Problem:
         """Return an error that refers to the line of this element."""
         source = self.source.line(self.line)
-        return Problem(self.source.name, self.line, self.col, CODE, message, hint, source=source)
+        return Problem(self.source.name, self.line, self.col, URDF_ERROR_CODE, message, hint, source=source)
 
 
 def parse_xml(data: bytes, file: str) -> Element:
@@ -77,7 +77,7 @@ def parse_xml(data: bytes, file: str) -> Element:
     try:
         return markup.parse(data, markup.Source.of(data, file), Element)
     except markup.MalformedXml as error:
-        problem = Problem(file, error.line, error.col, CODE, error.message, error.hint, source=error.source)
+        problem = Problem(file, error.line, error.col, URDF_ERROR_CODE, error.message, error.hint, source=error.source)
         raise InvalidInput([problem]) from error
 
 
@@ -99,5 +99,5 @@ def read_xml(path: Path, folders: AllowedFolders) -> Element:
     try:
         _, data = folders.read_file(path, MAX_URDF_BYTES)
     except UnusableFile as trouble:
-        raise InvalidInput([Problem(shown_path, 0, 0, CODE, str(trouble))]) from trouble
+        raise InvalidInput([Problem(shown_path, 0, 0, URDF_ERROR_CODE, str(trouble))]) from trouble
     return parse_xml(data, shown_path)

@@ -10,7 +10,7 @@ from simscen.sim.urdf.xacro.limits import MAX_BITS, MAX_LENGTH, Budget, Expansio
 
 Function = Callable[..., object]
 
-TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": bool, "list": list, "dict": dict}
+PYTHON_TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": bool, "list": list, "dict": dict}
 
 
 def _round(number: float, digits: int | None = None) -> float:
@@ -40,7 +40,7 @@ def _fatal(*messages: object) -> str:
     raise ExpansionError(f"error in the file: {' '.join(map(str, messages))[:200]}")
 
 
-MATH: Mapping[str, Function | float] = {
+MATH_FUNCTIONS: Mapping[str, Function | float] = {
     name: getattr(math, name)
     for name in (
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos", "cosh", "degrees", "exp",
@@ -48,15 +48,19 @@ MATH: Mapping[str, Function | float] = {
         "radians", "sin", "sinh", "sqrt", "tan", "tanh", "trunc", "pi", "e", "tau", "inf", "nan",
     )
 }  # fmt: skip
-PYTHON: Mapping[str, Function] = {
-    **TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range, "round": _round,
+PYTHON_FUNCTIONS: Mapping[str, Function] = {
+    **PYTHON_TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range, "round": _round,
     "sorted": sorted, "sum": sum,
 }  # fmt: skip
-XACRO: Mapping[str, Function] = {
+XACRO_FUNCTIONS: Mapping[str, Function] = {
     "message": _ignore_message, "warning": _ignore_message, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
 }  # fmt: skip
-NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {"math": MATH, "python": PYTHON, "xacro": XACRO}
-GLOBALS: Mapping[str, Function | float] = {**MATH, **PYTHON}
+NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {
+    "math": MATH_FUNCTIONS,
+    "python": PYTHON_FUNCTIONS,
+    "xacro": XACRO_FUNCTIONS,
+}
+GLOBAL_FUNCTIONS: Mapping[str, Function | float] = {**MATH_FUNCTIONS, **PYTHON_FUNCTIONS}
 """Functions and constants that can be used without a namespace."""
 
 
@@ -88,14 +92,14 @@ METHODS: Mapping[tuple[type, str], Function] = {
 MAX_EXPRESSION_CHARACTERS = 1000
 """Maximum length of an expression."""
 
-BINARY: dict[type[ast.operator], Callable[[Any, Any], object]] = {
+BINARY_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], object]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
 }  # fmt: skip
-UNARY: dict[type[ast.unaryop], Callable[[Any], object]] = {
+UNARY_OPERATORS: dict[type[ast.unaryop], Callable[[Any], object]] = {
     ast.UAdd: operator.pos, ast.USub: operator.neg, ast.Not: operator.not_
 }  # fmt: skip
-COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
+COMPARISON_OPERATORS: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
     ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
@@ -144,10 +148,10 @@ class _Evaluation:
                 return self._name(node)
             case ast.List(elts) | ast.Tuple(elts):
                 return [self.value(each) for each in elts]
-            case ast.BinOp(left, kind, right) if type(kind) in BINARY:
+            case ast.BinOp(left, kind, right) if type(kind) in BINARY_OPERATORS:
                 return _binary(type(kind), self.value(left), self.value(right))
-            case ast.UnaryOp(kind, operand) if type(kind) in UNARY:
-                return UNARY[type(kind)](self.value(operand))
+            case ast.UnaryOp(kind, operand) if type(kind) in UNARY_OPERATORS:
+                return UNARY_OPERATORS[type(kind)](self.value(operand))
             case ast.BoolOp(kind, values):
                 return self._boolean(values, isinstance(kind, ast.Or))
             case ast.Compare(left, kinds, others):
@@ -185,7 +189,7 @@ class _Evaluation:
         before, result = self.value(left), True
         for kind, other in zip(kinds, others, strict=True):
             after = self.value(other)
-            result = bool(COMPARE[type(kind)](before, after))
+            result = bool(COMPARISON_OPERATORS[type(kind)](before, after))
             if not result:
                 break
             before = after
@@ -201,9 +205,9 @@ class _Evaluation:
         path = _path(function) if isinstance(function, ast.Name) or _is_namespace(function) else ()
         if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
             kind = _path(arguments[1])[-1]
-            if kind not in TYPES:
+            if kind not in PYTHON_TYPES:
                 raise ExpansionError(f"isinstance() of {kind[:60]!r} is not supported")
-            return isinstance(self.value(arguments[0]), TYPES[kind])
+            return isinstance(self.value(arguments[0]), PYTHON_TYPES[kind])
         known: Function | float | None
         if path:
             known, receiver = _find_builtin(path), []
@@ -230,7 +234,7 @@ def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
         raise ExpansionError("the number is too large")
     if kind is ast.Mod and isinstance(left, str):
         raise ExpansionError("formatting texts with % is not supported", "write ${…} between the words instead")
-    return BINARY[kind](left, right)
+    return BINARY_OPERATORS[kind](left, right)
 
 
 def _path(node: ast.expr) -> tuple[str, ...]:
@@ -251,7 +255,7 @@ def _is_namespace(node: ast.expr) -> bool:
 def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
     match path:
         case (name,):
-            return GLOBALS.get(name)
+            return GLOBAL_FUNCTIONS.get(name)
         case (space, name):
             return NAMESPACES.get(space, {}).get(name)
         case _:
