@@ -127,7 +127,7 @@ class CommandLink:
         self._received, self._received_at = STOP, 0
 
     def send(self, tick: int, command: Twist) -> bool:
-        """Return whether the stack sends a message with its command at this tick. Call it once at each tick."""
+        """Return whether the stack sends a message with `command` at `tick`. Call it for each command."""
         sent = tick % self._period == 0 or command != self._sent
         self._sent = command
         return sent
@@ -165,5 +165,5 @@ class LocalizerWithFaults:
 
     @property
     def belief(self) -> Belief:
-        """The belief after the faults."""
+        """Belief with the effects of faults."""
         return self._disturb(self._inner.belief)

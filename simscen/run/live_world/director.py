@@ -14,7 +14,7 @@ from simscen.run.stream_names import stream_names
 from simscen.triggers.base import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 
-_AT_ONCE = Trigger(time=Time(0.0))
+_IMMEDIATE_TRIGGER = Trigger(time=Time(0.0))
 """Trigger of events and faults without `when`."""
 
 
@@ -35,12 +35,12 @@ class Director:
         """
         self._stage, self._injector, self._faults = stage, injector, faults
         self._steps = [
-            (step, TriggerState(step.when or _AT_ONCE, streams.generator(f"event{stream}")))
+            (step, TriggerState(step.when or _IMMEDIATE_TRIGGER, streams.generator(f"event{stream}")))
             for step, stream in zip(steps, stream_names([step.entry for step in steps]), strict=True)
         ]
         self._situations: dict[int, Situation] = {k: stage for k, step in enumerate(steps) if step.after is None}
         self._starts = [
-            TriggerState(entry.when or _AT_ONCE, streams.generator(f"fault-start{stream}"))
+            TriggerState(entry.when or _IMMEDIATE_TRIGGER, streams.generator(f"fault-start{stream}"))
             for entry, stream in zip(faults, stream_names(faults), strict=True)
         ]
         self._ends: dict[int, int | None] = {}

@@ -257,7 +257,7 @@ class LiveStage:
         self._send_order(lambda tick: self._stack.preempt(tick, goal))
 
     def cancel_goal(self) -> None:
-        """Cancel the current goal and all later ones."""
+        """Cancel the current goal and all following goals."""
         self._send_order(self._stack.cancel)
 
     def record_world_event(self, event: Event) -> None:

@@ -165,7 +165,7 @@ def adopt_orphans() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
-def has_descendants() -> bool:
+def has_running_children() -> bool:
     """Return whether a child of this process still runs. Reaps the children that have exited."""
     while True:
         try:

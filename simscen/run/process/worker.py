@@ -15,7 +15,7 @@ from simscen.core.records.trace import Moment
 from simscen.run.process.isolation import (
     adopt_orphans,
     die_with_parent,
-    has_descendants,
+    has_running_children,
     limit_resources,
     prefer_for_oom_kill,
 )
@@ -50,7 +50,7 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -
     try:
         _set_up_process(parent, pipes.output)
         end = _end_record(job, pipes.report, execute)
-        os.write(pipes.report, json_line({"end": end, "left_processes": has_descendants()}))
+        os.write(pipes.report, json_line({"end": end, "left_processes": has_running_children()}))
         code = 0
         sys.stdout.flush()
         sys.stderr.flush()

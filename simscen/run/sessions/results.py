@@ -88,7 +88,7 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
 
 
 def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
-    """Return the failure that the end of a process means, or None if the run was finished."""
+    """Return the failure of a run whose process has ended, or None if the run was finished."""
     if isinstance(end, ForkServerDeath):
         when = "while it prepared this one" if end.was_preparing else "while this run was active"
         kind = "timeout" if end.timed_out else "crashed"

@@ -49,8 +49,8 @@ MATH_FUNCTIONS: Mapping[str, Function | float] = {
     )
 }  # fmt: skip
 PYTHON_FUNCTIONS: Mapping[str, Function] = {
-    **PYTHON_TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range, "round": _round,
-    "sorted": sorted, "sum": sum,
+    **PYTHON_TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range,
+    "round": _round, "sorted": sorted, "sum": sum,
 }  # fmt: skip
 XACRO_FUNCTIONS: Mapping[str, Function] = {
     "message": _ignore_message, "warning": _ignore_message, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
@@ -60,6 +60,7 @@ NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {
     "python": PYTHON_FUNCTIONS,
     "xacro": XACRO_FUNCTIONS,
 }
+"""Functions and constants that can be used as `namespace.name`."""
 GLOBAL_FUNCTIONS: Mapping[str, Function | float] = {**MATH_FUNCTIONS, **PYTHON_FUNCTIONS}
 """Functions and constants that can be used without a namespace."""
 
