@@ -53,7 +53,7 @@ StackT = TypeVar("StackT", bound=StackBase)
 
 
 def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
-    """Return the stack. If it has `latency: robot`, its latencies are those of the robot's specification."""
+    """Return the stack. If it has `latency: robot`, it gets the latencies in the robot's specification."""
     if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(

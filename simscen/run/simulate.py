@@ -181,9 +181,9 @@ def execute_run(
 ) -> dict[str, Any]:
     """Execute a run in a worker process, and write all its files to `folder`.
 
-    The files are run.mcap, result.json, scenario.yaml, for an external stack stack.log and stack.json (with several
-    robots stack.ROBOT.log and stack.ROBOT.json), and those of `write_extras`. The moments (recorded beats) of the first
-    robot are also sent to `logs`. Returns the `outcome`, and `sha256`, the digest of run.mcap.
+    The files are run.mcap, result.json, scenario.yaml, and for an external stack stack.log and stack.json (with several
+    robots stack.ROBOT.log and stack.ROBOT.json). `write_extras` writes more files. The moments (recorded beats) of the
+    first robot are also sent to `logs`. Returns the `outcome`, and `sha256`, the digest of run.mcap.
     """
     if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)

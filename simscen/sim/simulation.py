@@ -202,7 +202,7 @@ class Simulation:
         scene.actors.end_step(scene.tick)
 
     def _build_walls(self, ticks: int) -> None:
-        """Create the walls that robots may touch now, and those that pushable objects can reach within `ticks`."""
+        """Create the walls that robots may touch now, and the walls that pushable objects can reach within `ticks`."""
         scene = self._scene
         robots = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
         for sphere in itertools.chain(robots, scene.actors.reachable_spheres(scene.tick, ticks)):

@@ -1,1 +1,1 @@
-"""Run navigation stacks in processes of their own, with which simscen exchanges frames of the stack protocol."""
+"""External navigation stacks: separate processes with which simscen exchanges frames of the stack protocol."""

@@ -1,1 +1,1 @@
-"""The world during a run: what triggers observe, and what events and actions change."""
+"""The world during a run: observed by triggers, and changed by events and actions."""

@@ -1,1 +1,1 @@
-"""Execute each run in a process of its own: supervisor, fork server, and workers."""
+"""Execution of each run in a separate process: supervisor, fork server, and workers."""

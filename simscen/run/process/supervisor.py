@@ -72,7 +72,7 @@ class ForkServerProcess:
         self._send_buffer += data
 
     def receive_line(self, timeout: float) -> bytes:
-        """Return the next message, and meanwhile send queued messages.
+        """Send queued messages, and return the next received message.
 
         Raises EOFError if the process has exited, and Unresponsive after `timeout` seconds.
         """

@@ -201,7 +201,7 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Return the folder of the run in the earlier session, whose name can contain the name of the stack."""
+    """Return the folder of the run in the earlier session. Its name can contain the name of the stack."""
     stack = run.result.stack.partition("=")[0]
     labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
     return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)

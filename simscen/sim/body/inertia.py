@@ -36,7 +36,7 @@ class MassProperties:
 
 
 def combine(parts: Sequence[MassProperties]) -> MassProperties:
-    """Return the properties of a rigid body from those of its parts in the same frame (parallel axis theorem)."""
+    """Return the properties of a rigid body that consists of `parts` in the same frame (parallel axis theorem)."""
     mass = sum(part.mass for part in parts)
     weighted = np.sum([part.mass * part.center for part in parts], axis=0)
     center = weighted / mass if mass > 0 else np.mean([part.center for part in parts], axis=0)
@@ -55,7 +55,7 @@ def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
 
 
 def volume(shape: Shape) -> float:
-    """Return the volume in m³; for a mesh, that of its bounding box."""
+    """Return the volume of a shape in m³; for a mesh, the volume of its bounding box."""
     match shape:
         case Box(size):
             return math.prod(size)
@@ -76,7 +76,7 @@ def volume(shape: Shape) -> float:
 
 
 def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
-    """Return the properties of a shape of uniform density in its own frame; for a mesh, those of its bounding box."""
+    """Return the properties of a shape of uniform density in its own frame. A mesh counts as its bounding box."""
     match shape:
         case Box((x, y, z)):
             return _symmetric(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)

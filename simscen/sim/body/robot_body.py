@@ -80,8 +80,8 @@ def assemble_body(
 ) -> RobotBody:
     """Return the body of a robot from the solids of its hull, its wheels, and the mass properties of its chassis.
 
-    Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. The footprint is
-    that of the specification, or by default that of the hull.
+    Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. Without a footprint
+    in the specification, the footprint is the outline of the hull.
     """
     hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
     outline = footprint(hull)

@@ -31,7 +31,7 @@ TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
 NOTHING, EVERYTHING = 0, -1
 """Collision masks of no group and of all groups."""
 STATIC_MASK = ~(STATIC | GROUND | TERRAIN)
-"""Collision mask of bodies without mass: all groups except those that never move."""
+"""Collision mask of bodies without mass: all groups except STATIC, GROUND, and TERRAIN."""
 DEFAULT_VISUAL = -1
 """Id of the visual shape that equals the collision shape."""
 ORIGIN = Pose3()

@@ -27,7 +27,7 @@ class _StaticNearest(NamedTuple):
 
     tick:    tick of the measurement
     pose:    pose of the robot at this tick
-    margin:  lower bound in m of how much farther away all other objects were
+    margin:  lower bound in m of the additional distance to any other object
     """
 
     tick: int
@@ -89,7 +89,7 @@ class Clearance:
         self.invalidate()
 
     def invalidate(self) -> None:
-        """Discard all results, because an object or robot was added, removed, or placed elsewhere."""
+        """Discard all results, because an object or robot was added, removed, or placed."""
         self._distance = 0.0
         self._measured_tick, self.no_contact_before = -1, 0
         self._static_nearest: _StaticNearest | None = None

@@ -52,7 +52,7 @@ class BaseMotion(NamedTuple):
 class PreStepMotion(NamedTuple):
     """Motions before a step, to compute the speed of a collision that starts during the step.
 
-    robot:   motion of the robot whose collisions are tracked
+    robot:   motion of the robot that collides
     actors:  velocities in m/s of all movable objects that can collide, by body id
     robots:  motions of all robots, by body id
     """
@@ -98,7 +98,7 @@ class CollisionTracker:
         self._end(tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay))
 
     def end_all(self, tick: int) -> None:
-        """End all collisions, because the robot is placed elsewhere at `tick`."""
+        """End all collisions, because the robot is placed at `tick`."""
         self._end(tick, sorted(self._ongoing))
 
     def _end(self, tick: int, names: list[str]) -> None:

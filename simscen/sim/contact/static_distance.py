@@ -33,7 +33,7 @@ NEAREST_SLACK_M = 0.005
 SOLID_TOLERANCE_M = 0.05
 """Largest distance from a contact point to the bounding box of the touched part."""
 LINE_TILT = 0.0123, 0.0271
-"""Slopes dx/dz and dy/dz of the line that `encloses_along_line` follows. It avoids vertical edges, as in maps."""
+"""Slopes dx/dz and dy/dz of the line in `encloses_along_line`. The tilt avoids hits of vertical edges, as in maps."""
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]

@@ -79,7 +79,7 @@ class Actors:
         self._update_engine(tick)
 
     def _update_engine(self, tick: int) -> None:
-        """Create actors in the engine after a change: those that cannot be deferred, and all if they are rendered."""
+        """Create in the engine all actors that cannot be deferred; if actors are rendered, create all actors."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
         none_deferred = any(actor.is_pushable for actor in actors)

@@ -169,7 +169,7 @@ class OmnidirectionalDrive:
 class MecanumDrive(OmnidirectionalDrive):
     """Drive with four mecanum wheels that never slip.
 
-    The firmware computes with the wheel dimensions of the drive's specification, which can differ from those in a URDF.
+    The firmware uses the wheel dimensions in the drive's specification. The real wheels of a URDF can differ.
     """
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:

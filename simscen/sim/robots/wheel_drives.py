@@ -98,7 +98,7 @@ class DifferentialDrive:
         self._set_wheels()
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the mean angle in rad of the left wheels, and that of the right wheels."""
+        """Return two mean angles in rad: of the left wheels, and of the right wheels."""
         return mean_angles(self._client, self._vehicle.id, self._joints, len(self._left))
 
     def _set_wheels(self) -> None:
@@ -140,7 +140,7 @@ def hold_wheels(client: int, robot: int, joints: Sequence[int], torques: Sequenc
 
 
 def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int) -> tuple[float, float]:
-    """Return the mean angle in rad of the first `left_count` joints, and that of the remaining joints."""
+    """Return two mean angles in rad: of the first `left_count` joints, and of the remaining joints."""
     states = pybullet.getJointStates(robot, joints, client)
     if len(states) == 2:
         return states[0][0], states[1][0]
@@ -149,7 +149,7 @@ def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int)
 
 
 STEERING_RATE_RAD_S = 3.2
-"""Largest steering rate, that of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
+"""Largest steering rate; the value is from F1TENTH cars (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
 MIN_STEERING_SPEED_M_S = 0.01
 """Commanded speed below which the steering angle does not change."""
 
@@ -209,7 +209,7 @@ class AckermannDrive:
         self._set_wheels()
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the angle in rad of the left rear wheel, and that of the right rear wheel."""
+        """Return two angles in rad: of the left rear wheel, and of the right rear wheel."""
         return mean_angles(self._client, self._robot, self._left + self._right, len(self._left))
 
     def _set_steering(self) -> None:

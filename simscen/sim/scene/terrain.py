@@ -95,7 +95,7 @@ class Terrain:
 def is_ground_contact(
     ground: Mapping[int, str | None], min_normal_z: Mapping[int, float], other: int, link: int, normal_z: float
 ) -> bool:
-    """Return whether a contact is that of a wheel or caster with the ground, rather than a collision.
+    """Return whether a contact is between a wheel or caster and the ground, and not a collision.
 
     The contact is between the robot's `link` and the body with the id `other`; `normal_z` is the z of the unit normal
     towards the robot. `ground` has the bodies of the terrain by id. `min_normal_z` has the smallest `normal_z` of a

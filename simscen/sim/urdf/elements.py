@@ -43,7 +43,7 @@ class JointLimits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint. `pose` is that of the child frame in the parent frame, `axis` a unit vector in the child frame."""
+    """A joint: `pose` of the child frame in the parent frame, and unit vector `axis` in the child frame."""
 
     name: str
     type: str
