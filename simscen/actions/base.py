@@ -88,7 +88,9 @@ class AnyAction(Choice):
     def _perform_chosen(self, stage: Stage) -> Effect:
         action = self.chosen
         assert isinstance(action, Action)
-        return action.perform(stage) if self.original_class is None else perform_checked(action, stage, self.added_by)
+        if self.original_class is None:
+            return action.perform(stage)
+        return perform_checked(action, stage, self.plugin_suffix)
 
 
 def is_same_pose(first: Pose2, second: Pose2) -> bool:

@@ -14,7 +14,7 @@ from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.messages.navigation import Path
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.moving_objects import Motion, Shaped
+from simscen.spec.moving_objects import Motion, ShapedObject
 from simscen.spec.places import DoorName, MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration, Ratio
 
@@ -24,7 +24,7 @@ TRAVEL_TOLERANCE = 1e-6
 """Fraction of its full travel within which a door has reached its target."""
 
 
-class Spawn(Shaped, Action):
+class Spawn(ShapedObject, Action):
     """Add an object to the world: at a pose, relative to the robot, or on its current plan.
 
     The robot can push an object that has a `mass`; other objects are only moved by the scenario.

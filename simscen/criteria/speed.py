@@ -126,7 +126,7 @@ class Speed(Spec, Criterion):
         inside = self._inside(trace, case, signal)
         if inside is None:
             return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
-        limits = mask.over(case.masks[mask.file].grid)
+        limits = mask.speed_limits(case.masks[mask.file].grid)
         local_limits = limits.at_points(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
         highest = _highest_around(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)

@@ -92,7 +92,7 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
 
 def _error(entry: AnyCriterion, what: str) -> Finding:
     """Return the finding of a criterion that could not judge. It names the package of a plugin."""
-    return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgment")
+    return Finding(Status.ERROR, entry.kind, f"{what}{entry.plugin_suffix}", "a judgment")
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:

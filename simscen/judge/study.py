@@ -12,7 +12,7 @@ from simscen.core.records.study import ParameterEffect, RateRow, Study
 from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
 from simscen.judge.pass_rate_claims import anytime_limits, evaluate_claim, is_counted
 from simscen.model.acceptance import PassRate
-from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
+from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
 """Minimum number of runs for effects. With fewer, no rank correlation of several parameters is significant."""
@@ -150,7 +150,7 @@ def _labels(values: Sequence[Any]) -> list[str]:
 
 def _short(value: Any) -> str:
     """Return a number or quantity with three significant digits."""
-    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     return f"{value:.3g}" if match is None else f"{float(match[1]):.3g} {match[2]}"
 
 

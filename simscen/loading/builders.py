@@ -29,10 +29,10 @@ def load_world(loaded: LoadedScenario) -> World:
 
 
 def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
-    """Build a loaded world. Files that an SDF file refers to must lie in `root` or a folder of `world_path`.
+    """Build a world from its loaded files. All files must lie in `root` or in a folder of `world_path`.
 
-    With `lenient`, unsupported elements of an SDF file become notes of the world instead of errors. Raises InvalidInput
-    for an unusable map image or SDF file.
+    With `lenient`, unsupported elements of an SDF file become warnings (`notes` of the world). Raises InvalidInput for an
+    unusable map image or SDF file.
     """
     base: World | None = None
     if source.sdf is not None:
@@ -57,7 +57,7 @@ def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
 
 
 def read_mesh(path: Path) -> Mesh:
-    """Read a mesh that a URDF names. Raises ValueError, as the reader of URDFs expects, for an unusable file."""
+    """Read a mesh file of a URDF. Raises ValueError for an unusable file."""
     from simscen.worlds.sdf.meshes import read_mesh as read
 
     try:
@@ -67,10 +67,10 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """Return the specification and the body of a scenario's robot, with the payload and torque that the scenario sets.
+    """Return the specification and the body of the robot of a scenario, with its payload and motor torque.
 
-    The specification of a robot that is only a URDF is inferred. Raises InvalidInput for unusable files, and for a
-    payload that would tip the robot over.
+    The specification of a robot without a robot file is inferred from its URDF. Raises InvalidInput for unusable files,
+    and for a payload with which the robot falls over.
     """
     try:
         spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
@@ -80,7 +80,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    """Return the body with the payload and the motor torque of the scenario. Raises InvalidInput if it tips over."""
+    """Return the body with the payload and motor torque of the scenario. Raises InvalidInput if it falls over."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
@@ -98,7 +98,7 @@ def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBo
 
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
-    """Return the specification and the body of a robot. Files that it refers to must lie in `roots`.
+    """Return the specification and the body of a robot. Its meshes and other files must lie in the folders `roots`.
 
     Raises InvalidInput for unusable files.
     """
@@ -119,60 +119,59 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
 
 
 def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
-    """Return the problem that a robot file sets an argument that its xacro file does not declare."""
+    """Return the problem that a robot file sets an undeclared xacro argument. `declared` are the valid arguments."""
     assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
     message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
     hint = suggestion(argument, declared) or "it has no <xacro:arg>"
     return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
-KEEPOUT_KEYS: Keys = ("stack", "keepout_mask")
-SPEED_KEYS: Keys = ("stack", "speed_mask", "file")
-"""Keys of the paths of the stack's masks in a scenario."""
-
-MAX_BLOCKS = 100_000
-"""Largest number of rectangles of equal cells in a mask of a criterion, because every log contains the rectangles."""
-
-WithSourceLine = Callable[[Problem], Problem]
-"""Function that returns a problem with the text of its source line."""
+KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
+"""Keys in a scenario of the path of the stack's keepout mask."""
+SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
+"""Keys in a scenario of the path of the stack's speed mask."""
+MAX_RECTANGLES = 100_000
+"""Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all rectangles."""
+AddSourceLine = Callable[[Problem], Problem]
+"""Function that returns a copy of a problem with the text of its source line."""
 
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
-    """Load the filter masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
-    keepout = _stack_mask_grid(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
-    grid, spec = _stack_mask_grid(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
+    """Load the costmap filter masks of the stack. Raises InvalidInput at the line of an unusable mask."""
+    keepout = _stack_mask_grid(loaded, KEEPOUT_MASK_KEYS, loaded.keepout_mask)
+    grid, spec = _stack_mask_grid(loaded, SPEED_MASK_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
     if grid is None or spec is None:
         return FilterMasks(keepout)
-    return FilterMasks(keepout, spec.over(grid))
+    return FilterMasks(keepout, spec.speed_limits(grid))
 
 
 def load_criterion_masks(
-    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: WithSourceLine
+    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSourceLine
 ) -> dict[str, MaskBlocks]:
-    """Load the filter masks of criteria, by path as written; the criteria in `tree` name them.
+    """Load the filter masks of criteria, by their paths as written in the scenario.
 
-    Raises InvalidInput at the line that names an unusable mask.
+    `tree` is the YAML tree of the scenario. Raises InvalidInput at the line of an unusable mask.
     """
     return {name: _criterion_mask_blocks(mask, tree, with_source_line) for name, mask in masks.items()}
 
 
-def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: WithSourceLine) -> MaskBlocks:
-    """Return a mask divided into rectangles of equal cells."""
-    cells = mask_blocks(_mask_grid(mask.map, mask.keys, tree, with_source_line))
-    if len(cells.blocks) > MAX_BLOCKS:
-        message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
-        hint = f"criteria judge by masks of {MAX_BLOCKS} at most; is it a photograph, or a map with noise?"
+def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: AddSourceLine) -> MaskBlocks:
+    """Return a mask divided into rectangles of equal cells. Raises InvalidInput if there are too many."""
+    mask_rectangles = mask_blocks(_mask_grid(mask.map, mask.keys, tree, with_source_line))
+    if len(mask_rectangles.blocks) > MAX_RECTANGLES:
+        message = f"mask image {mask.map.image.name} falls into {len(mask_rectangles.blocks)} rectangles of equal cells"
+        hint = f"criteria judge by masks of {MAX_RECTANGLES} at most; is it a photograph, or a map with noise?"
         raise InvalidInput([with_source_line(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
-    return cells
+    return mask_rectangles
 
 
 def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
-    """Return the grid of a mask of the stack; None if the stack has none."""
+    """Return the grid of the stack's mask at `keys` of the scenario; None if `source` is None."""
     return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 
-def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: WithSourceLine) -> OccupancyGrid:
-    """Return the grid of the mask that the scenario names at `keys`. Raises InvalidInput at this position."""
+def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: AddSourceLine) -> OccupancyGrid:
+    """Return the grid of the mask at `keys` of the scenario. Raises InvalidInput at this position."""
     try:
         return load_map(source)
     except InvalidInput as error:

@@ -1,7 +1,7 @@
-"""Error codes of problems in input files (SC…), and their meanings. A code never changes its meaning."""
+"""Error codes of problems in input files (SC…), and their meanings."""
 
 STACK_CANNOT = "SC062"
-"""Code of problems of a scenario with the selected stack: with another stack, the scenario may be valid."""
+"""Code of problems that concern only the selected stack. With another stack, the scenario may be valid."""
 
 CODES = {
     "SC001": "The file cannot be read: it is missing, not a regular file, too large, or not permitted.",
@@ -83,4 +83,4 @@ CODES = {
     "SC811": "The scenarios of two output folders to compare differ, or they have none in common.",
     "SC812": "The output folders to merge are not compatible.",
 }
-"""Code → meaning, as `simscen explain` shows it."""
+"""Meanings by code. A code never changes its meaning."""

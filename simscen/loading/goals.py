@@ -1,4 +1,4 @@
-"""Goals of a scenario: those that it lists, with their tolerances, and those that its events send."""
+"""Goals of a scenario: goals listed under `goals`, and goals that events send during the run."""
 
 import math
 from collections.abc import Callable
@@ -13,9 +13,10 @@ from simscen.model.stack_base import StackBase
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
-    """Return the goals that the scenario lists, in order, repeated for each loop.
+    """Return the goals listed under `goals`, repeated for each loop of the navigation.
 
-    The names of goals in further loops end in `#2`, `#3`, … Missing tolerances are those of the goal checker.
+    The names in the second loop end in `#2`, in the third in `#3`, and so on. Missing tolerances are those of the goal
+    checker.
     """
     goals = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
     if spec.navigation.mode == "navigate_through_poses":
@@ -32,9 +33,9 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the name of the expected failure of each of `goals` that is expected to fail, by name of the goal.
+    """Return the names of expected failures by goal name; goals without an expected failure are left out.
 
-    With navigate_through_poses, all goals fail or none: the expectation of the last goal applies to all.
+    `goals` are those of `scenario_goals`. With navigate_through_poses, the expectation of the last goal applies to all.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
@@ -46,14 +47,14 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 
 def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
-    """Return a goal that navigate_through_poses passes without stopping: within `radius` m, at any heading."""
+    """Return the via pose of a goal, which the robot passes within `radius` m, or its own tolerance, at any heading."""
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
 def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
-    """Return the goals that events send, by the keys of their actions in the scenario file.
+    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
 
-    `includes_robot` selects them by the robot that an action names (None: it names no robot).
+    `includes_robot` selects the actions by the name of their robot, which is None if an action names none.
     """
     checker = spec.stack.goal_checker
     found: dict[Keys, Goal] = {}

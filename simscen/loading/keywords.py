@@ -1,4 +1,4 @@
-"""Select scenarios by keyword and tag, as pytest's -k and -m do."""
+"""Selection of scenarios by keyword expression, as with pytest's -k, and by tag."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -10,10 +10,10 @@ from simscen.model.scenario import ScenarioSpec
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 MAX_DEPTH = 50
-"""Largest depth of nested `not` and parentheses."""
+"""Largest nesting depth of `not` and parentheses."""
 
 Matcher = Callable[[str], bool]
-"""Function that returns whether a title matches an expression."""
+"""Function that returns whether the title of a scenario matches an expression."""
 
 
 class Selectable(Protocol):
@@ -21,12 +21,12 @@ class Selectable(Protocol):
 
     @property
     def title(self) -> str:
-        """The id (path without suffix) with the name of the variation: `aisle[speed=0.5]`."""
+        """The path without suffix, with the name of the variation: `aisle[speed=0.5]`."""
         ...
 
     @property
     def spec(self) -> ScenarioSpec:
-        """The scenario, with its tags."""
+        """The specification of the scenario, which contains its tags."""
         ...
 
 
@@ -34,10 +34,11 @@ Item = TypeVar("Item", bound=Selectable)
 
 
 def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = ()) -> list[Item]:
-    """Return the scenarios whose title matches `keyword` and that have at least one of `tags`, in order.
+    """Return the scenarios whose title matches `keyword` and that have at least one of `tags`.
 
-    `keyword` is an expression like pytest's -k: parts of titles, ignoring case, and `and`, `or`, `not`, parentheses.
-    Raises UsageError for an invalid expression, and NothingSelected if nothing matches.
+    `keyword` is an expression of parts of titles, `and`, `or`, `not`, and parentheses; "" matches all titles. Case is
+    ignored. Empty `tags` select all scenarios. Raises UsageError for an invalid expression, and NothingSelected if
+    nothing matches.
     """
     candidates = list(scenarios)
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
@@ -57,13 +58,16 @@ def keyword_matcher(expression: str) -> Matcher:
 
 
 class _Parser:
-    """Recursive descent parser of expressions. `or` binds weakest, then `and`, then `not`. `tokens` are the rest."""
+    """Recursive descent parser of keyword expressions. `not` binds tightest, then `and`, then `or`.
+
+    `tokens` are the tokens that are not parsed yet.
+    """
 
     def __init__(self, tokens: list[str], expression: str) -> None:
         self.tokens, self._expression = tokens, expression
 
     def parse_or(self, depth: int) -> Matcher:
-        """Parse terms joined by `or`."""
+        """Parse parts joined by `or`, inside `depth` levels of nesting."""
         options = [self._parse_and(depth)]
         while self._take("or"):
             options.append(self._parse_and(depth))
@@ -92,7 +96,7 @@ class _Parser:
         return lambda text: word in text.casefold()
 
     def _take(self, token: str) -> bool:
-        """Remove the next token and return True if it is `token`; else return False."""
+        """Remove the next token if it is `token`, and return whether it was."""
         if self.tokens and self.tokens[0] == token:
             self.tokens.pop(0)
             return True

@@ -1,4 +1,4 @@
-"""List the names that a scenario can refer to: of places, regions, objects, goals, events, faults, and verdicts."""
+"""Names that a scenario can refer to: of places, regions, objects, goals, events, faults, and verdicts."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
 
-NOUNS = {
+KIND_DESCRIPTIONS = {
     "place": "place of the world",
     "region": "region of the world",
     "door": "door of the world",
@@ -20,18 +20,18 @@ NOUNS = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Kind of reference → words for what it refers to, in messages.
-
-A "movable" thing can be moved by actions. A "mover" is a movable thing or another robot, and can be followed.
-"""
+"""Text for messages by kind of reference. Actions can move a "movable"; a "mover" is a movable or another robot."""
 
 Names = Mapping[str, list[str] | None]
-"""Valid names by kind of reference. None: not known, because the scenario has an imported world that is not built yet,
-or because a scenario of several robots has verdicts of all of them."""
+"""Valid names by kind of reference; None for a kind whose names are not known.
+
+Names in a world from SDF or a map are not known before it is built. Names of verdicts are not known for one robot of
+several.
+"""
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """Return all names that a scenario can refer to. For names in an imported world, the built `world` is needed."""
+    """Return all names that a scenario can refer to. `world` is its built world; None if it is not built yet."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
     disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
@@ -46,12 +46,12 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
 
 
 def goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the goals that the scenario lists, then of those that its events send."""
-    return listed_goal_names(loaded) + _defined(loaded, "new_goal")
+    """Return the names of the goals under `goals`, then of the goals that events send."""
+    return listed_goal_names(loaded) + _names_in_actions(loaded, "new_goal")
 
 
 def listed_goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the goals under `goals` in every loop: as written, or after their place, or goal-1, …"""
+    """Return the names of the goals under `goals`, repeated for each loop of the navigation."""
     loops = range(1, loaded.spec.navigation.loops + 1)
     return [loop_goal_name(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
@@ -62,12 +62,12 @@ def event_names(loaded: LoadedScenario) -> list[str]:
 
 
 def mark_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the marks that events set, in order."""
-    return _distinct(_defined(loaded, "mark"))
+    """Return the names of the marks (named moments of the run) that events set."""
+    return _distinct(_names_in_actions(loaded, "mark"))
 
 
 def _names_in_files(loaded: LoadedScenario) -> Names:
-    """Return the names of things of the world as far as the files contain them."""
+    """Return the names of things in the world file."""
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -83,7 +83,7 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
-    """Return the names of things of the built world."""
+    """Return the names of things in the built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -95,7 +95,7 @@ def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
 
 
 def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
-    """Return the names of all objects in the built world; without it, of those in the world file."""
+    """Return the names of all objects of the world; without the built `world`, only of objects in the world file."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
     return _object_names(loaded.world.spec) if loaded.world.spec is not None else []
@@ -103,7 +103,7 @@ def world_object_names(loaded: LoadedScenario, world: World | None = None) -> li
 
 def spawned_names(loaded: LoadedScenario) -> list[str]:
     """Return the names of the objects and pedestrians that events add to the world."""
-    return _defined(loaded, "spawn") + pedestrian_names(loaded)
+    return _names_in_actions(loaded, "spawn") + pedestrian_names(loaded)
 
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
@@ -114,21 +114,23 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
         for action in step.actions
         if action.kind == "crowd" and hasattr(action.chosen, "names")
     ]
-    return _defined(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
+    return _names_in_actions(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
 
 
-def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
-    """Return the names of what actions of one kind add, without goals of other robots."""
+def _names_in_actions(loaded: LoadedScenario, kind: str) -> list[str]:
+    """Return the values of `name` in all actions of one kind, such as "spawn", without goals of other robots."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
     relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
 
 
 def _movable_names(world: WorldSpec) -> list[str]:
+    """Return the names of the objects and doors of a world file."""
     return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
 
 
 def _object_names(world: WorldSpec) -> list[str]:
+    """Return the names of all solid things of a world file, including its walls."""
     return [
         *_movable_names(world),
         *(obstacle.name for obstacle in world.obstacles),

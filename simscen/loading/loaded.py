@@ -1,4 +1,4 @@
-"""Loaded scenarios, worlds, robots, and maps: validated specifications, and the files from which they were loaded."""
+"""Loaded scenarios, worlds, robots, and maps: validated specifications, and their files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,7 +18,7 @@ from simscen.model.world import RosMapSpec, WorldSpec
 
 @dataclass(frozen=True)
 class LoadedMap:
-    """ROS map: `path` of its YAML file, `image` file, and `notes`, which are warnings about keys without effect."""
+    """ROS map: its YAML file `path`, its `image` file, and warnings about keys without effect (`notes`)."""
 
     path: Path
     spec: RosMapSpec
@@ -27,7 +27,7 @@ class LoadedMap:
 
 
 class CriterionMask(NamedTuple):
-    """Filter mask of a criterion: the keys where the first criterion that uses it names the mask, and its map."""
+    """Filter mask of a criterion. `keys` are those of its first use in the scenario."""
 
     keys: Keys
     map: LoadedMap
@@ -35,134 +35,136 @@ class CriterionMask(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadedWorld:
-    """World from a file of simscen (`spec`, which may extend a `map` or an `sdf`), from a ROS map, or from an SDF file.
-
-    `path` is the file of the world; for an inline world, the file of the scenario. `tree` belongs to `spec`.
-    """
+    """World from a `*.world.yaml`, which may add to a ROS map or SDF file; or from a ROS map or SDF file alone."""
 
     name: str
     path: Path
+    """File of the world; for an inline world, the file of the scenario."""
     spec: WorldSpec | None = None
+    """Specification; None for a ROS map or SDF file alone."""
     map: LoadedMap | None = None
     sdf: Path | None = None
     tree: MappingNode | None = field(default=None, repr=False, compare=False)
+    """YAML tree of `spec`."""
 
 
 @dataclass(frozen=True)
 class LoadedRobot:
-    """Robot from the file `path`: a `*.robot.yaml` with a `spec`, which may name a `urdf`; or a URDF without a `spec`.
-
-    `bundled` robots ship with simscen. `tree` belongs to `spec`. `packages` are the folders of the ROS packages that
-    the robot file names, by name of the package.
-    """
+    """Robot from a `*.robot.yaml`, or from a URDF alone."""
 
     name: str
     path: Path
     spec: RobotSpec | None = None
+    """Specification; None for a URDF alone."""
     urdf: Path | None = None
+    """URDF or xacro file that the `*.robot.yaml` names."""
     bundled: bool = False
+    """Whether the robot ships with simscen."""
     tree: MappingNode | None = field(repr=False, default=None)
+    """YAML tree of `spec`."""
     packages: Mapping[str, Path] = field(default_factory=dict)
+    """Folders of ROS packages by name, as the `*.robot.yaml` lists them."""
 
 
 @dataclass(frozen=True)
 class LoadedScenario:
-    """Valid scenario, or valid variation of a scenario. It has been checked as far as possible without its built world.
+    """Valid scenario, or valid variation of a scenario. All checks that do not need its built world have passed.
 
-    For several robots, `robots` has a view for each robot: a scenario of this robot alone. The other fields of a
-    scenario of several robots are those of the view of its first robot, except `spec`, `tree` and `notes`.
+    A scenario of several robots has a view of each robot: a scenario with this robot alone. `spec`, `tree`, and `notes`
+    are those of all robots, all other fields those of the first view.
     """
 
     id: str
     """Path relative to the root, without suffix."""
     path: str
-    """Path relative to the root, as problems name the file."""
+    """Path relative to the root, as in messages."""
     file: Path
     """Absolute path."""
     root: Path
+    """Folder that all files of the scenario must lie in."""
     world_path: tuple[Path, ...]
     """Folders of `--world-path`, in which worlds are searched."""
     text: str
     """Content of the file."""
     spec: ScenarioSpec
-    """Specification, with poses instead of names of places."""
+    """Specification, with poses instead of place names."""
     world: LoadedWorld
     map: LoadedMap | Literal["none"] | None
-    """Map that the robot gets: a ROS map, "none" for driving without a map, or None for the map of the world."""
+    """ROS map that the robot uses; "none" for no map, None for the map of the world."""
     robot: LoadedRobot
     tree: MappingNode = field(repr=False)
-    """Tree of the scenario: all files merged, the variation and the selected stack applied, places still as names."""
+    """YAML tree of the scenario: all files merged, with the values of the variation and the selected stack."""
     sources: Mapping[str, str] = field(repr=False, default_factory=dict)
-    """Texts of all YAML files of the scenario, by their names in problems."""
+    """Texts of all YAML files of the scenario, by path as in messages."""
     files: Mapping[str, Path] = field(default_factory=dict)
-    """Absolute paths of these files, by their names in problems."""
+    """Absolute paths of the same files, by path as in messages."""
     read_files: tuple[Path, ...] = ()
     """Other files that were read to build the world and the robot, such as meshes."""
     notes: tuple[Problem, ...] = ()
     """Warnings."""
     lenient: bool = False
-    """Whether unusable parts of an SDF world are skipped with a note, instead of being errors."""
+    """Whether unusable parts of an SDF world are skipped with a warning, instead of being errors."""
     keepout_mask: LoadedMap | None = None
     """Keepout mask of the stack."""
     speed_mask: LoadedMap | None = None
     """Speed mask of the stack."""
     criterion_masks: Mapping[str, CriterionMask] = field(default_factory=dict)
-    """Filter masks of criteria, by path as written."""
+    """Filter masks of criteria, by path as written in the scenario."""
     choice: StackChoice | None = None
     """Stack selected on the command line; None for the stack of the scenario."""
     several_stacks: bool = False
-    """Whether the session runs the scenario with several stacks, so that the keys of runs contain the stack."""
+    """Whether the session runs the scenario with several stacks."""
     external_command: ExternalCommand | None = None
-    """Command that starts the external stack of the scenario; None if it has none, or if it is not defined (yet)."""
+    """Command that starts the external stack; None for another stack, or if no command is defined."""
     variation: str = ""
     """Name of the variation; "" for a file without variations."""
     varied_values: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    """Values of the variation, by path."""
+    """Values of the variation, by dotted path."""
     set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
-    """Path that set a varied value, by the position of the value."""
+    """Dotted path of each value of the variation, by the position of the value."""
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
-    """Views of the robots by name; empty for a scenario of one robot."""
+    """Views by name of the robot; {} for a scenario of one robot."""
     robot_name: str = ""
-    """In a view, the name of its robot."""
+    """In a view, the name of its robot; otherwise ""."""
     other_robots: tuple[str, ...] = ()
-    """In a view, the names of the other robots."""
+    """In a view, the names of the other robots; otherwise ()."""
 
     @property
     def robot_views(self) -> Mapping[str, "LoadedScenario"]:
-        """The views of all robots by name; for a scenario of one robot, the scenario itself under the name ""."""
+        """The views by name of the robot; for a scenario of one robot, the scenario itself under `robot_name`."""
         return self.robots or {self.robot_name: self}
 
     def with_changes(self, **changes: Any) -> "LoadedScenario":
-        """Return the scenario with these fields changed, in it and in the views of its robots."""
+        """Return a copy of the scenario with these fields changed, also in its views."""
         robots = {name: view.with_changes(**changes) for name, view in self.robots.items()}
         return replace(self, **changes, robots=robots)
 
-    def skipped(self, choice: StackChoice, reason: str) -> "LoadedScenario":
-        """Return the scenario with the stack `choice`, marked as skipped for this reason."""
+    def as_skipped(self, choice: StackChoice, reason: str) -> "LoadedScenario":
+        """Return a copy of the scenario with the stack `choice`, marked as skipped for this reason."""
         return replace(self, choice=choice, spec=self.spec.model_copy(update={"skip": reason}))
 
     def includes_robot(self, robot: str | None) -> bool:
-        """Return whether a part of the scenario that names `robot` applies to this view. None: it names no robot."""
+        """Return whether a part of the scenario that names `robot` applies to this view. None stands for all robots."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
     def title(self) -> str:
-        """The id with the name of the variation."""
+        """The id with the name of the variation, e.g. `aisle[speed=0.5]`."""
         return scenario_title(self.id, self.variation)
 
     @property
     def stack_name(self) -> str:
-        """Name of the stack in the keys of runs; "" unless the session has several stacks."""
+        """Name of the stack in run keys; "" unless the session runs the scenario with several stacks."""
         return self.choice.name if self.choice is not None and self.several_stacks else ""
 
     @property
     def stack(self) -> str:
-        """NAME=VALUE of the selected stack, with a stack file relative to the root; "" for the scenario's own stack."""
+        """The value of `--stack`, with file paths relative to the root; "" for the stack of the scenario."""
         return "" if self.choice is None else self.choice.relative_to_folder(self.root)
 
     @property
     def expectation(self) -> ExpectedFailure | None:
-        """The failure that the scenario expects; its line is 0 if `expected` is in a file that the scenario extends."""
+        """The failure that the scenario expects, or None. Its line is 0 if `expected` is in an extended file."""
         expected = self.spec.expected
         if expected is None:
             return None
@@ -180,18 +182,18 @@ class LoadedScenario:
         return value_position(self.tree, keys)
 
     def key_position_of(self, *keys: Key) -> Position:
-        """Return the position of the last of `keys` itself."""
+        """Return the position of the last key of `keys`, before its value."""
         return key_position(self.tree, keys)
 
     def problem(self, keys: Keys, code: str, message: str, hint: str = "") -> Problem:
-        """Return an error at the value of `keys`, with the text of its line."""
+        """Return an error at the position of the value at `keys`, with the text of its line."""
         return self.problem_at(self.position_of(*keys), code, message, hint)
 
     def problem_at(self, position: Position, code: str, message: str, hint: str = "") -> Problem:
-        """Return an error at a position in any of the files, with the text of its line."""
+        """Return an error at a position in any file of the scenario, with the text of its line."""
         return self.with_source_line(Problem(*position, code=code, message=message, hint=hint))
 
     def with_source_line(self, problem: Problem) -> Problem:
-        """Return a problem in any of the files with the text of its line."""
+        """Return a copy of a problem with the text of its line in any file of the scenario."""
         lines = self.sources.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem

@@ -1,4 +1,4 @@
-"""Handle `robots:`: split a scenario of several robots into one scenario per robot, and report missing keys."""
+"""Scenarios with `robots`: split the YAML tree into one scenario per robot, and report missing keys."""
 
 from collections.abc import Iterator
 
@@ -15,10 +15,9 @@ ROBOT_KEYS = ("goals", "faults")
 
 
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
-    """Return the tree of a scenario for each robot alone, by name and sorted; empty for a scenario of one robot.
+    """Return a scenario tree for each robot alone, sorted by name of the robot; {} without `robots`.
 
-    All nodes keep their positions in the file. The key `expected` is left out, because it applies to all robots
-    together.
+    Nodes keep their positions in the file. The trees have no key `expected`, because it applies to all robots together.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
@@ -26,7 +25,7 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
-    """Return whether a scenario has a key `robots` with a mapping of mappings."""
+    """Return whether `robots` of a scenario is a mapping of mappings, as it must be."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
         isinstance(entry.value, MappingNode) for entry in robots.entries.values()
@@ -34,9 +33,9 @@ def has_multiple_robots(tree: MappingNode) -> bool:
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
-    """Return the tree of a scenario for one robot, whose entry under `robots` is `entry`.
+    """Return the scenario tree for one robot; `entry` is its entry under `robots`.
 
-    Its keys have priority over those at top level. Its criteria are added to those at top level.
+    The keys of the robot override keys at top level, but its criteria are added to the criteria at top level.
     """
     own_tree, position = entry.value, entry.value.position
     assert isinstance(own_tree, MappingNode)
@@ -51,10 +50,9 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
 
 
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario with the selected stack instead of its own stack, or instead of the stacks of all its robots.
+    """Return a scenario tree with the selected stack instead of the stacks of all robots.
 
-    If the choice is the command of an external stack that a robot of the scenario names, the tree is returned
-    unchanged, because the command is for this robot alone.
+    The tree is unchanged if `choice` is the command of an external stack that one of several robots already uses.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
@@ -78,10 +76,7 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
-    """Return the entry of a robot with the complete `stack` section of `robot_scenario`.
-
-    It must be complete, because the common `stack` section at top level is removed.
-    """
+    """Return the mapping of a robot under `robots` with the `stack` of its single-robot tree `robot_scenario`."""
     assert isinstance(robot, MappingNode)
     return MappingNode(
         robot.position, robot.entries | {key: entry for key, entry in robot_scenario.entries.items() if key == STACK}
@@ -101,12 +96,12 @@ def _items(node: Node | None) -> tuple[Node, ...]:
 
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems with the keys of robots and with `pass` in a scenario that are missing or exclude each other."""
+    """Return problems of a scenario with missing or mutually exclusive keys `robot`, `robots`, and `pass`."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems with `robots` and `pass` in a file of criteria, as `scenario_robot_problems` for scenarios."""
+    """Return problems of a criteria file with missing or mutually exclusive keys `robots` and `pass`."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
 
 

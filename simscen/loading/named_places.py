@@ -1,4 +1,4 @@
-"""Replace the names of places in a specification by the poses of these places."""
+"""Replacement of place names in a specification by the poses of these places."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
@@ -16,28 +16,29 @@ Spec = TypeVar("Spec", bound=BaseModel)
 Places = Mapping[str, PoseSpec]
 """Poses of places by name."""
 PLACEHOLDER_POSE = PoseSpec(x=0.0, y=0.0)
-"""Pose that replaces the name of an unknown place, so that loading can go on. A problem is reported for the name."""
+"""Pose that replaces the name of an unknown place, for which a problem is reported."""
 NO_WORLD_HINT = "name its world with `world:`"
+"""Hint for a place name in a file without a world."""
 NO_PLACES_HINT = "the world has no places"
-"""Hints for names of places if there are no places."""
+"""Hint for a place name in a world without places."""
 
 
 def places_of(world: LoadedWorld | None) -> Places:
-    """Return the places of a world; {} without a world. Only world files of simscen can define places."""
+    """Return the places of a world; {} without a world."""
     return world.spec.places if world is not None and world.spec is not None else {}
 
 
 def resolve_places(spec: Spec, places: Places) -> Spec:
-    """Return the specification with poses and points instead of the names of places."""
+    """Return a copy of a specification with poses and points instead of place names."""
     for reference, pose in _poses_of_references(spec, places):
         spec = _replace_at(spec, reference.keys, pose)
     return spec
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """Return `plain`, the YAML data of `spec`, with poses and points instead of the names of places in criteria.
+    """Return the YAML data of a scenario with poses and points instead of place names in its criteria.
 
-    Logs contain these data. They are judged without a world, so their criteria cannot refer to its places.
+    `plain` are these data, `spec` is their specification.
     """
     for reference, pose in _poses_of_references(spec, places):
         if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
@@ -52,19 +53,22 @@ def place_references(spec: BaseModel) -> Iterator[Reference]:
 
 
 def unknown_places(
-    spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES_HINT
+    spec: BaseModel, tree: Node, known: Iterable[str], empty_hint: str = NO_PLACES_HINT
 ) -> Iterator[Problem]:
-    """Yield a problem for each name of a place that is not in `known`; `nothing` is the hint if there are no places."""
+    """Yield a problem for each place name in a specification that is not in `known`.
+
+    `tree` is the YAML tree of the specification. `empty_hint` is the hint if `known` is empty.
+    """
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:
-            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "keywords", ()))) or nothing
+            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "keywords", ()))) or empty_hint
             message = f"no place of the world is called {quoted(reference.name)}"
             yield Problem(*value_position(tree, reference.keys), code="SC030", message=message, hint=hint)
 
 
 def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
-    """Yield each reference to a place, and the pose or point that replaces it."""
+    """Yield the references to places, with the pose or point that replaces each of them."""
     for reference in place_references(spec):
         assert isinstance(reference.mark, PlaceAllowed)
         yield (
@@ -74,7 +78,7 @@ def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Refe
 
 
 def _replace_at(holder: Any, keys: Keys, value: Any) -> Any:
-    """Return a copy of `holder`, a model, list, or dict, with `value` at `keys`."""
+    """Return a copy of `holder` (a model, list, or dict) with `value` at `keys`."""
     if isinstance(holder, RootModel):
         return holder.model_copy(update={"root": _replace_at(holder.root, keys, value)})
     if not keys:

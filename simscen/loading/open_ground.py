@@ -1,4 +1,4 @@
-"""Extend the bounds of a world with open ground, so that its map covers the starts and goals of all robots."""
+"""Bounds of worlds with open ground, extended to the starts and goals of all robots."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,9 +13,10 @@ from simscen.loading.world_cache import Bounds
 
 
 def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
-    """Return a world with open ground with bounds that contain the stops of all robots; another world unchanged.
+    """Return a world with open ground with its bounds extended to the stops of all robots.
 
-    Stops are start poses, goals that are not expected to fail, and poses to which events kidnap a robot.
+    Stops are start poses, goals without an expected failure, and poses to which events kidnap a robot. A world without
+    open ground, or with a map, is returned unchanged.
     """
     if not world.has_open_ground or world.grid is not None or loaded.map is not None:
         return world
@@ -26,7 +27,7 @@ def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
 
 
 def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
-    """Yield the stops of the robot of a scenario."""
+    """Yield the stops of a scenario of one robot."""
     spec = loaded.spec
     yield spec.only_robot.pose.pose
     for goal in (*scenario_goals(spec), *event_goals(spec, loaded.includes_robot).values()):
@@ -38,7 +39,7 @@ def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
 
 
 def extend_bounds(bounds: Bounds, poses: list[Pose2]) -> Bounds:
-    """Return the bounds, enlarged to contain the poses."""
+    """Return the smallest bounds that contain `bounds` and the poses."""
     left, bottom, right, top = bounds
     xs, ys = [pose.x for pose in poses], [pose.y for pose in poses]
     return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

@@ -1,6 +1,6 @@
-"""Find which plugins of installed packages a scenario uses, and check that the plugins of a log are installed.
+"""Plugins that a scenario uses, and plugins of a log that are not installed.
 
-An Entry is one plugin, i.e. an entry point of an installed package.
+A plugin is a type, such as a criterion, that an installed package adds; an Entry describes it.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -14,41 +14,41 @@ from simscen.spec.choice import Choice
 from simscen.spec.registry import Entry, entries_of, find
 
 _HEADER_PREFIX = "plugin."
-"""Beginning of the keys of plugins in the header of a log."""
+"""Beginning of the header keys of plugins in a log."""
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
-    """Return the plugins that a scenario and its robots use, sorted."""
-    return used_by(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
+    """Return the plugins that a scenario and its robots use, sorted by group and name."""
+    return _plugins_of_specs(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
-    """Return the plugins that at least one of the scenarios uses, sorted."""
+    """Return the plugins that at least one of the scenarios uses, sorted by group and name."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
 
 
-def used_by(*specs: Any) -> tuple[Entry, ...]:
-    """Return the plugins that specifications use, sorted."""
-    found = {entry for spec in specs for keys, part in walk(spec) for entry in _used(keys, part)}
+def _plugins_of_specs(*specs: Any) -> tuple[Entry, ...]:
+    """Return the plugins that the specifications use, sorted by group and name."""
+    found = {entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)}
     return _sorted(found)
 
 
 def log_header_key(entry: Entry) -> str:
-    """Return the key under which the header of a log records the version of a plugin: `plugin.criterion.dwell`."""
+    """Return the header key of a plugin in a log, e.g. `plugin.criterion.dwell`. Its value is the requirement."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: Entry) -> str:
-    """Return the requirement by which pip installs the package of a plugin in its version: `package==version`."""
+    """Return the pip requirement of the package of a plugin: `package==version`."""
     return f"{entry.distribution}=={entry.version}"
 
 
 def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[Problem]:
-    """Return a problem for each plugin that a log used, but that is not installed in the same version.
+    """Return a problem for each plugin of a log that is not installed in the same version.
 
-    `header` is the header of the log. Only plugins of these `groups`, e.g. "criterion", are checked. The problems have
-    no path; the caller adds it.
+    `header` are the header entries of the log. Only plugins of `groups`, e.g. "criterion", are checked. The path of the
+    problems is "".
     """
     missing: list[Problem] = []
     for key, recorded in sorted(header.items()):
@@ -69,8 +69,8 @@ def _sorted(entries: Iterable[Entry]) -> tuple[Entry, ...]:
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 
-def _used(keys: Keys, part: Any) -> Iterator[Entry]:
-    """Yield the plugin that defines a part of a specification, if one does; `keys` are those of the part."""
+def _plugins_of_part(keys: Keys, part: Any) -> Iterator[Entry]:
+    """Yield the plugin that defines the part of a specification at `keys`; nothing if simscen defines it."""
     if isinstance(part, Choice):
         entry = find(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

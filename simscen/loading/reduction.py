@@ -1,6 +1,6 @@
-"""Make a scenario smaller and simpler: find and remove parts, find and round numbers, and list the differences.
+"""Reduction of a scenario for `simscen shrink`: remove parts, round numbers, and list the differences.
 
-A part is a value in the tree of a scenario, given by its keys. `simscen shrink` runs the changed scenarios.
+A part is a value in the YAML tree of a scenario, given by its keys.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -19,14 +19,14 @@ from simscen.loading.yaml.tree import (
     nodes_with_keys,
     replace_at,
 )
-from simscen.spec.quantities import NUMBER_AND_UNIT
+from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN
 
 REQUIRED_KEYS = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
-"""Top-level keys that are never left out as a whole."""
+"""Top-level keys that are never removed."""
 FIXED_KEYS = frozenset({"simscen", "seed", "pass", "time_limit"})
-"""Top-level keys whose values are not changed at all: they define the failure and the length of the run."""
+"""Top-level keys whose values are never changed. They define the failure and the length of the run."""
 FIXED_WORLD_PARTS = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
-"""Parts of an inline world that are never changed: without them, the same criterion would fail for another reason."""
+"""Parts of an inline world that are never changed. A criterion would fail for another reason without them."""
 UNNEEDED_KEYS = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
 """Top-level keys that do not affect a run."""
 MAX_DIGITS = 3
@@ -34,14 +34,14 @@ MAX_DIGITS = 3
 
 
 class Rounding(NamedTuple):
-    """The keys of a number in a scenario, and its rounded value; a quantity with a unit is text."""
+    """Keys of a number in a scenario, and its rounded value. A quantity with a unit is text."""
 
     keys: Keys
     value: str | float | int
 
 
 def removable_parts(tree: MappingNode, depth: int) -> list[Keys]:
-    """Return the keys of the parts at `depth` (1: top level) that can be left out, in the order of the file."""
+    """Return the keys of the removable parts at `depth`, in the order of the file. Depth 1 is the top level."""
     return [
         keys
         for keys, _ in nodes_with_keys(tree)
@@ -58,13 +58,13 @@ def max_depth(tree: MappingNode) -> int:
 
 
 def without_parts(tree: MappingNode, parts: Collection[Keys]) -> MappingNode:
-    """Return the scenario without these parts. Mappings and lists that become empty are left out as well."""
+    """Return the scenario without these parts. Mappings and lists that become empty are removed as well."""
     remaining = _remove_parts(tree, frozenset(parts), ())
     return remaining if isinstance(remaining, MappingNode) else replace(tree, entries={})
 
 
 def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> MappingNode:
-    """Return the scenario with these values at their keys. Parts with the value None are left out."""
+    """Return the scenario with these values at their keys. Parts with the value None are removed."""
     removed = [keys for keys, value in values.items() if value is None]
     changed = tree
     for keys, value in values.items():
@@ -75,8 +75,8 @@ def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> Mappin
     return without_parts(changed, removed) if removed else changed
 
 
-def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
-    """Return the changes that round all numbers with more than `digits` significant digits to that many."""
+def find_roundings(tree: MappingNode, digits: int) -> list[Rounding]:
+    """Return the roundings of all numbers that have more than `digits` significant digits."""
     found = []
     for keys, node in nodes_with_keys(tree):
         if isinstance(node, ScalarNode) and keys[0] not in FIXED_KEYS and keys[:2] not in FIXED_WORLD_PARTS:
@@ -86,22 +86,20 @@ def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
     return found
 
 
-def with_roundings(tree: MappingNode, changes: Sequence[Rounding]) -> MappingNode:
-    """Return the scenario with these changes."""
-    return with_values(
-        tree, {change.keys: ScalarNode(node_at(tree, change.keys).position, change.value) for change in changes}
-    )
+def with_roundings(tree: MappingNode, roundings: Sequence[Rounding]) -> MappingNode:
+    """Return the scenario with these rounded numbers."""
+    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).position, one.value) for one in roundings})
 
 
 def with_seed(tree: MappingNode, seed: int) -> MappingNode:
-    """Return the scenario with this seed, without the keys that do not apply to a single run that may fail."""
+    """Return the scenario with this seed, without `acceptance`, `expected`, and `variations`."""
     position = tree.entries["seed"].key if "seed" in tree.entries else tree.position
     rest = tree.without_keys("acceptance", "expected", "variations")
     return replace(rest, entries={**rest.entries, "seed": Entry(position, ScalarNode(position, seed))})
 
 
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
-    """Return the removed parts as text, e.g. `events[0] (blocker)`; the parts of a removed part are not listed."""
+    """Return the removed parts as text, e.g. `events[0] (blocker)`. Parts inside a removed part are not listed."""
     remaining = {node.position for _, node in nodes_with_keys(after)}
     found: list[Keys] = []
     for keys, node in nodes_with_keys(before):
@@ -124,7 +122,7 @@ def changed_values(before: MappingNode, after: MappingNode) -> list[str]:
 
 
 def _part_text(tree: MappingNode, keys: Keys) -> str:
-    """Return the keys of a part; for an item of a list, also its name, or else its first key."""
+    """Return the dotted path of a part. For a mapping in a list, add its name, or its first key if it has no name."""
     node, text = node_at(tree, keys), dotted_path(keys)
     if isinstance(node, MappingNode) and isinstance(keys[-1], int):
         named = [
@@ -138,7 +136,7 @@ def _part_text(tree: MappingNode, keys: Keys) -> str:
 
 
 def _remove_parts(node: Node, parts: frozenset[Keys], prefix: Keys) -> Node | None:
-    """Return the node without the parts; None if nothing is left of a mapping or list. `prefix` has its own keys."""
+    """Return a node without the parts; None for a mapping or list that becomes empty. `prefix` are the node's keys."""
     if isinstance(node, MappingNode):
         entries = {}
         for key, entry in node.entries.items():
@@ -159,13 +157,13 @@ def _remove_parts(node: Node, parts: frozenset[Keys], prefix: Keys) -> Node | No
 
 
 def _rounded(value: object, digits: int) -> str | float | int | None:
-    """Return a number or quantity with `digits` significant digits; None if that changes nothing."""
+    """Return a number or quantity rounded to `digits` significant digits; None if this does not change it."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):
         short = float(f"{value:.{digits}g}")
         return None if short == value else int(short) if isinstance(value, int) else short
-    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         return None
     number = float(match[1])

@@ -1,4 +1,4 @@
-"""Determine the size of a robot, and which solids of a world block it."""
+"""Size of a robot, and the solids of a world that block it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -12,12 +12,12 @@ from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
 from simscen.worlds.geometry.prisms import has_no_drivable_solids
 
 CIRCLE_CORNERS = 24
-"""Corners of the polygon that approximates a round footprint."""
+"""Number of corners of the polygon that approximates a round footprint."""
 
 
 @dataclass(frozen=True)
 class RobotSize:
-    """Size of a robot in m."""
+    """Size of a robot. All lengths are in m."""
 
     footprint: Polygon
     """Corners of the footprint in the base frame."""
@@ -26,21 +26,21 @@ class RobotSize:
     height: float
     """Height of the top of the hull above the floor."""
     underside: float | None = None
-    """Height of the lowest point of the hull of an omnidirectional or mecanum base, which stays at z = 0.
+    """Height of the lowest point of the hull above the floor, for an omnidirectional or mecanum base.
 
-    None for other bases, whose wheels climb low obstacles.
+    None for other bases, which can climb low obstacles.
     """
 
     @property
     def inscribed(self) -> float:
-        """Radius in m of the largest circle around the base frame's origin inside the footprint."""
+        """Radius of the largest circle inside the footprint, around the origin of the base frame."""
         return inscribed_radius(self.radius, self.footprint)
 
 
 def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """Return the radius in m of the largest circle around the origin inside a footprint.
+    """Return the radius in m of the largest circle around the origin that is inside a footprint.
 
-    `radius` is that of a round footprint, and None for a polygon.
+    `radius` is the radius of a round footprint; None for a polygon.
     """
     if radius is not None:
         return radius
@@ -49,12 +49,9 @@ def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
 
 
 def robot_size(loaded: LoadedScenario) -> RobotSize:
-    """Return the size of a scenario's robot. Raises InvalidInput for an unusable robot.
-
-    To build the robot is slow. That is avoided if its file has simple shapes as body, and a footprint or radius.
-    """
+    """Return the size of the robot of a scenario. Raises InvalidInput for an unusable robot."""
     spec = loaded.robot.spec
-    if (
+    if (  # building the body is slow, and not needed if the robot file states its shapes and its footprint or radius
         spec is not None
         and spec.body is not None
         and (spec.radius is not None or spec.footprint is not None)
@@ -81,7 +78,7 @@ def _circle(radius: float) -> Polygon:
 
 
 def _hull_heights(body: RobotBody) -> tuple[float, float]:
-    """Return the lowest and the highest z of the hull in m."""
+    """Return the lowest and the highest z of the hull in m, in the base frame."""
     from simscen.sim.body.outline import hull_points
 
     heights = [solid.pose.apply(hull_points(solid.shape))[:, 2] for solid in body.hull]
@@ -89,7 +86,7 @@ def _hull_heights(body: RobotBody) -> tuple[float, float]:
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
-    """Return the solids that block a robot: all except those that it can drive over or climb, such as ramps."""
+    """Return the solids that block a robot. Solids that it can drive over or climb, such as ramps, are left out."""
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if has_no_drivable_solids(solids, reach):
         return solids
@@ -100,12 +97,13 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
-    """Return the world with only the solids that block the scenario's robot. Raises InvalidInput for an unusable robot.
+    """Return the world with only the solids that block the robot of a scenario.
 
-    To build the robot is slow. That is avoided if the world has no solids that it could drive over.
+    Raises InvalidInput for an unusable robot.
     """
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)
+    # Building the robot is slow, and not needed if no robot of its wheel size could drive over a solid.
     if radius is not None and has_no_drivable_solids(world.solids, 2 * radius):
         return world
     solids = blocking_solids(world.solids, load_robot(loaded)[1])

@@ -1,4 +1,4 @@
-"""Load a scenario, its variations, and all files that it refers to; or report all problems."""
+"""Loading of a scenario, its variations, and all files that it refers to."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -38,10 +38,9 @@ def load_scenario(
 ) -> LoadedScenario:
     """Load the scenario in the file `path`, or one of its variations.
 
-    All files that it refers to must lie in `root` or in a folder of `world_path`, in which worlds are searched.
-    `choice` is the stack selected with `--stack`, which replaces the stack of the scenario. `variation` is the name of
-    the variation; "" for a file without variations. Raises InvalidInput with all problems of the scenario and its
-    files, and UsageError if there is no such variation, or if a file with variations is loaded without naming one.
+    All its files must lie in `root` or in a folder of `world_path`. `choice` is a stack that replaces the stack of the
+    scenario. `variation` is the name of a variation; "" for a file without variations. Raises InvalidInput with all
+    problems of the files, and UsageError for a variation that is unknown or missing.
     """
     number = number_of(variation)
     loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
@@ -56,14 +55,6 @@ def load_scenario(
     raise UsageError(f"{path} {reason}; {suggestion(variation, names)}")
 
 
-def try_scenario(
-    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
-) -> LoadedScenario | list[Problem]:
-    """Return the scenario in a file (its first variation if it has any), or all problems of the file."""
-    loaded = try_variations(path, root, world_path, choice)
-    return loaded if isinstance(loaded, list) else loaded[0]
-
-
 def try_variations(
     path: Path,
     root: Path,
@@ -72,12 +63,11 @@ def try_variations(
     numbers: Sequence[int] | None = None,
     unsaved: Mapping[Path, str] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
-    """Return all variations of the scenario in a file, in order; or all problems if any of them has errors.
+    """Return all variations of the scenario in a file; or all problems if one of them has errors.
 
-    A file without variations yields one scenario with `variation` "". `numbers` selects variations, counted from 1.
-    Numbers that do not exist, and variations that do not meet the conditions in `require`, are skipped. `unsaved`
-    contains the texts of files that are changed in an editor, but not saved. The other parameters are those of
-    `load_scenario`.
+    The result for a file without variations is one scenario. `numbers` selects variations, counted from 1; None selects
+    all. Unknown numbers are ignored. `unsaved` are texts that replace the content of files, such as unsaved texts of an
+    editor. The other parameters are those of `load_scenario`.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
@@ -97,7 +87,7 @@ def try_variations(
 
 
 def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()) -> VariationSpace | None:
-    """Return the variations of the scenario in a file without loading them; None if it has none.
+    """Return the space of variations of the scenario in a file; None for a file without variations.
 
     Raises InvalidInput if the file or its `variations` cannot be read.
     """
@@ -110,11 +100,11 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 
 
 class ChangedScenario:
-    """Loads changed versions of a scenario file without writing them, for example to find a smaller scenario.
+    """Scenario file from which changed scenarios are loaded without writing them to a file.
 
-    `merged_tree` is the content of the file merged with the files that it extends and with `defaults.yaml`. `base_tree`
-    is `merged_tree` without the key `variations`. `tree` is `base_tree` with the values of the selected variation,
-    which `changes` lists.
+    `merged_tree` is the YAML tree of the file, merged with the files that it extends and with `defaults.yaml`.
+    `base_tree` is `merged_tree` without `variations`. `changes` are the values of the selected variation, and `tree` is
+    `base_tree` with these values.
     """
 
     def __init__(
@@ -127,8 +117,8 @@ class ChangedScenario:
     ) -> None:
         """Read the file and check the selected variation.
 
-        `variation` is the name of a variation, "" for a file without variations, or None to ignore its variations and
-        check nothing. Raises InvalidInput, and UsageError for an unknown variation.
+        With None instead of the name of a variation, nothing is checked. The other parameters and the errors are those
+        of `load_scenario`.
         """
         self._library, self._choice = Library(PathSandbox.around(root, world_path)), choice
         if variation is not None:
@@ -148,7 +138,7 @@ class ChangedScenario:
             self.tree, self.changes = varied.tree, varied.changes
 
     def load(self, tree: MappingNode) -> LoadedScenario | list[Problem]:
-        """Load the scenario with the content `tree`, without its variations; or return all its problems."""
+        """Return the scenario with the content `tree`, ignoring its `variations`; or all its problems."""
         merged, problems = self._library.with_defaults(self.file, tree, [])
         if problems or not isinstance(merged, MappingNode):
             return problems
@@ -157,7 +147,7 @@ class ChangedScenario:
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
-    """Return the absolute path of a scenario file and its tree, merged with what it extends; or all problems."""
+    """Return the absolute path of a scenario file and its tree, merged with the files it extends; or all problems."""
     sandbox = library.sandbox
     file = sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -183,7 +173,7 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
 def _load_variation(
     variation: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """Load one variation with the stack `choice`, or with its own stack if it is None; or return all its problems."""
+    """Return one variation, with the stack `choice` unless it is None; or all its problems."""
     tree = variation.tree if choice is None else multirobot.apply_stack_choice(variation.tree, choice)
     if choice is not None and (ineffective := list(_ineffective_variation_problems(variation, tree, choice))):
         return library.with_source(ineffective)
@@ -208,7 +198,7 @@ def _load_variation(
 
 
 def _ineffective_variation_problems(variation: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
-    """Yield a problem for each varied value that has no effect, because `--stack` replaces the stack that it is for."""
+    """Yield a problem for each value of a variation that has no effect, because `choice` replaces the stack."""
     each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
     for change in variation.changes:
         if all(node_at(part, change.target.keys) is not change.value for part in each):
@@ -218,7 +208,7 @@ def _ineffective_variation_problems(variation: Variation, tree: MappingNode, cho
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
-    """Return the problems of the world file that an invalid scenario names, to report all problems at once."""
+    """Return the problems of the world file of an invalid scenario."""
     assets, node = Assets(library), child(tree, "world")
     if isinstance(node, ScalarNode) and isinstance(node.value, str):
         assets.world(node)
@@ -228,7 +218,7 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
 def _load_multi_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of several robots, or return its problems; a problem that several robots share occurs once."""
+    """Return a scenario of several robots, or all its problems without duplicates."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
@@ -256,7 +246,10 @@ def _load_multi_robot(
 def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of one robot, or the view of the robot `name` among the robots `others`; or return problems."""
+    """Return a scenario of one robot, or a view: the robot `name` of several, without the robots `others`.
+
+    Return all problems instead if there is an error.
+    """
     assets = Assets(library)
     world = assets.world_of(spec.world, tree, file)
     robot_map = _robot_map(spec, tree, assets)
@@ -303,7 +296,7 @@ def _load_single_robot(
 
 
 def _robot_map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | Literal["none"] | None:
-    """Load the map that the robot gets; "none" for no map, None for the map of the world."""
+    """Load the ROS map of the robot; "none" for no map, None for the map of the world."""
     node = node_at(tree, ("map",))
     if spec.map is None or spec.map == "none" or not isinstance(node, ScalarNode):
         return "none" if spec.map == "none" else None
@@ -311,23 +304,23 @@ def _robot_map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedM
 
 
 def _mask(mask_path: str | None, tree: MappingNode, keys: Keys, assets: Assets) -> LoadedMap | None:
-    """Load the filter mask that the stack names at `keys`; None if `mask_path` is None."""
+    """Load the filter mask of the stack at `keys`; None if `mask_path` is None."""
     node = node_at(tree, keys)
     return assets.map(node) if mask_path is not None and isinstance(node, ScalarNode) else None
 
 
 def _map_notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
-    """Return the notes about the maps, without duplicates."""
+    """Return the warnings about the maps, without duplicates."""
     return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
 
 
 def is_unusable_name(name: str) -> bool:
-    """Return whether no output folder can have this name."""
+    """Return whether the name cannot be the name of an output folder."""
     return name in ("", ".", "..")
 
 
 def scenario_id(file: Path, root: Path) -> str:
-    """Return the id of a scenario: its path relative to the root (its name if it is outside), without suffix."""
+    """Return the id of a scenario: its path relative to the root, without suffix; outside the root, its file name."""
     display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
     return next(
         (display_name.removesuffix(suffix) for suffix in SUFFIXES if display_name.endswith(suffix)),

@@ -1,4 +1,4 @@
-"""What a log records of a scenario: a self-contained text, which can be read again, and its events and faults."""
+"""Scenario text in a log, and criteria read from it; and the list of events and faults of a scenario."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -22,14 +22,13 @@ from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
 """Kinds of plugins that are needed to judge a log."""
 _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
-"""Top-level keys of a scenario that are needed to judge a log."""
+"""Top-level keys of a scenario that are needed to judge a log of it."""
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
-    """Return the scenario (or its variation) as one text, without `extends` and without places in criteria.
+    """Return the scenario, or its variation, as one YAML text without `extends`.
 
-    The text is the file as written if nothing had to be merged or replaced. Names of places in criteria are replaced by
-    poses, because logs are judged without the world.
+    Poses replace the place names in criteria. The text is that of the file if these changes have no effect.
     """
     own, _ = parse_yaml(loaded.text, loaded.path)
     plain = resolve_criteria_places(loaded.tree.plain, _validated(ScenarioSpec, loaded.tree), places_of(loaded.world))
@@ -39,7 +38,7 @@ def resolved_text(loaded: LoadedScenario) -> str:
 
 
 def unexpanded_text(loaded: LoadedScenario) -> str:
-    """Return the scenario as one text without `extends`, with `variations` instead of the values of this variation."""
+    """Return the scenario as one YAML text without `extends`, with its `variations`."""
     if not loaded.variation:
         return resolved_text(loaded)
     own, _ = parse_yaml(loaded.text, loaded.path)
@@ -47,15 +46,10 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
     return loaded.text if tree is None or own is None or own.plain == tree.plain else to_yaml(tree.plain)
 
 
-def spec_of_text(text: str, name: str) -> ScenarioSpec:
-    """Return the specification in a text of `resolved_text`; `name` is its name in problems. Raises InvalidInput."""
-    return _validated(ScenarioSpec, _read(text, name))
+def criteria_and_tree(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
+    """Return the criteria in a scenario text or criteria file, and its YAML tree.
 
-
-def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
-    """Return the criteria in a text of `resolved_text`, or of a file with criteria only, and the tree of the text.
-
-    `robot` selects one of several robots. `name` is the name of the text in problems. Raises InvalidInput.
+    `name` is the path of the text in messages. `robot` selects one of several robots. Raises InvalidInput.
     """
     tree = _read(text, name)
     if isinstance(tree, MappingNode) and robot:
@@ -66,11 +60,11 @@ def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, 
 
 
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
-    """Return the criteria in the scenario text of a log; `robot` selects one of several robots.
+    """Return the criteria in the scenario text of a log, ignoring the rest of the scenario.
 
-    `name` is the name of the text in problems, and `facts` are the entries in the header of the log. The rest of the
-    scenario is ignored, so plugins that it uses for other things than criteria and metrics need not be installed.
-    Raises InvalidInput, also if a criterion or metric is not installed in the version of the log.
+    `name` is the path of the text in messages. `facts` are the header entries of the log. `robot` selects one of
+    several robots. Raises InvalidInput for an invalid text, and for a criterion or metric of a plugin that is not
+    installed in the version of the log.
     """
     if missing := missing_plugins(facts, JUDGING_PLUGINS):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
@@ -82,7 +76,7 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
 
 
 def _read(text: str, name: str) -> Node:
-    """Return the tree of a text. Raises InvalidInput."""
+    """Return the YAML tree of a text. Raises InvalidInput."""
     tree, problems = parse_yaml(text, name)
     if tree is None or problems:
         raise InvalidInput(problems)
@@ -98,11 +92,12 @@ def _validated(model: type[Model], tree: Node) -> Model:
 
 
 def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
-    """Return the events, each followed by the steps of its sequence, then the faults, in the order of the scenario."""
+    """Return the events of a scenario, each followed by the steps of its sequence, then its faults."""
     return (*_events(loaded), *_faults(loaded))
 
 
 def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
+    """Yield the events of a scenario, each followed by the steps of its sequence."""
     for step in loaded.spec.steps:
         when = "" if step.when is None else _one_line_yaml(loaded, *step.keys, "when")
         yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)
@@ -124,6 +119,6 @@ def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
 
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """Return the line of the value at `keys` in the scenario file; 0 if it is in a file that the scenario extends."""
+    """Return the line of the value at `keys`; 0 if it is not in the scenario file itself."""
     position = loaded.position_of(*keys)
     return position.line if position.path == loaded.path else 0

@@ -1,4 +1,4 @@
-"""Search a specification for its parts, for names that refer to things, and for quantities; each with its keys."""
+"""Search of a specification for its parts, its references by name, and its quantities, with their YAML keys."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -12,7 +12,7 @@ from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name at `keys` of a specification that refers to something; `mark` in the type of the field says to what."""
+    """Name in a specification that refers to something. `mark` is the annotation of its field."""
 
     keys: Keys
     mark: ReferenceTo
@@ -20,30 +20,30 @@ class Reference(NamedTuple):
 
     @property
     def target(self) -> str:
-        """The kind of thing that the name refers to, such as "place" or "door"."""
+        """The kind of thing that the name refers to, e.g. "door"."""
         return self.mark.target
 
 
 RobotFilter = Callable[[str], bool]
-"""Function that returns whether parts that name this robot are searched."""
+"""Function that returns whether to search the parts that name this robot."""
 
 
 def references(spec: BaseModel, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[Reference]:
-    """Yield every reference in `spec`, whose own keys are `keys`, in the order of its fields.
+    """Yield all references in `spec`. `keys` are the keys of `spec` itself.
 
-    Parts that name a robot for which `includes_robot` is false are left out; None includes all.
+    Parts for which `includes_robot` is false are left out; None includes all parts.
     """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
-    for name, key, mark in _fields_of(type(spec)):
+    for name, key, mark in _fields_with_marks(type(spec)):
         below = keys if isinstance(spec, RootModel) else (*keys, key)
         yield from _references_in(getattr(spec, name), mark, below, includes_robot)
 
 
 @cache
-def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
-    """Return the name and the YAML key of each field, and the mark that says to what a text in it refers."""
+def _fields_with_marks(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
+    """Return the name, the YAML key, and the ReferenceTo annotation of each field; None for a field without one."""
     found = []
     for name, field in model.model_fields.items():
         marks = [mark for mark in field.metadata if isinstance(mark, ReferenceTo)]
@@ -54,7 +54,7 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | Non
 def _references_in(
     value: Any, mark: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
-    """Yield the references in the value of a field whose texts have the given mark."""
+    """Yield the references in the value of a field with this annotation."""
     if isinstance(value, BaseModel):
         yield from references(value, keys, includes_robot)
     elif isinstance(value, list):
@@ -70,7 +70,7 @@ def _references_in(
 
 
 def _mark(kind: Any) -> ReferenceTo | None:
-    """Return the mark of a type, or of its members or items; None if its texts refer to nothing."""
+    """Return the first ReferenceTo annotation in a type, its union members, or its list items; None without one."""
     if get_origin(kind) is Annotated:
         marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, ReferenceTo)]
         if marks:
@@ -80,9 +80,9 @@ def _mark(kind: Any) -> ReferenceTo | None:
 
 
 def walk(spec: Any, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield a specification and every specification in it, each with its keys; `keys` are those of `spec` itself.
+    """Yield a specification and all specifications in it with their keys. `keys` are the keys of `spec` itself.
 
-    Parts that name a robot for which `includes_robot` is false are left out; None includes all.
+    Parts for which `includes_robot` is false are left out; None includes all parts.
     """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
@@ -102,7 +102,7 @@ def walk(spec: Any, keys: Keys = (), includes_robot: RobotFilter | None = None) 
 
 
 def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
-    """Yield the quantities of one dimension, such as "angle", in SI units, each with its keys."""
+    """Yield the keys and values of all quantities of one dimension, such as "angle", in SI units."""
     for keys, part in walk(spec):
         for name, key in _quantity_fields(type(part), dimension):
             if isinstance(value := getattr(part, name), int | float):
@@ -111,7 +111,7 @@ def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float
 
 @cache
 def _quantity_fields(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
-    """Return the name and the YAML key of each field with a quantity of the dimension."""
+    """Return the name and the YAML key of each field that is a quantity of the dimension."""
     return [
         (name, field.alias or name)
         for name, field in model.model_fields.items()

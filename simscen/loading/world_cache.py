@@ -1,4 +1,4 @@
-"""Cache of built worlds, and of shortest paths in them, for the scenarios of one command."""
+"""Cache of built worlds, and of path searches in them, for the scenarios of one command."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass
 class WorldCache:
-    """Caches built worlds, and the shortest paths of discs between their solids.
+    """Caches built worlds and path searches.
 
-    `max_worlds` is the largest number of worlds that are kept; the oldest ones are discarded. In all methods, `solids`
-    are compared by identity, `radius` is that of the disc in m, and `z_range` are the heights in m between which a
-    solid blocks the disc.
+    A path search finds paths of a disc with a `radius` in m between `solids`. Solids block it if they reach into
+    `z_range`, two heights in m. The cache compares `solids` by identity.
     """
 
-    max_worlds: int = 100_000
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     """Worlds, and the files from which they were built."""
     _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
@@ -40,13 +38,13 @@ class WorldCache:
     )
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the built world of a scenario, and record its files as read. Raises InvalidInput."""
+        """Return the built world of a scenario, and call `record_read_file` for its files. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:
                 world = load_world(loaded)
             known = loaded.world, world, read
-            self._worlds = [*self._worlds[-self.max_worlds + 1 :], known]
+            self._worlds.append(known)
         for file in sorted(known[2]):
             record_read_file(file)
         return known[1]
@@ -54,7 +52,7 @@ class WorldCache:
     def simple_paths(
         self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]
     ) -> SimplePaths | None:
-        """Return a fast search of paths, which may miss paths; None if a solid is too complex for it."""
+        """Return a fast path search, which can miss paths; None if a solid is too complex for it."""
         for known in self._simple_paths:
             if known[0] is solids and known[1:3] == (radius, z_range):
                 return known[3]
@@ -65,7 +63,7 @@ class WorldCache:
     def shortest_paths(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestPaths:
-        """Return the slower search of shortest paths in `bounds`, which finds a path if there is one."""
+        """Return a slower path search within `bounds`, which always finds the shortest path."""
         for known in self._shortest_paths:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]

@@ -11,7 +11,7 @@ from simscen.core.records.events import READING_KINDS
 from simscen.model.stack_base import RobotLatency
 from simscen.spec.base import Component, LanguageVersion, Ranged, Spec, by_default
 from simscen.spec.choice import Choice
-from simscen.spec.moving_objects import Shaped
+from simscen.spec.moving_objects import ShapedObject
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,
@@ -329,7 +329,7 @@ class Sensor(Choice):
         return self.original_class is not None or self.reading_type == "Image"
 
 
-class Part(Shaped):
+class Part(ShapedObject):
     """Part of the body of the robot."""
 
     pose: PoseSpec = PoseSpec(x=0.0, y=0.0)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from simscen.spec.base import LanguageVersion, Spec
-from simscen.spec.moving_objects import Motion, Shaped
+from simscen.spec.moving_objects import Motion, ShapedObject
 from simscen.spec.places import Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Length, Mass, PositiveLength, Probability
 
@@ -29,7 +29,7 @@ class Wall(Spec):
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
-class WorldObject(Shaped):
+class WorldObject(ShapedObject):
     """Object in the world."""
 
     name: Name

@@ -1,4 +1,4 @@
-"""Base classes of the specifications that users write in YAML, and import of specifications at their first use."""
+"""Base classes of specifications: pydantic models of the YAML that users write."""
 
 import ast
 import inspect
@@ -27,7 +27,10 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Spec(BaseModel):
-    """Base of all specifications: no type conversion, frozen, finite numbers only, and an unknown key is an error."""
+    """Base class of all specifications. Instances are immutable.
+
+    Validation rejects unknown keys, infinite and NaN numbers, and values of another type.
+    """
 
     model_config = ConfigDict(
         strict=True,
@@ -49,29 +52,29 @@ class Spec(BaseModel):
         return schema
 
 
-def _no_boolean(value: Any) -> Any:
+def _reject_boolean(value: Any) -> Any:
     if isinstance(value, bool):  # `True == 1`, so a Literal accepts it
         raise PydanticCustomError("literal_error", "expected 1", {"expected": "1"})
     return value
 
 
-LanguageVersion = Annotated[Literal[1], BeforeValidator(_no_boolean)]
-"""Version of the scenario language that a file is written in."""
+LanguageVersion = Annotated[Literal[1], BeforeValidator(_reject_boolean)]
+"""Version of the scenario language in which a file is written. 1 is the only version."""
 
 T = TypeVar("T")
 
 
 class Value(RootModel[T], Generic[T]):
-    """Specification that is a single value instead of a mapping, e.g. `time: 10 s`."""
+    """Specification that is a single value instead of a mapping, e.g. `10 s` in `time: 10 s`."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class Ranged(Spec):
-    """Specification in which no field `min_…` may be greater than the field `max_…` of the same name."""
+    """Base class of specifications with pairs of fields `min_x` and `max_x`. No minimum may exceed its maximum."""
 
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
-    """Names of the fields `max_…` that mean "no limit" if they are 0 or less."""
+    """Names of the fields `max_x` in which 0 or less means "no limit"."""
 
     @model_validator(mode="after")
     def _check_order(self) -> "Ranged":
@@ -86,15 +89,16 @@ class Ranged(Spec):
 
 
 def by_default() -> Any:
-    """Return the default of a field that holds a specification: the specification of an empty mapping.
-
-    It is created when it is needed. Creating it at import would cost every command 10 ms.
-    """
+    """Return a pydantic field whose default is the specification that an empty mapping validates to."""
+    # Creating the specification at import would cost every command 10 ms.
     return Field(default_factory=dict, validate_default=True)
 
 
 def type_discriminator(default: str) -> Callable[[Any], str | None]:
-    """Return a pydantic discriminator that selects a member of a union by `type`; a missing `type` means `default`."""
+    """Return a function for pydantic's Discriminator that selects a member of a union by the key `type`.
+
+    `default` is the type of a mapping without this key.
+    """
 
     def tag(value: Any) -> str | None:
         if isinstance(value, dict):
@@ -105,7 +109,7 @@ def type_discriminator(default: str) -> Callable[[Any], str | None]:
 
 
 def field_docs(model: type) -> dict[str, str]:
-    """Return the docstrings of all fields of a model, also inherited ones, by field name."""
+    """Return the docstrings of all fields of a model by field name, including inherited fields."""
     docs: dict[str, str] = {}
     for base in reversed(model.__mro__):
         if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
@@ -115,7 +119,7 @@ def field_docs(model: type) -> dict[str, str]:
 
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
-    """Return the field docstrings of all classes of a module; empty if its source is not installed."""
+    """Return field docstrings by class name and field name; {} if the source of the module is not installed."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:
@@ -124,6 +128,7 @@ def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
 
 
 def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
+    """Return the docstrings of the fields of a class by field name."""
     docs = {}
     for statement, following in zip(node.body, node.body[1:], strict=False):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
@@ -134,22 +139,21 @@ def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
 
 
 class Component(Spec):
-    """Specification of an object that is built for a run: a part of a stack, a whole stack, or a sensor.
+    """Specification of an object that is built for a run: a stack, a part of a stack, or a sensor.
 
-    The class of the object is imported when the run is assembled. Files are therefore validated without the libraries
-    that the class needs.
+    The class of the object is imported when the run starts, so validation does not need its libraries.
     """
 
     component: ClassVar[str]
-    """Address `package.module:Class` of the class or function that makes the object.
+    """Address `package.module:Class` of the class, or of a function that returns the object.
 
-    It is called with the specification and a setting: what the object may know of its run, such as the
-    simscen.stack.setting.Setting of all parts of a stack, or the simscen.sensors.sensor.SensorSetting of a sensor.
+    It is called with the specification and a setting (facts about the run): simscen.stack.setting.Setting for a part of
+    a stack, simscen.sensors.sensor.SensorSetting for a sensor.
     """
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Return why this class is not a valid specification of a component; "" if it is."""
+        """Return the reason why `component` of this class is missing or malformed; "" if it is valid."""
         valid = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
         return "" if valid else "it has no attribute `component` of the form package.module:Class"
 
@@ -161,7 +165,7 @@ class Component(Spec):
 
 
 class Typed(Component):
-    """Component that files select by `type`, which is the name of its entry point."""
+    """Component that a file selects by its name under the key `type`."""
 
     type: str = ""
     """Name of the component."""
@@ -169,7 +173,10 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation of a field whose specification is the class `name` of `module`, imported when the field is used."""
+    """Annotation of a field that is a specification of the class `name` in `module`.
+
+    The module is imported when a value of the field is validated.
+    """
 
     module: str
     name: str
@@ -191,10 +198,10 @@ class LazySpec:
         return generated if schema["type"] == "nullable" else generated["anyOf"][0]
 
     def _validate(self, value: Any) -> BaseModel:
-        """Validate a value; pydantic reports errors of the model as errors of the field, with their positions."""
+        """Return the specification of a value. Raises pydantic.ValidationError."""
         return self.load().model_validate(value, by_alias=True, by_name=False)
 
 
 def annotation_of(field: FieldInfo) -> Any:
-    """Return the type of a field: its annotation, or the specification of its LazySpec, which is imported."""
+    """Return the type of a field. For a field with a LazySpec, import and return the specification class."""
     return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)

@@ -1,10 +1,8 @@
-"""Base class of mappings in a file that must have exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
+"""Base class of YAML mappings with exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
 
-simscen ships some of the keys, and installed packages can add others. Packages are searched only if a file uses a key
-that simscen does not ship, or if all keys are requested.
+Installed packages can add keys to the keys that simscen ships.
 """
 
-import contextlib
 from functools import cache
 from typing import Annotated, Any, ClassVar, get_args
 
@@ -18,32 +16,34 @@ from simscen.spec.base import LazySpec, Spec
 class Choice(Spec):
     """Mapping with exactly one key out of several, e.g. `spawn: {…}`, plus optional modifiers.
 
-    A subclass has one optional field for each choice; the fields in `modifiers` can be combined with any choice. Unlike
-    with a union by `type`, editors and validators can report the exact mistake.
-
-    If `group` is a group of the registry, installed packages can add choices. A mapping with an added key becomes an
-    instance of an extended class (`with_installed_choices`) that has a field for each added choice.
+    A subclass has one optional field for each choice. A mapping with a key that an installed package adds becomes an
+    instance of an extended class: a subclass with a further field for each added key.
     """
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
+    """Names of fields that can be combined with any choice."""
     group: ClassVar[str] = ""
+    """Group of the registry in which installed packages can add choices; "" if they cannot."""
     original_class: ClassVar[type["Choice"] | None] = None
-    """Class from which an extended class was created; None for any other class."""
+    """In an extended class, the class that it extends; None in any other class."""
 
     @classmethod
     def choices(cls) -> dict[str, str]:
-        """Return the name of the field of each choice, by the key in YAML."""
+        """Return the field names of all choices by their keys in YAML."""
         return {f.alias or name: name for name, f in cls.model_fields.items() if name not in cls.modifiers}
 
     @classmethod
     @cache
     def known_keys(cls) -> frozenset[str]:
-        """Return all valid keys in YAML, including modifiers."""
+        """Return the keys in YAML of all choices and modifiers."""
         return frozenset(field.alias or name for name, field in cls.model_fields.items())
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the addresses "module:Class" of the specifications by key; choices without one are left out."""
+        """Return the addresses "module:Class" of the specifications of the choices, by their keys in YAML.
+
+        Lists and nested choices are left out.
+        """
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
 
@@ -68,38 +68,39 @@ class Choice(Spec):
     @classmethod
     @cache
     def _python_names(cls) -> frozenset[str]:
-        """Return the names of fields that differ from their keys in YAML, e.g. `for_`."""
+        """Return the field names that differ from their keys in YAML, e.g. `for_`."""
         return frozenset(name for name, field in cls.model_fields.items() if field.alias not in (None, name))
 
     @model_validator(mode="after")
     def _check_one_choice(self) -> "Choice":
-        given = self._given()
+        given = self._given_keys()
         if not given:
             raise ValueError(f"expected one of: {', '.join(self.choices())}")
         if len(given) > 1:
             raise ValueError(f"only one of {', '.join(given)} may be given here")
         return self
 
-    def _given(self) -> list[str]:
+    def _given_keys(self) -> list[str]:
+        """Return the keys in YAML of the choices in the mapping."""
         return [key for key, name in self.choices().items() if getattr(self, name) is not None]
 
     @property
     def kind(self) -> str:
-        """The key that is given."""
-        return self._given()[0]
+        """The key in YAML of the choice in the mapping."""
+        return self._given_keys()[0]
 
     @property
     def chosen(self) -> BaseModel:
-        """The specification under the key that is given."""
+        """The specification under this key."""
         spec = getattr(self, self.choices()[self.kind])
         assert isinstance(spec, BaseModel)
         return spec
 
     @property
-    def added_by(self) -> str:
-        """Text for messages that names the package that added the key; "" if simscen ships the key.
+    def plugin_suffix(self) -> str:
+        """Suffix for messages that names the plugin, e.g. " (criterion `dwell` of yardwork 1.2)".
 
-        Example: " (criterion `dwell` of yardwork 1.2)"
+        It is "" if simscen ships the key.
         """
         if self.original_class is None:
             return ""
@@ -111,15 +112,12 @@ class Choice(Spec):
     def __reduce_ex__(self, protocol: Any) -> Any:
         if self.original_class is None:
             return super().__reduce_ex__(protocol)
-        return empty_instance, (self.original_class,), self.__getstate__()
+        return _empty_instance, (self.original_class,), self.__getstate__()
 
 
 @cache
 def with_installed_choices(choice: type[Choice]) -> type[Choice]:
-    """Return the extended class: a subclass with a field for each key that installed packages add.
-
-    Returns the class itself if there are no such keys.
-    """
+    """Return the extended class of a choice; the class itself if no installed package adds a key."""
     from pydantic import create_model
 
     from simscen.spec.extensible_union import PluginSpec
@@ -144,29 +142,15 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     return extended
 
 
-def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
-    """Return the usable specifications that installed packages add to a choice, by key."""
-    from simscen.spec.registry import BrokenPlugin, installed
-
-    found = {}
-    for entry in installed(choice.group) if choice.group else ():
-        if entry.name not in choice.known_keys():
-            with contextlib.suppress(BrokenPlugin):
-                found[entry.name] = entry.load()
-    return found
-
-
-def empty_instance(original_class: type[Choice]) -> Choice:
-    """Return an instance of the extended class without fields, for unpickling.
-
-    Pickle cannot import an extended class by its name, because each process creates the class at run time.
-    """
+def _empty_instance(original_class: type[Choice]) -> Choice:
+    """Return an uninitialized instance of the extended class of a choice, for unpickling."""
+    # Pickle cannot import an extended class by its name, because each process creates the class at run time.
     extended = with_installed_choices(original_class)
     return extended.__new__(extended)
 
 
 def _address(field: FieldInfo) -> str:
-    """Return the address of the specification of a field; "" for a list and for another choice."""
+    """Return the address "module:Class" of the specification of a field; "" for a list and for a nested choice."""
     lazy = next((item for item in field.metadata if isinstance(item, LazySpec)), None)
     if lazy is not None:
         return f"{lazy.module}:{lazy.name}"

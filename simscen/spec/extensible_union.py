@@ -1,7 +1,6 @@
-"""Unions of specifications, selected by `type`, to which installed packages can add members."""
+"""Fields that accept the types of a registry group: shipped types, and types that installed packages add."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -12,16 +11,20 @@ from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import LazySpec, Typed
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
-GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen names", "simscen mappings"
-"""Keys of schema metadata: the group that packages can extend; whether names are valid values; whether mappings are."""
+GROUP_KEY = "simscen group"
+"""Key of the registry group in the metadata of a pydantic schema."""
+NAMES_ALLOWED_KEY = "simscen names"
+"""Key in the same metadata: true if the name of a type alone is a valid value."""
+MAPPINGS_ALLOWED_KEY = "simscen mappings"
+"""Key in the same metadata: true if a mapping with the key `type` is a valid value."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Annotation of a field that is a specification of a group of the registry; `shipped_union` has the shipped types.
+    """Annotation of a field that is a specification of a registry group, selected by the key `type`.
 
-    A mapping with another `type` is validated by the specification that an installed package adds under that name. If
-    `allows_names`, the name of a type alone is also valid.
+    `shipped_union` is the union of the shipped specifications. Another `type` selects the specification of an installed
+    package. With `allows_names`, the name of a type alone is also valid.
     """
 
     group: str
@@ -36,21 +39,21 @@ class ExtensibleUnion:
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
-        if self.allows_names and isinstance(value, str) and value not in _names(self.group):
+        if self.allows_names and isinstance(value, str) and value not in _shipped_names(self.group):
             return validate_plugin_spec(_find_or_raise(self.group, value), {"type": value})
         name = value.get("type") if isinstance(value, dict) else None
-        if not isinstance(name, str) or name in _names(self.group):
+        if not isinstance(name, str) or name in _shipped_names(self.group):
             return validate_shipped(value)
         entry = find(self.group, name)
         if entry is not None:
             return validate_plugin_spec(entry, value)
-        details = InitErrorDetails(type=_unknown(self.group, name), loc=("type",), input=name)
+        details = InitErrorDetails(type=_unknown_type_error(self.group, name), loc=("type",), input=name)
         raise ValidationError.from_exception_data("type", [details])
 
 
 @dataclass(frozen=True)
 class TypeName:
-    """Annotation of a string that is the name of a shipped type or of a type that an installed package adds."""
+    """Annotation of a string that names a type of a registry group, shipped or from an installed package."""
 
     group: str
 
@@ -59,48 +62,38 @@ class TypeName:
         return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=metadata)
 
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        if isinstance(value, str) and value not in _names(self.group):
+        if isinstance(value, str) and value not in _shipped_names(self.group):
             return _find_or_raise(self.group, value).name
         return validate_shipped(value)
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
-"""Name of a recovery behavior, as in the events of the log."""
+"""Name of a recovery behavior, shipped or from an installed package."""
 
 
-def installed_specs(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the name and class of each usable specification that installed packages add to a group."""
-    for entry in installed(group):
-        if entry.problem or entry.name in _names(group):
-            continue
-        try:
-            yield entry.name, entry.load()
-        except BrokenPlugin:
-            continue
-
-
-def _names(group: str) -> frozenset[str]:
+def _shipped_names(group: str) -> frozenset[str]:
     return frozenset(entry.name for entry in shipped(group))
 
 
 def _find_or_raise(group: str, name: str) -> Entry:
+    """Return the type of a group by name. Raises PydanticCustomError if there is none."""
     if (entry := find(group, name)) is None:
-        raise _unknown(group, name)
+        raise _unknown_type_error(group, name)
     return entry
 
 
-def _unknown(group: str, name: str) -> PydanticCustomError:
+def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
     names = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(names)})
 
 
 _CHECKED_PROPERTIES = ("horizon", "clearance_range")
-"""Properties that criteria may have: a time in s and a distance in m that are used before a run."""
+"""Properties of plugin criteria that are read before a run: a time in s, and a distance in m."""
 
 
 @dataclass(frozen=True)
 class PluginSpec(LazySpec):
-    """Annotation of a field whose specification an installed package adds."""
+    """Annotation of a field whose specification class comes from an installed package."""
 
     entry: Entry
 
@@ -113,9 +106,9 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """Validate a value with the specification of an entry. Any error of the package becomes a validation error."""
+    """Return the specification of a value under a plugin type. Any error of the package becomes a validation error."""
     try:
-        return _checked(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
+        return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
         raise _plugin_error(broken) from broken
     except (ValueError, AssertionError):  # pydantic reports these as mistakes in the file
@@ -126,11 +119,12 @@ def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
 
 
 def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
+    """Return the validation error for a plugin that cannot be used."""
     return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 
-def _checked(entry: Entry, spec: BaseModel) -> BaseModel:
-    """Return `spec`. Raises BrokenPlugin if a property that is used before a run is not a valid number."""
+def _with_valid_properties(entry: Entry, spec: BaseModel) -> BaseModel:
+    """Return `spec`. Raises BrokenPlugin if a checked property is not a finite number of at least 0."""
     for name in _CHECKED_PROPERTIES:
         number = getattr(spec, name) if hasattr(type(spec), name) else 0.0
         if isinstance(number, bool) or not isinstance(number, int | float) or not (0 <= number < math.inf):

@@ -1,4 +1,4 @@
-"""Specifications of objects with a simple shape and of scripted motions along waypoints or timed keyframes."""
+"""Specifications of objects with a simple shape, and of scripted motions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Time of turning before a corner, and after it. On a short leg, at most a quarter of the leg's duration."""
+"""Duration of half of the turn at a corner. A leg at constant speed limits it to a quarter of its duration."""
 SMOOTH_DURATION_FACTOR = 1.5
-"""Duration of a leg with `ease: smooth`, relative to a leg at constant speed with the same top speed."""
+"""Duration of a leg with `ease: smooth`, divided by its duration at constant speed with the same top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6
-"""Largest difference in m and rad between the first and the last keyframe of a loop."""
+"""Largest distance in m, and largest difference of yaw in rad, between the ends of a loop of keyframes."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
-"""Time, x, y, and yaw. Not strict, because YAML has lists instead of tuples."""
+"""Time in s, x and y in m, and yaw in rad. Lists are valid as well as tuples."""
 
 
 def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
@@ -85,7 +85,7 @@ class Motion(Spec):
         return self
 
     def path(self, current: Pose2, start: float = 0.0) -> MotionPath:
-        """Return the path of an object at the pose `current` that starts moving `start` seconds from now."""
+        """Return the path of an object whose pose is now `current` and that starts to move in `start` seconds."""
         if self.keyframes is not None:
             return _path_through_keyframes(current, self.keyframes, self.repeat, start, self.ease, self.phase)
         assert self.through is not None and self.speed is not None
@@ -100,6 +100,7 @@ def _path_through_keyframes(
     ease: str,
     phase: float,
 ) -> MotionPath:
+    """Return the path through keyframes; the parameters are those of Motion and `Motion.path`."""
     times, poses = [t for t, *_ in keyframes], [Pose2(x, y, yaw) for _, x, y, yaw in keyframes]
     if times[0] > 0:
         times, poses = [0.0, *times], [current, *poses]
@@ -111,7 +112,7 @@ def _path_through_keyframes(
 def path_through_waypoints(
     current: Pose2, through: list[list[float]], speed: float, repeat: str, ease: str = "linear", start: float = 0.0
 ) -> MotionPath:
-    """Return the path along straight lines from `current` through waypoints; `speed` in m/s is the top speed."""
+    """Return the path along straight lines from `current` through waypoints [x, y]; `speed` in m/s is the top speed."""
     corners = [(current.x, current.y)]
     for x, y in [*through, *([[current.x, current.y]] if repeat == "loop" else [])]:
         if (x, y) != corners[-1]:
@@ -120,12 +121,13 @@ def path_through_waypoints(
         return MotionPath((0.0,), (current,), repeat, start)
     legs = [_Leg(Pose2(*a, math.atan2(b[1] - a[1], b[0] - a[0])), math.hypot(b[0] - a[0], b[1] - a[1]), b)
             for a, b in itertools.pairwise(corners)]  # fmt: skip
-    stops = _with_stops(legs, speed, repeat) if ease == "smooth" else _at_constant_speed(legs, speed, repeat)
+    timed_poses = _poses_with_stops if ease == "smooth" else _poses_at_constant_speed
+    stops = timed_poses(legs, speed, repeat)
     return MotionPath(tuple(time for time, _ in stops), tuple(pose for _, pose in stops), repeat, start, ease)
 
 
 class _Leg(NamedTuple):
-    """Straight leg of a path: pose at its beginning with the heading along it, length in m, and end point."""
+    """Straight leg of a path. `begin` has the heading of the leg. `length` is in m, `end_point` is (x, y)."""
 
     begin: Pose2
     length: float
@@ -133,38 +135,40 @@ class _Leg(NamedTuple):
 
     @property
     def end(self) -> Pose2:
+        """The pose at the end, with the heading of the leg."""
         return Pose2(*self.end_point, self.begin.yaw)
 
-    def at(self, distance: float) -> Pose2:
+    def pose_at(self, distance: float) -> Pose2:
+        """Return the pose `distance` m after the beginning."""
         return self.begin.compose(Pose2(distance, 0.0))
 
 
-def _at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times in s and poses at constant speed. Half of each turn is made before the corner, half after it."""
+def _poses_at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
+    """Return times in s and poses for a motion that turns while driving, half before each corner and half after it."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         duration = leg.length / speed
         turn_time = min(CORNER_TURN_S, duration / 4)
         if stops[-1][1].yaw != leg.begin.yaw:
-            stops.append((time + turn_time, leg.at(turn_time * speed)))
+            stops.append((time + turn_time, leg.pose_at(turn_time * speed)))
         next_leg = following or (legs[0] if repeat == "loop" else leg)
         turn = wrap(next_leg.begin.yaw - leg.begin.yaw)
         if turn:
-            stops.append((time + duration - turn_time, leg.at(leg.length - turn_time * speed)))
+            stops.append((time + duration - turn_time, leg.pose_at(leg.length - turn_time * speed)))
         time += duration
         stops.append((time, leg.end._replace(yaw=wrap(leg.begin.yaw + turn / 2))))
     if repeat == "loop" and stops[-1][1].yaw != stops[0][1].yaw:
         first = stops[0]
         turn_time = min(CORNER_TURN_S, legs[0].length / speed / 4)
         stops[0] = (0.0, first[1]._replace(yaw=stops[-1][1].yaw))
-        stops.insert(1, (turn_time, legs[0].at(turn_time * speed)))
+        stops.insert(1, (turn_time, legs[0].pose_at(turn_time * speed)))
     if repeat == "loop":
         stops[-1] = (time, stops[0][1])
     return stops
 
 
-def _with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times in s and poses with a stop at the end of each leg and a turn in place at each corner."""
+def _poses_with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
+    """Return times in s and poses for a motion that stops at the end of each leg and turns in place at corners."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         time += SMOOTH_DURATION_FACTOR * leg.length / speed
@@ -176,8 +180,8 @@ def _with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float
     return stops
 
 
-class Shaped(Spec):
-    """Object with one simple shape, whose underside is at the height `z`."""
+class ShapedObject(Spec):
+    """Object with exactly one shape: a box, a cylinder, or a prism over a polygon."""
 
     box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
     """Box: length along x, width along y, height."""
@@ -191,18 +195,18 @@ class Shaped(Spec):
     """Height of the underside above the ground."""
 
     @model_validator(mode="after")
-    def _check_shape(self) -> Shaped:
+    def _check_shape(self) -> ShapedObject:
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
         return self
 
     @property
     def total_height(self) -> float:
-        """Height of the object in meters."""
+        """Height in m from the underside of the object to its top."""
         return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 
     def solid(self, name: str) -> Solid:
-        """Return the shape with a name, in the frame of the object, whose origin is on the ground below the object."""
+        """Return the object as a named solid. The origin of its frame is on the ground below the object."""
         shape: Shape
         if self.box is not None:
             shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2

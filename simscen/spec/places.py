@@ -1,7 +1,7 @@
-"""Names, points, poses, and references to named things in specifications.
+"""Field types for names, points, poses, and references to named things.
 
-A field of type `PlaceOrPose` or `PlaceOrPoint` also accepts the name of a place. The loader replaces the name by the
-pose of the place (`loading/named_places.py`), so code that uses a specification only sees poses and points.
+A place is a named pose of a world. The loader replaces the name of a place in a pose or point field by the pose or
+point of the place.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def _reject_path(name: str) -> str:
-    """Return the name. Raise an error for `../x` and `/x`, because files are named after it, but not for `1 m/s`."""
+    """Return the name. Raises PydanticCustomError for a path such as `../x` or `/x`; `1 m/s` is valid."""
     if name[0] in "/\\" or not {".", ".."}.isdisjoint(name.replace("\\", "/").split("/")):
         raise PydanticCustomError("path_name", "must not be a path")
     return name
@@ -34,12 +34,14 @@ Name = Annotated[
     StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
     AfterValidator(_reject_path),
 ]
-NAMESPACE = r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"
-RobotName = Annotated[str, StringConstraints(max_length=40, pattern=NAMESPACE)]
+"""Name of a thing: 1 to 120 characters without control characters, and not a path."""
+ROS_NAMESPACE_PATTERN = r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"
+RobotName = Annotated[str, StringConstraints(max_length=40, pattern=ROS_NAMESPACE_PATTERN)]
 """Name of one of several robots, which is also its ROS namespace."""
 # The maximum length is not part of the pattern: compiling `\w{0,119}` for Unicode takes 25 ms at every start.
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
+"""Point [x, y] in m."""
 
 
 def _check_polygon(ring: list[Point]) -> list[Point]:
@@ -66,11 +68,11 @@ class PoseSpec(Spec):
 
     @property
     def place(self) -> str:
-        """Name of the place if the file contains a name instead of the pose, otherwise ""."""
+        """Name of the place from which the pose comes; "" for a pose that the file contains."""
         return self._place
 
     def with_place(self, place: str) -> PoseSpec:
-        """Return a copy of the pose with the name of the place that it comes from."""
+        """Return a copy of the pose with `place` set to this name."""
         copy = self.model_copy()
         copy._place = place
         return copy
@@ -81,18 +83,18 @@ class PoseSpec(Spec):
         return Pose2(self.x, self.y, self.yaw)
 
 
-Target = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask"]
+ReferenceKind = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask"]
 
 
 @dataclass(frozen=True)
 class ReferenceTo:
-    """Annotation of a string that must be the name of an existing `target`; the loader checks that it exists.
+    """Annotation of a string that must be the name of an existing thing of the kind `target`.
 
-    `object`: anything that can be touched. `movable`: an object with its own pose. `mover`: a movable or another robot.
+    `object`: anything that can be touched. `movable`: an object or door that can move. `mover`: a movable, or a robot.
     `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of a filter mask.
     """
 
-    target: Target
+    target: ReferenceKind
 
 
 RegionName = Annotated[Name, ReferenceTo("region")]
@@ -106,10 +108,11 @@ DisturbanceName = Annotated[Name, ReferenceTo("disturbance")]
 MaskFile = Annotated[str, Field(min_length=1, max_length=4096), ReferenceTo("mask")]
 
 
-DESCRIPTION = "Name of a place in the world."
+PLACE_NAME_DESCRIPTION = "Name of a place in the world."
 
 
-def _name_or_value(value: Any) -> str:
+def _union_tag(value: Any) -> str:
+    """Return the tag of a value in the unions below: "text" for the name of a place, otherwise "written out"."""
     return "text" if isinstance(value, str) else "written out"
 
 
@@ -117,19 +120,19 @@ def _name_or_value(value: Any) -> str:
 class PlaceAllowed(ReferenceTo):
     """Annotation of a pose in the world frame that can also be given as the name of a place.
 
-    `keywords` are texts that do not name a place but have another meaning in this field.
+    `keywords` are texts that this field accepts and that do not name a place.
     """
 
-    target: Target = "place"
+    target: ReferenceKind = "place"
     keywords: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        field = Field(description=DESCRIPTION, examples=list(self.keywords) or None)
+        field = Field(description=PLACE_NAME_DESCRIPTION, examples=list(self.keywords) or None)
         name = handler.generate_schema(Annotated[PlaceName, field])
-        return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _name_or_value)
+        return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _union_tag)
 
     def value_at(self, pose: PoseSpec) -> Any:
-        """Return the value that replaces the name of a place with this pose."""
+        """Return the value of the field for a place with this pose: the pose itself."""
         return pose
 
 
@@ -137,21 +140,22 @@ class PlaceAllowedForPoint(PlaceAllowed):
     """Annotation of a point [x, y] in the world frame that can also be given as the name of a place."""
 
     def value_at(self, pose: PoseSpec) -> Any:
-        """Return the position of the place."""
+        """Return the value of the field for a place with this pose: [x, y]."""
         return [pose.x, pose.y]
 
 
 @dataclass(frozen=True)
 class PlaceShorthand:
-    """Annotation of a mapping for which the name of a place can be given instead, meaning `{key: name}`."""
+    """Annotation of a mapping that can also be given as the name of a place, short for `{key: name}`."""
 
     key: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        name, mapping = handler.generate_schema(Annotated[PlaceName, Field(description=DESCRIPTION)]), handler(source)
+        name = handler.generate_schema(Annotated[PlaceName, Field(description=PLACE_NAME_DESCRIPTION)])
+        mapping = handler(source)
         convert = core_schema.no_info_plain_validator_function(self._as_mapping)
         shorthand = core_schema.chain_schema([name, convert, mapping])
-        return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _name_or_value)
+        return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _union_tag)
 
     def _as_mapping(self, place: str) -> dict[str, str]:
         return {self.key: place}
@@ -179,8 +183,8 @@ class SpeedMask(Spec):
     multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
     """Increase of the limit per unit of value (multiplier of CostmapFilterInfo): percent or m/s."""
 
-    def over(self, grid: OccupancyGrid) -> SpeedLimits:
-        """Return the speed limits, given the mask as a grid."""
+    def speed_limits(self, grid: OccupancyGrid) -> SpeedLimits:
+        """Return the speed limits of all cells; `grid` has the values of the mask."""
         from simscen.core.environment.costmap_filters import SpeedLimits
 
         return SpeedLimits(grid, self.type == "percent", self.base, self.multiplier)

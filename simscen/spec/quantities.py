@@ -1,9 +1,9 @@
-"""Types of physical quantities in YAML: a number in SI units, or text with a unit whose dimension is checked."""
+"""Field types for physical quantities: a number in SI units, or text with a unit, such as "50 cm"."""
 
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -11,10 +11,12 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 _METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 _SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 _RADIANS = {"rad": 1.0, "deg": math.pi / 180}
-NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d].*?)\s*")
+NUMBER_AND_UNIT_PATTERN = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d].*?)\s*")
+"""Pattern of a quantity such as "1.5 m". Group 1 is the number, group 2 the unit."""
 
 
-def _per(top: dict[str, float], bottom: dict[str, float], power: str = "") -> dict[str, float]:
+def _units_per(top: dict[str, float], bottom: dict[str, float], power: Literal["", "^2"] = "") -> dict[str, float]:
+    """Return the SI factors of the units `top/bottom`, or `top/bottom^2`; e.g. m/s^2 from m and s."""
     return {f"{a}/{b}{power}": x / (y**2 if power else y) for a, x in top.items() for b, y in bottom.items()}
 
 
@@ -22,10 +24,10 @@ UNITS: dict[str, dict[str, float]] = {
     "length": _METERS,
     "duration": _SECONDS,
     "angle": _RADIANS,
-    "speed": _per(_METERS, {"s": 1.0, "h": 3600.0, "min": 60.0}),
-    "angular speed": _per(_RADIANS, {"s": 1.0}),
-    "acceleration": _per(_METERS, {"s": 1.0}, "^2"),
-    "angular acceleration": _per(_RADIANS, {"s": 1.0}, "^2"),
+    "speed": _units_per(_METERS, {"s": 1.0, "h": 3600.0, "min": 60.0}),
+    "angular speed": _units_per(_RADIANS, {"s": 1.0}),
+    "acceleration": _units_per(_METERS, {"s": 1.0}, "^2"),
+    "angular acceleration": _units_per(_RADIANS, {"s": 1.0}, "^2"),
     "jerk": {"m/s^3": 1.0},
     "mass": {"kg": 1.0, "g": 0.001, "t": 1000.0},
     "frequency": {"Hz": 1.0, "kHz": 1000.0},
@@ -33,12 +35,12 @@ UNITS: dict[str, dict[str, float]] = {
     "impulse": {"N s": 1.0, "Ns": 1.0},
     "ratio": {"%": 0.01},
 }
-"""Units of each dimension, with their factors to SI units."""
+"""Factors to SI units, by dimension and unit."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Annotation of a float that is a physical quantity with a dimension of UNITS."""
+    """Annotation of a float with a physical dimension, a key of UNITS. Validation converts text to SI units."""
 
     dimension: str
 
@@ -56,12 +58,12 @@ class Quantity:
 
     @property
     def example(self) -> str:
-        """Example of a value in a file."""
+        """Example of a value in YAML, e.g. "1.5 m"."""
         return f"1.5 {next(iter(UNITS[self.dimension]))}"
 
     @property
     def description(self) -> str:
-        """Description for editors."""
+        """Description of the field for the JSON schema."""
         return f"{self.dimension}, e.g. {self.example}"
 
     @property
@@ -69,11 +71,14 @@ class Quantity:
         return f"an {self.dimension}" if self.dimension[0] in "aeiou" else f"a {self.dimension}"
 
     def parse(self, value: Any) -> Any:
-        """Convert text such as "90 deg" to SI units; return other values unchanged."""
+        """Convert text such as "90 deg" to SI units; return any other value unchanged.
+
+        Raises PydanticCustomError for text without a number, or with a unit of another dimension.
+        """
         if not isinstance(value, str):
             return value
         units = UNITS[self.dimension]
-        match = NUMBER_AND_UNIT.fullmatch(value)
+        match = NUMBER_AND_UNIT_PATTERN.fullmatch(value)
         if match and match[2] in units:
             return float(match[1]) * units[match[2]]
         if match and any(match[2] in others for others in UNITS.values()):
@@ -90,9 +95,9 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnyQuantity:
-    """Annotation of a float in SI units whose dimension depends on another field of the same specification.
+    """Annotation of a float whose dimension depends on another field. It adds all units to the JSON schema.
 
-    It only adds units to the JSON schema. The specification with the field must convert text itself (`si_number`).
+    The specification with the field must convert text by `si_number`.
     """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -105,10 +110,10 @@ class AnyQuantity:
 
 
 class WholeQuantity(Quantity):
-    """Annotation of an integer that is a physical quantity in whole SI units."""
+    """Annotation of an integer with a physical dimension, in SI units."""
 
     def parse(self, value: Any) -> Any:
-        """Convert text such as "240 Hz" to 240; a fraction stays a float, which pydantic rejects."""
+        """Convert text such as "240 Hz" to an integer. A fraction stays a float, which validation rejects."""
         number = super().parse(value)
         return int(number) if isinstance(value, str) and number.is_integer() else number
 
@@ -140,12 +145,12 @@ Force = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("force")]
 Impulse = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("impulse")]
 Ratio = Annotated[float, Field(ge=0), Quantity("ratio")]
 Friction = Annotated[float, Field(ge=0, le=2), Quantity("ratio")]
-"""Friction coefficient of a surface and a rubber wheel: 1 on dry concrete, 0.3 on a wet floor, 0.1 on oil or ice."""
+"""Friction coefficient of a rubber wheel on a surface: 1 on dry concrete, 0.3 on a wet floor, 0.1 on oil or ice."""
 Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
 
 
 class Amount(NamedTuple):
-    """A number and its unit, which is "" if none is given."""
+    """Number and its unit; "" for a number without a unit."""
 
     number: float
     unit: str = ""
@@ -153,7 +158,7 @@ class Amount(NamedTuple):
 
 @dataclass(frozen=True)
 class _ParsedAmount:
-    """Annotation of an Amount of any dimension, given as a number or as text."""
+    """Annotation of an Amount that is given as a number or as text."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(_parse_amount)
@@ -163,12 +168,14 @@ class _ParsedAmount:
 
 
 AnyAmount = Annotated[Amount, _ParsedAmount()]
+"""Amount of any dimension."""
 
 
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
-    """Return the numbers in a common unit, and the unit: that of all amounts if it is the same, otherwise "" for SI.
+    """Return the amounts as numbers in one unit, and this unit.
 
-    Raises ValueError if their dimensions differ.
+    The unit is that of the amounts if they all have the same, otherwise "" for the SI unit. Raises ValueError if their
+    dimensions differ.
     """
     units = {amount.unit for amount in amounts}
     if len(units) == 1:
@@ -182,7 +189,7 @@ def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]
 
 def si_number(value: Any) -> Any:
     """Convert text such as "50 cm" to a number in SI units; return any other value unchanged."""
-    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         return value
     scales = [units[match[2]] for units in UNITS.values() if match[2] in units]
@@ -194,7 +201,7 @@ def _parse_amount(value: Any) -> Amount:
         if not math.isfinite(value):
             raise PydanticCustomError("finite_number", "must be a finite number")
         return Amount(float(value))
-    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     if match and any(match[2] in known for known in UNITS.values()) and math.isfinite(float(match[1])):
         return Amount(float(match[1]), match[2])
     found = f"the text `{value}`" if isinstance(value, str) else "something else"

@@ -1,12 +1,12 @@
-"""Registry of the types that files can use by name: shipped types, and types that installed packages add.
+"""Registry of the types of components that YAML files can use by name, such as planners and criteria.
 
-A package adds a type by an entry point in a group `simscen.<kind>` whose value is the address of a specification:
+simscen ships types. An installed package adds a type, called a plugin, by an entry point. Its value is the address of a
+specification class:
 
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"
 
-Searching the installed packages takes 30 ms (importlib.metadata), so it is done once, and only if a file uses a name
-that simscen does not ship, or if all names are requested. A package is imported when a file uses one of its types.
+A package is imported when a file uses one of its types.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel
 
-PREFIX = "simscen."
+ENTRY_POINT_PREFIX = "simscen."
+"""Beginning of the names of entry point groups, e.g. "simscen.criterion" for the group "criterion"."""
 _BASE_CLASSES = ("simscen.spec.base:Spec", "simscen.spec.base:Value")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 _ADDRESS = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
@@ -36,15 +37,14 @@ _ADDRESS = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
 
 @dataclass(frozen=True)
 class Group:
-    """Kind of types that packages can add, such as criteria.
-
-    `base` is the address of the base class of all specifications of the group. `shipped` is the address of the shipped
-    types: a Choice, or a mapping of names to "module:Class". `reserved` names have another meaning in files.
-    """
+    """Group of types, such as criteria. Addresses have the form "module:name"."""
 
     base: str
-    shipped: str = ""
+    """Address of the base class of all specifications of the group."""
+    shipped: str
+    """Address of the shipped types: a Choice, or a dict of addresses by name."""
     reserved: tuple[str, ...] = ()
+    """Names that plugins cannot have, because YAML files use them as keys."""
 
 
 GROUPS: dict[str, Group] = {
@@ -69,25 +69,25 @@ GROUPS: dict[str, Group] = {
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
     "metric": Group("simscen.criteria.base:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
-"""All groups by kind. The name of a group of entry points is `simscen.<kind>`."""
+"""All groups by name."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Type that files can use: its group, name, and the address of its specification, `value` = "module:Class".
-
-    `distribution` and `version` are those of the package that adds the type; "" for a shipped type. `problem` is the
-    reason why the type cannot be used, as far as it is known without an import; "" if there is none.
-    """
+    """Registered type, shipped or from an installed package."""
 
     group: str
     name: str
     value: str
+    """Address "module:Class" of the specification class."""
     distribution: str = ""
+    """Name of the package that adds the type; "" for a shipped type."""
     version: str = ""
+    """Version of this package; "" for a shipped type."""
     problem: str = ""
+    """Reason why the type cannot be used, found without importing the package; "" if there is none."""
     folder: str = ""
-    """Folder of the search path in which the package is installed."""
+    """Folder in which the package is installed; "" for a shipped type."""
 
     @property
     def is_shipped(self) -> bool:
@@ -96,7 +96,7 @@ class Entry:
 
     @property
     def origin(self) -> str:
-        """Package and version for messages, e.g. "headway 1.2"."""
+        """Package and version for messages, e.g. "headway 1.2"; "simscen" for a shipped type."""
         return f"{self.distribution} {self.version}".strip() or "simscen"
 
     def load(self) -> type[BaseModel]:
@@ -107,7 +107,7 @@ class Entry:
 
 
 class BrokenPlugin(Exception):
-    """A type of an installed package cannot be used. `why` is the reason; `hint` says how to find out more."""
+    """A type of an installed package cannot be used. `why` is the reason, `hint` the next step for the user."""
 
     def __init__(self, entry: Entry, why: str, hint: str = "") -> None:
         self.entry, self.why = entry, why
@@ -116,11 +116,8 @@ class BrokenPlugin(Exception):
 
 
 def shipped(group: str) -> tuple[Entry, ...]:
-    """Return the shipped types of a group, in the order of `Group.shipped`."""
-    address = GROUPS[group].shipped
-    if not address:
-        return ()
-    types = _resolve(address)
+    """Return the shipped types of a group."""
+    types = _import_address(GROUPS[group].shipped)
     values: dict[str, str] = types if isinstance(types, dict) else types.addresses()
     return tuple(Entry(group, name, value) for name, value in values.items())
 
@@ -130,26 +127,35 @@ def installed(group: str) -> tuple[Entry, ...]:
     return tuple(entry for entry in _installed_entries() if entry.group == group)
 
 
+def installed_specs(group: str) -> dict[str, type[BaseModel]]:
+    """Return the usable specification classes that installed packages add to a group, by name of the type."""
+    specs = {}
+    for entry in installed(group):
+        with contextlib.suppress(BrokenPlugin):
+            specs[entry.name] = entry.load()
+    return specs
+
+
 def entries(group: str) -> tuple[Entry, ...]:
-    """Return all types of a group: the shipped types, then the installed types with other names."""
+    """Return the shipped types of a group, then the types of installed packages with other names."""
     own = shipped(group)
     names = {entry.name for entry in own}
     return (*own, *(entry for entry in installed(group) if entry.name not in names))
 
 
 def find(group: str, name: str) -> Entry | None:
-    """Return the type with this name, or None. Packages are only searched if no shipped type has the name."""
+    """Return the type with this name; None if there is none. Shipped types have priority."""
     own = next((entry for entry in shipped(group) if entry.name == name), None)
     return own or next((entry for entry in installed(group) if entry.name == name), None)
 
 
 def unknown_groups() -> tuple[Entry, ...]:
-    """Return the entry points of packages in groups `simscen.…` that do not exist, probably because of a typo."""
+    """Return the entry points of installed packages in groups `simscen.…` that do not exist."""
     return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
 
 
 def entries_of(spec: type) -> tuple[Entry, ...]:
-    """Return the entries of installed packages whose specification is this class; () if simscen ships the class."""
+    """Return the types of installed packages whose specification is this class; () if simscen ships the class."""
     package = spec.__module__.partition(".")[0]
     if package == "simscen":
         return ()
@@ -170,13 +176,13 @@ def _has_spec(entry: Entry, spec: type) -> bool:
 
 @cache
 def _installed_entries() -> tuple[Entry, ...]:
-    """Return all entry points in groups of simscen, sorted by group, name, and package."""
+    """Return all types of installed packages, sorted by group, name, and package."""
     found = sorted(set(_read_entries()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
     return tuple(replace(entry, problem=entry.problem or _entry_problem(entry, found)) for entry in found)
 
 
 def _read_entries() -> Iterator[Entry]:
-    """Yield the entry points of all importable packages; for several with the same name, only those of the first."""
+    """Yield the types of all packages on the search path. Of several packages with one name, only the first counts."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
@@ -196,23 +202,22 @@ def _read_entries() -> Iterator[Entry]:
             yield Entry("", "", "entry_points.txt", *owner, f"its entry_points.txt is damaged: {error}", folder)
             continue
         for group, point, value in points:
-            if group.startswith(PREFIX):
-                yield Entry(group.removeprefix(PREFIX), point, value, *owner, folder=folder)
+            if group.startswith(ENTRY_POINT_PREFIX):
+                yield Entry(group.removeprefix(ENTRY_POINT_PREFIX), point, value, *owner, folder=folder)
 
 
 def _mentions_simscen(package: Distribution) -> bool:
-    """Return whether a package can have entry points for simscen, even if its file is not valid UTF-8."""
+    """Return whether the entry points of a package mention simscen. This reads only one file."""
     try:
-        return PREFIX in (package.read_text("entry_points.txt") or "")
+        return ENTRY_POINT_PREFIX in (package.read_text("entry_points.txt") or "")
     except UnicodeDecodeError as error:
-        return PREFIX.encode() in error.object
+        return ENTRY_POINT_PREFIX.encode() in error.object
 
 
 def search_path() -> list[str]:
-    """Return the search path of modules without the two folders that Python adds by itself.
+    """Return sys.path without the working directory and the folder of the program, unless PYTHONPATH names them.
 
-    These are the working directory and the folder of the program. Without them, a dist-info folder next to scenarios
-    cannot run code.
+    A dist-info folder next to scenarios must not run code.
     """
     program = getattr(sys.modules.get("__main__"), "__file__", None)
     implicit = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
@@ -222,10 +227,10 @@ def search_path() -> list[str]:
 
 
 def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
-    """Return why an entry cannot be used, as far as it is known without an import; "" if there is no reason."""
+    """Return the reason why a type cannot be used, found without importing its package; "" if there is none."""
     group = GROUPS.get(entry.group)
     if group is None:
-        return f"there is no group `{PREFIX}{entry.group}`"
+        return f"there is no group `{ENTRY_POINT_PREFIX}{entry.group}`"
     if not _NAME.fullmatch(entry.name):
         return "its name must start with a lowercase letter and consist of lowercase letters, digits, and `_`"
     if entry.name in group.reserved:
@@ -242,6 +247,7 @@ def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
 
 @cache
 def _load(entry: Entry) -> type[BaseModel]:
+    """Import and return the specification class of a type. Raises BrokenPlugin."""
     module, _, name = entry.value.partition(":")
     try:
         # Output of a module during import must not get into output that programs read.
@@ -259,12 +265,12 @@ def _load(entry: Entry) -> type[BaseModel]:
 
 
 def _specification_problem(entry: Entry, model: Any) -> str | None:
-    """Return why an imported object is not a valid specification of its group, or None."""
+    """Return the reason why `model` is not a valid specification class of the group; None if it is valid."""
     if model is None:
         return f"`{entry.value}` does not exist"
-    if not isinstance(model, type) or not issubclass(model, tuple(map(_resolve, _BASE_CLASSES))):
+    if not isinstance(model, type) or not issubclass(model, tuple(map(_import_address, _BASE_CLASSES))):
         return f"`{entry.value}` is not a subclass of simscen.plugin.Spec or simscen.plugin.Value"
-    base = _resolve(GROUPS[entry.group].base)
+    base = _import_address(GROUPS[entry.group].base)
     if not issubclass(model, base):
         return f"`{entry.value}` is not a subclass of simscen.plugin.{base.__name__}"
     if inspect.isabstract(model):
@@ -274,6 +280,7 @@ def _specification_problem(entry: Entry, model: Any) -> str | None:
     return f"`{entry.value}`: {problem}" if problem else None
 
 
-def _resolve(address: str) -> Any:
+def _import_address(address: str) -> Any:
+    """Import and return the object with the address "module:name"."""
     module, _, name = address.partition(":")
     return getattr(import_module(module), name)

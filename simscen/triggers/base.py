@@ -108,7 +108,8 @@ class AnyCondition(Choice):
         assert isinstance(condition, Condition)
         result: object = condition.holds(now)
         if not isinstance(result, bool | np.bool_):
-            raise RunError(BROKEN_COMPONENT, f"a condition returned {result!r} instead of True or False{self.added_by}")
+            message = f"a condition returned {result!r} instead of True or False{self.plugin_suffix}"
+            raise RunError(BROKEN_COMPONENT, message)
         return bool(result)
 
 

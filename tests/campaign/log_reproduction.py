@@ -23,7 +23,7 @@ import yaml
 from simscen.core.errors import SimscenError
 from simscen.core.records.verdict import Status
 from simscen.judge.run_result import judge_run
-from simscen.loading.scenario_text import spec_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 from simscen.record.log_reader import Log, read_log
 
@@ -100,7 +100,7 @@ def simscen_run(scenarios: Path, out: Path, root: Path) -> None:
 
 def failed_criteria(log: Log, judged_as: Log) -> set[str]:
     """Return the criteria of one log's scenario that fail in another log."""
-    spec = spec_of_text(judged_as.header.scenario, "scenario.yaml")
+    spec = criteria_of_text(judged_as.header.scenario, "scenario.yaml", {})
     case = replace(log.header.case, regions=judged_as.header.case.regions, disturbances=())
     result = judge_run(log.header.key, "", spec.pass_, log.trace, case)
     return {verdict.criterion for verdict in result.verdicts if verdict.status is Status.FAIL}

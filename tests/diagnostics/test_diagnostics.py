@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.diagnostics import as_text
-from simscen.loading.scenario import try_scenario
+from tests.scenario_files import try_scenario
 
 HERE = Path(__file__).parent
 CASES = sorted(HERE.glob("*.scenario.yaml"))

@@ -14,7 +14,7 @@ from mutate import mutant
 from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
-from simscen.loading.scenario_text import spec_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader import read_run
 from simscen.record.log_recovery import recover
 from simscen.record.mcap_reader import RecordReader
@@ -89,7 +89,7 @@ def read_log(path: Path) -> list[Problem]:
     with contextlib.suppress(InvalidInput):
         recover(path)
     read = read_run(path)
-    spec = spec_of_text(read.header.scenario, str(path))
+    spec = criteria_of_text(read.header.scenario, str(path), {})
     verdicts = judge(spec.pass_, read.trace, read.header.case)
     assert isinstance(verdicts, tuple)
     return []

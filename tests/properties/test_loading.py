@@ -14,9 +14,9 @@ from simscen.cli.diagnostics import as_text
 from simscen.core.errors import Problem, UsageError
 from simscen.loading.keywords import keyword_matcher
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import try_scenario
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.report.display_text import escape_control
+from tests.scenario_files import try_scenario
 
 SCENARIO = """\
 simscen: 1

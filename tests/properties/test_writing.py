@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from simscen.loading.files.single_files import world_text
 from simscen.loading.scenario import load_scenario
-from simscen.loading.scenario_text import resolved_text, spec_of_text
+from simscen.loading.scenario_text import resolved_text
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.scalars import to_yaml
 from simscen.loading.yaml.textfile import read_text
 from simscen.model.world import WorldSpec
+from tests.scenario_files import spec_of_text
 
 ODD = [
     *("1e3", "on", "off", "yes", "0o7", "017", "0x1f", "1:30", "12:30:45", "1_000", ".5", ".inf", ".nan", "null", "~"),

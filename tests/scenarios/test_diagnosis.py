@@ -7,7 +7,7 @@ import pytest
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
-from simscen.loading.scenario_text import spec_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader import read_log
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
@@ -78,6 +78,6 @@ def test_cause_is_reported_first_in_run_and_judge(name, tmp_path):
 
 def again(log: Path, result) -> str:
     read = read_log(log)
-    criteria = spec_of_text(read.header.scenario, "log").pass_
+    criteria = criteria_of_text(read.header.scenario, "log", {}).pass_
     lines = result.lines[-len(criteria) :]
     return to_json(judge_run(result.key, result.path, criteria, read.trace, read.header.case, lines))

@@ -14,7 +14,7 @@ from simscen.core.records.trace import Moment
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
-from simscen.loading.scenario_text import spec_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 from simscen.run.preparation import prepare
@@ -213,7 +213,7 @@ def test_log_with_invalid_readings_is_judged_with_the_same_result(tmp_path, faul
     file.write_text(f"{ROOM}time_limit: 4 s\nfaults:\n{faults}{criteria}")
     run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    written = spec_of_text(log.header.scenario, file.name).pass_
+    written = criteria_of_text(log.header.scenario, file.name, {}).pass_
     again = judge_run(run.result.key, run.result.path, written, log.trace, log.header.case, run.result.lines)
     assert to_json(again) == to_json(run.result)
     assert first_difference(run.trace, log.trace) is None

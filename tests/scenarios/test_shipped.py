@@ -12,7 +12,7 @@ import pytest
 from simscen.judge import several_robots
 from simscen.judge.result_json import read_result, to_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.scenario_text import criteria_of_text, spec_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 
@@ -79,7 +79,7 @@ def test_run_replay_and_judge_give_the_same_verdicts(together, every: int):
 def judged_again(live, log, name):
     """The result by what the log says alone; of several robots from those of each."""
     if not log.robots:
-        criteria = spec_of_text(log.header.scenario, name).pass_
+        criteria = criteria_of_text(log.header.scenario, name, {}).pass_
         return judge_run(live.key, live.path, criteria, log.trace, log.header.case, live.lines)
     results, lines = {}, list(live.lines)
     for robot, one in log.robots.items():

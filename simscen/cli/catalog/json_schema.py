@@ -13,9 +13,9 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.stack_files import StackFileSpec, UserConfigSpec
 from simscen.model.world import WorldSpec
-from simscen.spec import extensible_union
-from simscen.spec.choice import Choice, installed_choices, with_installed_choices
+from simscen.spec.choice import Choice, with_installed_choices
 from simscen.spec.extensible_union import GROUP_KEY, MAPPINGS_ALLOWED_KEY, NAMES_ALLOWED_KEY
+from simscen.spec.registry import installed_specs
 
 Schema = dict[str, Any]
 
@@ -133,15 +133,16 @@ class _InstalledTypesGenerator(_Generator):
         result, model = super().model_schema(schema), schema["cls"]
         if not issubclass(model, Choice) or with_installed_choices(model) is model:
             return result
-        for key, choice in installed_choices(model).items():
+        added = installed_specs(model.group)
+        for key, choice in added.items():
             result["properties"][key] = self.generate_inner(
                 core_schema.nullable_schema(choice.__pydantic_core_schema__)
             )
-        return {**result, **_exactly_one(model, [*model.choices(), *installed_choices(model)])}
+        return {**result, **_exactly_one(model, [*model.choices(), *added])}
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
         result, metadata = super().function_wrap_schema(schema), schema.get("metadata", {})
-        models = dict(extensible_union.installed_specs(metadata[GROUP_KEY])) if GROUP_KEY in metadata else {}
+        models = installed_specs(metadata[GROUP_KEY]) if GROUP_KEY in metadata else {}
         more: list[Schema] = [
             self._named(name, model) for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY]
         ]

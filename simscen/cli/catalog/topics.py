@@ -38,9 +38,9 @@ from simscen.model import (
 from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
 from simscen.model.stack_base import SpeedZone
 from simscen.model.world import RosMapSpec
-from simscen.spec import extensible_union, registry
+from simscen.spec import registry
 from simscen.spec.base import LazySpec, annotation_of, field_docs
-from simscen.spec.choice import Choice, installed_choices
+from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec, SpeedMask
 from simscen.spec.quantities import UNITS, Quantity
@@ -321,19 +321,15 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
 
 
 def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
-    """Yield the topics of the usable choices that installed packages add, or nothing if not `installed`."""
-    if not installed:
-        return
-    origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
-    for key, model in installed_choices(choice).items():
-        yield replace(_topic(choice.group, key, model), origin=origins[key])
+    """Return the topics of the usable choices that installed packages add, or nothing if not `installed`."""
+    return _installed_types(choice.group, installed)
 
 
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
     """Yield the topics of the usable types of a group that installed packages add, or nothing if not `installed`."""
     if installed:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
-        for name, model in extensible_union.installed_specs(group):
+        for name, model in registry.installed_specs(group).items():
             yield replace(_topic(group, name, model), origin=origins[name])
 
 

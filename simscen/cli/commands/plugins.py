@@ -13,7 +13,7 @@ import typer
 
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.core.errors import Exit
-from simscen.spec.registry import GROUPS, PREFIX, BrokenPlugin, Entry, installed, unknown_groups
+from simscen.spec.registry import ENTRY_POINT_PREFIX, GROUPS, BrokenPlugin, Entry, installed, unknown_groups
 
 INDENT = 6
 """Columns before the description of a type."""
@@ -71,7 +71,7 @@ def _first_sentence(text: str) -> str:
 
 def _text(listed: list[dict[str, Any]]) -> str:
     if not listed:
-        return f"no plug-ins: no installed package has entry points in a group `{PREFIX}…`"
+        return f"no plug-ins: no installed package has entry points in a group `{ENTRY_POINT_PREFIX}…`"
     lines = []
     for (package, version, folder), rows in groupby(
         listed, lambda row: (row["package"], row["version"], row["folder"])

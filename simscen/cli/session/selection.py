@@ -160,7 +160,7 @@ def load_selection(
         variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
         if choice is not None and file not in named and (reason := impossible_with(choice, found)):
             variations, found = checker.check_scenario(file, None, selection.variation_numbers)
-            variations = [one.skipped(choice, reason) for one in variations]
+            variations = [one.as_skipped(choice, reason) for one in variations]
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)

@@ -18,9 +18,9 @@ from simscen.loading.reduction import (
     MAX_DIGITS,
     UNNEEDED_KEYS,
     Rounding,
+    find_roundings,
     max_depth,
     removable_parts,
-    roundings,
     with_roundings,
     with_seed,
     with_values,
@@ -233,7 +233,7 @@ class Shrinker:
     def _round(self) -> None:
         """Round numbers to as few digits as possible."""
         for digits in range(1, MAX_DIGITS + 1):
-            before, changes = self.tree, roundings(self.tree, digits)
+            before, changes = self.tree, find_roundings(self.tree, digits)
 
             def build(
                 exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before

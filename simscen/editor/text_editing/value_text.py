@@ -7,7 +7,7 @@ import textwrap
 from typing import Any
 
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.spec.quantities import NUMBER_AND_UNIT, UNITS, si_number
+from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, UNITS, si_number
 
 LINE_WIDTH = 120
 """Maximum length of the lines of a folded text (`>`), in characters."""
@@ -65,7 +65,7 @@ def replacement_text(value: Any, old: str, style: str) -> str:
 
 def quantity_text(value: float, old: str) -> str:
     """Return a number in SI units as text with the unit and the decimal places of the text `old`, e.g. "1.50 m"."""
-    match = NUMBER_AND_UNIT.fullmatch(old)
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(old)
     scale = _scale(_unit(old))
     if match is None or not scale:
         plain = _PLAIN_NUMBER.fullmatch(old.strip())
@@ -119,7 +119,7 @@ def string_text(text: str) -> str:
 
 def _unit(text: str) -> str:
     """Return the unit of a text such as "2.5 m"; "" if it has no unit or an unknown one."""
-    match = NUMBER_AND_UNIT.fullmatch(text)
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(text)
     return match[2] if match and _scale(match[2]) else ""
 
 

@@ -250,9 +250,9 @@ def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -
     except MissingEvidence as missing:
         return str(missing)
     except Exception as error:  # a plugin can raise anything
-        raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.added_by}") from error
+        raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.plugin_suffix}") from error
     if isinstance(found, str) and found:
         return found
     if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
-        raise InvalidTrace(f"metric {entry.kind} is not a finite number: {found!r}{entry.added_by}")
+        raise InvalidTrace(f"metric {entry.kind} is not a finite number: {found!r}{entry.plugin_suffix}")
     return float(found)

@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import depth_inside_polygon, separation_from_boxes
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
-from simscen.loading.builders import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
+from simscen.loading.builders import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, load_criterion_masks, load_masks
 from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     WORLD,
@@ -54,7 +54,7 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
     ]
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None:
-        zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
+        zones.append((KEEPOUT_MASK_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
         for goal_keys, goal in scene.targets:
             if forbids(goal.pose, MIN_DEPTH_M):
@@ -88,9 +88,9 @@ def masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
     """Find masks of the stack that forbid or limit nothing."""
     masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
-        yield CheckProblem(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
+        yield CheckProblem(KEEPOUT_MASK_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
     if masks.speed is not None and not masks.speed.has_limits:
-        yield CheckProblem(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
+        yield CheckProblem(SPEED_MASK_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
 
 
 @WORLD.check("SC311", severity="warning")
@@ -101,7 +101,7 @@ def partly_occupied_mask_cells(scene: Scene) -> Iterator[CheckProblem]:
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
         if count:
             message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
-            yield CheckProblem(KEEPOUT_KEYS, message)
+            yield CheckProblem(KEEPOUT_MASK_KEYS, message)
 
 
 @WORLD.check("SC055", severity="warning")
@@ -113,7 +113,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
                 yield CheckProblem(("pass", index, "keepout", "mask"), message)
-            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).has_limits:
+            case Speed(mask=spec) if spec is not None and not spec.speed_limits(masks[spec.file].grid).has_limits:
                 yield CheckProblem(
                     ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
                 )

@@ -14,7 +14,8 @@ from pydantic.fields import FieldInfo
 from simscen.loading.yaml.tree import Key
 from simscen.spec.base import LazySpec, annotation_of
 from simscen.spec.choice import Choice, with_installed_choices
-from simscen.spec.extensible_union import ExtensibleUnion, installed_specs
+from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.registry import BrokenPlugin, installed_specs
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
@@ -64,8 +65,6 @@ def field_type(model: type[BaseModel], key: str) -> Any:
 
 def _type_of(field: FieldInfo) -> Any:
     """Return the type of a field; None if its package cannot be imported."""
-    from simscen.spec.registry import BrokenPlugin
-
     if mark := next((mark for mark in field.metadata if isinstance(mark, ExtensibleUnion)), None):
         return Annotated[field.annotation, mark]
     try:
@@ -79,7 +78,7 @@ def _union_members(kind: Any) -> list[Any]:
     if mark := _extensible_union(kind):
         return [
             *_union_members(mark.shipped_union),
-            *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group)),
+            *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group).items()),
         ]
     unwrapped = _unwrapped(kind)
     if get_origin(unwrapped) in (Union, UnionType):

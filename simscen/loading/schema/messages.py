@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from simscen.loading.yaml.textfile import lookalike_hint
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
-from simscen.spec.places import NAMESPACE
+from simscen.spec.places import ROS_NAMESPACE_PATTERN
 
 _KINDS = {
     "model_type": "a mapping",
@@ -173,6 +173,6 @@ def _invalid_name(node: Node, pattern: str) -> Message:
     if control is not None:
         return Message("SC017", f"control character U+{ord(control):04X} in {quoted(value)}", "remove it")
     hint = "start with a letter or `_`, then use letters, digits, spaces, `_`, `.` and `-`"
-    if pattern == NAMESPACE:
+    if pattern == ROS_NAMESPACE_PATTERN:
         hint = "it is also a ROS namespace: start with a letter, then use letters, digits, and single `_` between them"
     return Message("SC017", f"{quoted(value)} is not a valid name", hint)

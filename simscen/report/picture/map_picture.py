@@ -14,7 +14,6 @@ from simscen.report.picture import event_layer, palette, path_layer, world_layer
 from simscen.report.picture.canvas import (
     LABEL_CELL_PX,
     Canvas,
-    DrawnPart,
     TextItem,
     draw_text,
     font,
@@ -76,11 +75,6 @@ def draw_map_picture(scene: Scene) -> Image.Image:
     write_coordinates(pen, canvas, left, top)
     _draw_header(image, scene)
     return image
-
-
-def drawn_parts(scene: Scene) -> list[DrawnPart]:
-    """Return the list of what is drawn on the map, without the header and the sidebar."""
-    return _map_canvas(scene).parts
 
 
 def write_picture(scene: Scene, path: Path) -> None:

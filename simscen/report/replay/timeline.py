@@ -15,7 +15,7 @@ from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.registry import verdict_names
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
 from simscen.judge.several_robots import WORLD_EVENT_PREFIXES
-from simscen.loading.scenario_text import parts_of_text
+from simscen.loading.scenario_text import criteria_and_tree
 from simscen.loading.yaml.tree import Key, MappingNode, key_position
 from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
@@ -235,7 +235,7 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
     if not text:
         return SourceLines(), None
     try:
-        spec, tree = parts_of_text(text, "scenario.yaml", robot)
+        spec, tree = criteria_and_tree(text, "scenario.yaml", robot)
     except InvalidInput:
         return SourceLines(), None
     names = verdict_names(spec.pass_)

@@ -226,7 +226,7 @@ class FaultInjector:
 
     def _raise_invalid(self, index: int, problem: str) -> NoReturn:
         entry = self._faults[index]
-        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.added_by}")
+        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.plugin_suffix}")
 
     def _count(self, active: _ActiveFault) -> None:
         """Count a change by a fault, and emit an event for the first change."""

@@ -53,7 +53,8 @@ def _disturb_map(
     if not isinstance(disturbed, OccupancyGrid):
         raise RunError(
             BROKEN_COMPONENT,
-            f"fault `{entry.label}` returned an object of type {type(disturbed).__name__} for a map{entry.added_by}",
+            f"fault `{entry.label}` returned an object of type {type(disturbed).__name__} for a map"
+            f"{entry.plugin_suffix}",
         )
     return disturbed
 

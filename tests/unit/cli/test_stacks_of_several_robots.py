@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.session.selection import Selection, load_selection
-from simscen.loading.scenario_text import resolved_text, spec_of_text
+from simscen.loading.scenario_text import resolved_text
 from simscen.run.reproducibility import scenario_digests
+from tests.scenario_files import spec_of_text
 
 HEAD = """\
 simscen: 1

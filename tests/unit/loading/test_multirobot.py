@@ -4,7 +4,8 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.loading.checks.scene_runner import check_in_world
-from simscen.loading.scenario import load_scenario, try_scenario
+from simscen.loading.scenario import load_scenario
+from tests.scenario_files import try_scenario
 
 HEAD = """\
 simscen: 1

@@ -9,9 +9,10 @@ from simscen.core.errors import Problem
 from simscen.loading.files.criteria_file import load_criteria
 from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import load_scenario, try_scenario
-from simscen.loading.scenario_text import criteria_of_text, resolved_text, spec_of_text
+from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import criteria_of_text, resolved_text
 from simscen.spec.places import PoseSpec
+from tests.scenario_files import spec_of_text, try_scenario
 
 Write = Callable[[str, str], Path]
 NEAR_DESK = "pass: [{always: {signal: distance_to, point: desk, op: '>=', value: 0.1}}]"

@@ -6,9 +6,9 @@ import pytest
 
 from simscen.loading.reduction import (
     changed_values,
+    find_roundings,
     removable_parts,
     removed_parts,
-    roundings,
     with_roundings,
     with_seed,
     with_values,
@@ -74,7 +74,7 @@ def test_values_are_changed_at_their_places() -> None:
 @pytest.mark.parametrize(("digits", "values"), [(1, {"90 %", "60 s"}), (2, {"93 %", "62 s"}), (3, {"93.1 %"})])
 def test_numbers_are_rounded_with_their_units(digits: int, values: set[str]) -> None:
     tree = parsed(TEXT)
-    found = roundings(tree, digits)
+    found = find_roundings(tree, digits)
     assert {one.value for one in found} == values
     rounded = with_roundings(tree, found)
     assert len(changed_values(tree, rounded)) == len(values)

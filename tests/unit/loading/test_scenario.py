@@ -5,7 +5,8 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import load_scenario, scenario_id, try_scenario
+from simscen.loading.scenario import load_scenario, scenario_id
+from tests.scenario_files import try_scenario
 
 Write = Callable[[str, str], Path]
 MAP = "image: floor.pgm\nresolution: 5 cm\norigin: [0, 0, 0.5]\n"

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import synthetic_drives as drives
 
-from simscen.loading.scenario_text import spec_of_text
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
 from simscen.reconstruction.objects.pedestrians import fit_pedestrians, is_person
 from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.scenario.scenario_text import _object
 from simscen.run.live_world.pedestrians import PedestrianMap
+from tests.scenario_files import spec_of_text
 
 
 def thing(path, size=(0.25,), name="moving object 1", begin=1.0, end=9.0):

@@ -17,7 +17,6 @@ from simscen.report.picture.map_picture import (
     _MARGIN_PX,
     HEADER_HEIGHT_PX,
     draw_map_picture,
-    drawn_parts,
     write_picture,
 )
 from simscen.report.picture.path_layer import round_time_step
@@ -99,7 +98,7 @@ def test_a_collision_has_a_red_star():
 
 def test_a_mark_has_a_flag_where_the_robot_was():
     marked = scene(events=[[7.5, "mark", "now"]])
-    assert dict(drawn_parts(marked))["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
+    assert dict(map_picture._map_canvas(marked).parts)["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
     assert near(pixel(draw_map_picture(marked), 4.53, 2.66), palette.AMBER)
     assert near(pixel(draw_map_picture(scene()), 4.5, 2.5), palette.time_color(0.75), 60), "the robot is there then"
 

@@ -18,7 +18,7 @@ from simscen.record.log_header import scenery_from_header
 from simscen.record.log_reader import read_log
 from simscen.report.picture import map_picture, sidebar
 from simscen.report.picture.canvas import LABEL_CELL_PX
-from simscen.report.picture.map_picture import draw_map_picture, drawn_parts
+from simscen.report.picture.map_picture import draw_map_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation import prepare
@@ -84,6 +84,11 @@ def everything(**changes):
         ),
     )
     return Scene(trace, case, room(), result, scenery)
+
+
+def drawn_parts(scene):
+    """The parts of the map, without the header and the sidebar."""
+    return map_picture._map_canvas(scene).parts
 
 
 def told(scene):

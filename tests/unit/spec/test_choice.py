@@ -8,14 +8,15 @@ from pydantic import ValidationError
 
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.stack import StackSpec
-from simscen.spec.choice import installed_choices, with_installed_choices
+from simscen.spec.choice import with_installed_choices
+from simscen.spec.registry import installed_specs
 
 
 def test_name_of_an_installed_package_is_a_valid_choice(calm) -> None:
     entry = AnyCriterion.model_validate({"calm": {"max": "0.5 m/s"}, "severity": "warn"}, by_alias=True, by_name=False)
     assert isinstance(entry, AnyCriterion)
     assert (entry.kind, entry.severity, entry.chosen.max) == ("calm", "warn", 0.5)
-    assert set(installed_choices(AnyCriterion)) == {"calm"}
+    assert set(installed_specs("criterion")) == {"calm"}
 
 
 def test_name_is_unknown_without_its_package() -> None:
@@ -48,7 +49,7 @@ def test_broken_package_is_reported_at_the_key_that_uses_it(packages) -> None:
     (error,) = output.value.errors()
     assert error["loc"] == ("calm",)
     assert error["msg"].startswith("criterion `calm` of calm 1.0 cannot be used: `calm:Calm` cannot be loaded: ")
-    assert installed_choices(AnyCriterion) == {}
+    assert installed_specs("criterion") == {}
 
 
 def test_installed_choice_can_be_copied_and_pickled(calm) -> None:

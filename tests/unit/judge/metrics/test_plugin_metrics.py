@@ -23,7 +23,7 @@ BEFORE = MetricValues({"spl": 1.0}, {"ldlj": "no motion"})
 class Measured:
     """A metric that returns or raises something."""
 
-    kind, added_by = "mine", " (my-package 1.0)"
+    kind, plugin_suffix = "mine", " (my-package 1.0)"
 
     def __init__(self, answer: object, evidence: frozenset[Evidence] | None = frozenset()) -> None:
         self.answer, self.evidence = answer, evidence

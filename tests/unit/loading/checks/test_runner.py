@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import Problem
-from simscen.loading.scenario import try_scenario
+from tests.scenario_files import try_scenario
 
 Write = Callable[[str, str], Path]
 Told = Callable[[str], list[Problem]]

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.errors import InvalidInput, NothingSelected
 from simscen.loading.files.discovery import default_root, discover
-from simscen.loading.scenario import try_scenario
+from tests.scenario_files import try_scenario
 
 SHIPPED = Path(__file__).parents[4]
 

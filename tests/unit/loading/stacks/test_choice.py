@@ -7,9 +7,10 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.loading.named_places import resolve_places
 from simscen.loading.scenario import load_scenario
-from simscen.loading.scenario_text import resolved_text, spec_of_text
+from simscen.loading.scenario_text import resolved_text
 from simscen.loading.stacks.choice import StackChoice, load_stack_file
 from simscen.model.stack import StackSpec
+from tests.scenario_files import spec_of_text
 
 ZONES = "stack: {keepout: [hall], speed_zones: [{region: hall, speed_limit: 0.2}], costmap: {inflation_radius: 1}}\n"
 

@@ -6,9 +6,9 @@ import pytest
 
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import try_scenario
 from simscen.model.stack import StackSpec
 from simscen.model.stack_files import ExternalStackSpec
+from tests.scenario_files import try_scenario
 
 Write = Callable[[str, str], Path]
 Load = Callable[[str], LoadedScenario | list[Problem]]
