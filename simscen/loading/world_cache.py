@@ -28,6 +28,8 @@ class WorldCache:
     `z_range`, two heights in m. The cache compares `solids` by identity.
     """
 
+    max_worlds: int = 100_000
+    """Largest number of worlds in the cache. The oldest worlds are discarded."""
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     """Worlds, and the files from which they were built."""
     _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
@@ -44,7 +46,7 @@ class WorldCache:
             with collect_read_files() as read:
                 world = load_world(loaded)
             known = loaded.world, world, read
-            self._worlds.append(known)
+            self._worlds = [*self._worlds, known][-self.max_worlds :]
         for file in sorted(known[2]):
             record_read_file(file)
         return known[1]

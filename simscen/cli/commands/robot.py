@@ -51,9 +51,7 @@ def check(
     try:
         failed = _check_and_print(file, robot, picture, as_json)
     except InvalidInput as error:
-        raise InvalidInput(
-            relative_to_working_folder(file.library.with_source_where_missing(error.problems), root_folder)
-        ) from error
+        raise InvalidInput(relative_to_working_folder(file.library.with_source(error.problems), root_folder)) from error
     if failed:
         sys.exit(Exit.FAILED)
 
@@ -67,7 +65,7 @@ def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_js
 
     spec, body = robot_from_file(file.robot, file.roots)
     library = file.library
-    notes = library.with_source_where_missing(geometry_warnings(file.robot, spec, body, file.roots))
+    notes = library.with_source(geometry_warnings(file.robot, spec, body, file.roots))
     notes = relative_to_working_folder(notes, library.sandbox.root)
     with engine_output_on_stderr():
         checked = check_robot(body)

@@ -76,4 +76,4 @@ def robot_problems(file: RobotFile) -> list[Problem]:
             found = []
     except InvalidInput as error:
         found = error.problems
-    return file.library.with_source_where_missing(found)
+    return file.library.with_source(found)

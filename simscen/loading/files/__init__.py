@@ -1,1 +1,1 @@
-"""Find and load the files that commands and scenarios name: scenarios, worlds, maps, robots, and criteria."""
+"""Files that commands and scenarios name: scenarios, worlds, maps, robots, and criteria."""

@@ -1,4 +1,4 @@
-"""Load the files that a scenario names: worlds, maps, robots, and filter masks."""
+"""Loading of the files that a scenario names: worlds, maps, robots, and filter masks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -28,37 +28,37 @@ Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 """Suffixes of the files of Gazebo worlds."""
 XML_STARTS = ("<?xml", "<sdf", "<!--")
-"""Beginnings of XML files, for example of SDF files with the suffix of another format."""
+"""Possible beginnings of XML files."""
 URDF_SUFFIXES = (".urdf", ".xacro")
-ROBOT_SUFFIX = ".robot.yaml"
-"""Suffix of the files of the robots that ship with simscen."""
+SHIPPED_ROBOT_SUFFIX = ".robot.yaml"
+"""Suffix of the files of robots that ship with simscen."""
 
 
 @dataclass
 class Assets:
-    """Loader of the files that a scenario names. Its methods add all problems to `problems`.
+    """Loader of the files that a scenario names. Its methods add problems to `problems`.
 
-    Methods return None if the file cannot be used, or if nothing is to be loaded. `written` is a name or a path as
-    written in the scenario, relative to the file that contains it; `position` is where it is written.
+    Methods return None if a file is unusable, or if there is nothing to load. `written` is a name or path in a YAML
+    file, and `position` is its position. Paths are relative to this YAML file.
     """
 
     library: Library
     problems: list[Problem] = field(default_factory=list)
 
     def world_of(self, world: WorldSpec | str | None, tree: MappingNode, file: Path) -> LoadedWorld | None:
-        """Load the world under the key `world` of the scenario `file`: the inline world, or the file that it names."""
+        """Load the world of the scenario `file`: the inline world, or the world file under the key `world`."""
         node = node_at(tree, ("world",))
         if isinstance(world, WorldSpec):
             return self.complete_world(world, node, file)
         return self.world(node) if isinstance(node, ScalarNode) else None
 
     def world(self, written: ScalarNode) -> LoadedWorld | None:
-        """Load the world in the file with this path."""
+        """Load the world in the file with the path `written`."""
         path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
-        """Load a world: an SDF file (recognized by its suffix), a ROS map (by its keys), or a world file of simscen."""
+        """Load the world in an SDF file, the YAML file of a ROS map, or a `*.world.yaml`."""
         if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         name = self.library.sandbox.display_name(path)
@@ -71,13 +71,13 @@ class Assets:
         if is_ros_map(tree):
             loaded = self._ros_map(tree, path)
             return LoadedWorld(path.stem, path, map=loaded) if loaded else None
-        spec = self._checked(WorldSpec, tree)
+        spec = self._validated(WorldSpec, tree)
         return self.complete_world(spec, tree, path) if spec and tree else None
 
     def complete_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """Load the map or SDF file that a simscen world extends, and replace names of places by poses.
+        """Return the world `spec` with its map and SDF file, and with poses instead of place names.
 
-        `tree` is the tree of `spec`, and `path` is the file that contains it: a world file, or a scenario.
+        `tree` is the YAML tree of `spec`. `path` is the file that contains it, a world file or a scenario.
         """
         before = len(self.problems)
         loaded_map = sdf = None
@@ -94,7 +94,7 @@ class Assets:
         return LoadedWorld(name, path, spec, loaded_map, sdf, mapping) if len(self.problems) == before else None
 
     def map(self, written: ScalarNode) -> LoadedMap | None:
-        """Load the ROS map in the YAML file with this path."""
+        """Load the ROS map in the YAML file with the path `written`."""
         path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
@@ -103,7 +103,7 @@ class Assets:
         return self._ros_map(self._read_tree(path), path)
 
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
-        """Load a robot from the file with this path, or a robot with this name that ships with simscen."""
+        """Load the robot in the file with the path `written`, or the robot with this name that ships with simscen."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
             path = self._find_file(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
@@ -115,7 +115,7 @@ class Assets:
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
-        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file; `bundled` means that it ships with simscen."""
+        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file. `bundled` robots ship with simscen."""
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
             text = read_text(path, self.library.sandbox.display_name(path))
@@ -124,7 +124,7 @@ class Assets:
                 return None
             return LoadedRobot(name, path, urdf=path)
         tree = self._read_tree(path)
-        spec = self._checked(RobotSpec, tree)
+        spec = self._validated(RobotSpec, tree)
         if spec is None or tree is None:
             return None
         urdf = self._find_file(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
@@ -139,7 +139,7 @@ class Assets:
         return LoadedRobot(name, path, spec, urdf, bundled, mapping, found)
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """Return `load(path)`. A file without problems is loaded once for all variations of a scenario."""
+        """Return `load(path)`, or the same object as before if the file has been loaded without problems."""
         key = getattr(load, "func", load).__name__, path
         if key in self.library.loaded:
             known: Loaded = self.library.loaded[key]
@@ -151,8 +151,8 @@ class Assets:
         return found
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
-        """Return the ROS map with this tree in the file `path`."""
-        spec = self._checked(RosMapSpec, tree)
+        """Return the ROS map with the YAML tree `tree` in the file `path`."""
+        spec = self._validated(RosMapSpec, tree)
         if spec is None or tree is None:
             return None
         image = self._find_file(spec.image, value_position(tree, ("image",)))
@@ -163,12 +163,13 @@ class Assets:
         )
 
     def _read_tree(self, path: Path) -> Node | None:
+        """Return the YAML tree of a file; None if it cannot be parsed."""
         tree, problems = self.library.read(path)
         self.problems += problems
         return tree
 
-    def _checked(self, model: type[Model], tree: Node | None) -> Model | None:
-        """Return the specification in a tree; None if the tree is None or invalid."""
+    def _validated(self, model: type[Model], tree: Node | None) -> Model | None:
+        """Return the specification in a YAML tree; None if the tree is None or invalid."""
         if tree is None:
             return None
         spec = check(model, tree)
@@ -192,6 +193,7 @@ class Assets:
         return found
 
     def _find_path(self, written: str, position: Position) -> Path | None:
+        """Return the existing file or folder with the path `written`."""
         found = self.library.sandbox.find(written, self.library.folder_of(position))
         if isinstance(found, PathProblem):
             self._add_problem(position, found.code, found.message, found.hint)
@@ -203,7 +205,7 @@ class Assets:
 
 
 def is_ros_map(tree: Node | None) -> bool:
-    """Return whether a YAML file is a ROS map (a file of map_server), and not a world file of simscen."""
+    """Return whether a YAML file is a ROS map, i.e. a file of map_server."""
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
@@ -225,7 +227,7 @@ def _ignored_key_warnings(tree: Node) -> list[Problem]:
 
 
 def _ignored_key_hint(key: str) -> str:
-    """Return "did you mean …?" if a key of a ROS map is similar; else that the key is ignored."""
+    """Return "did you mean …?" for a key that is similar to a key of ROS maps; else that it is ignored."""
     near = suggestion(key, RosMapSpec.model_fields)
     return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 
@@ -233,14 +235,15 @@ def _ignored_key_hint(key: str) -> str:
 def shipped_robots() -> dict[str, Path]:
     """Return the files of the robots that ship with simscen, by name."""
     folder = PACKAGE / "data" / "robots"
-    return {path.name.removesuffix(ROBOT_SUFFIX): path for path in sorted(folder.glob(f"*{ROBOT_SUFFIX}"))}
+    files = sorted(folder.glob(f"*{SHIPPED_ROBOT_SUFFIX}"))
+    return {path.name.removesuffix(SHIPPED_ROBOT_SUFFIX): path for path in files}
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Load the filter masks of the criteria under `pass`, by path as written; problems are added to `assets`.
+    """Load the filter masks of the criteria under `pass`, by path as written in the file. Add problems to `assets`.
 
-    Logs distinguish masks by these paths, so it is a problem if one path leads to two files. That is possible with
-    `pass+` in a scenario in another folder than the file that it extends.
+    It is a problem if one path leads to two files. This can happen with `pass+` if the scenario and the file that it
+    extends are in different folders.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):

@@ -1,4 +1,4 @@
-"""Copy a scenario, and the files that it names, to another folder."""
+"""Copies of a scenario and of the files that it names in another folder."""
 
 import shutil
 from collections.abc import Iterator
@@ -12,20 +12,19 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import Node, ScalarNode, nodes_with_keys
 
 _MODELINE = "# yaml-language-server:"
-"""Start of the comment that tells editors the path of the schema, which would be wrong in another folder."""
+"""Start of the comment with the path of the JSON schema for editors."""
 _SEARCHED_SUFFIXES = (".yaml", ".yml")
-"""Files in which names of further files are searched."""
+"""Suffixes of files in which the names of further files are searched."""
 _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
-"""Files that can name further files, but are not searched, so they cannot be copied."""
+"""Suffixes of files that can name further files, but are not searched. They are not copied."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
-    """Copy a scenario to the file `target` and return the paths of all copies.
+    """Copy a scenario to the file `target`, and return the paths of all copies. Paths in the copy are adapted.
 
-    The files that it names are copied to a folder next to `target`, called as `target` without suffixes. If `root`, the
-    root of `target`, is also the root of the scenario, they are not copied. The paths in the copied scenario are
-    adapted. The copy keeps the comments of the scenario, unless files that it extends are merged into it. Raises
-    UsageError if a file cannot be copied, or a copy exists already.
+    `root` is the root of `target`. If it is not the root of the scenario, the files that the scenario names are copied
+    to a folder next to `target`, with the name of `target` without suffixes. Raises UsageError if a file cannot be
+    copied, or a copy exists already.
     """
     text, tree = _text_of(loaded)
     folders = {file.parent for file in loaded.files.values()}
@@ -48,7 +47,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
 
 
 def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
-    """Return the text to copy, without the line that names the schema for editors, and its tree."""
+    """Return the scenario as one YAML text without the comment for editors, and its tree."""
     lines = unexpanded_text(loaded).split("\n")
     text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
     tree, _ = parse_yaml(text, loaded.path)
@@ -61,16 +60,16 @@ def _scalars(tree: Node) -> Iterator[ScalarNode]:
 
 
 def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
-    """Return the file whose path relative to one of the folders is the value of the leaf; None if there is none."""
+    """Return the existing file whose path relative to one of `folders` is the value of `leaf`; None without one."""
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
     return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
 
 
 def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Yield a file and the files that it names, recursively, except files in `known`.
+    """Yield a file, the files that it names, and so on, except files in `known`.
 
-    Raises UsageError for a file that may name further files, but is not searched.
+    Raises UsageError for a file that can name further files, but is not searched.
     """
     if file in known:
         return
@@ -86,7 +85,7 @@ def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iter
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
-    """Return the text with `path` instead of the value of the leaf."""
+    """Return the YAML text with `path` instead of the value of `leaf`."""
     lines = text.split("\n")
     line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""

@@ -1,4 +1,4 @@
-"""Load a file with criteria, by which logs are judged."""
+"""Files with criteria for the judgment of logs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,28 +19,27 @@ from simscen.model.scenario import CriteriaSpec
 
 @dataclass(frozen=True)
 class LoadedCriteria:
-    """Criteria of a file.
-
-    `lines` has the line of each criterion in `file`; 0 for criteria from a file that it extends. `masks` has the filter
-    masks of the criteria, by path as written. `library` is the reader of the file.
-    """
+    """Criteria of a file."""
 
     file: Path
     spec: CriteriaSpec
     lines: tuple[int, ...]
+    """Line of each criterion in `file`; 0 for a criterion from a file that it extends."""
     tree: MappingNode = field(repr=False)
+    """YAML tree of `file`, merged with the files that it extends."""
     library: Library = field(repr=False)
+    """Reader of these files."""
     masks: Mapping[str, CriterionMask] = field(default_factory=dict)
+    """Filter masks of the criteria, by path as written in the file."""
 
     def for_robot(self, robot: str) -> "LoadedCriteria":
-        """Return the criteria for a robot of a log; "" is the only robot of a log.
+        """Return the criteria for the robot of a log with this name; "" stands for the only robot of a log.
 
-        A file without `robots` applies to every robot. Raises InvalidInput if the robot is not in the `robots` of the
-        file.
+        A file without `robots` applies to all robots. Raises InvalidInput if `robots` does not contain the robot.
         """
         trees = multirobot.split_by_robot(self.tree)
         if robot in trees:
-            return _loaded(self.file, trees[robot], self.library)
+            return _load_tree(self.file, trees[robot], self.library)
         if not trees:
             return self
         unknown = f"the log has a robot {quoted(robot)}, which is not listed here"
@@ -49,7 +48,7 @@ class LoadedCriteria:
         raise InvalidInput(self.library.with_source([problem]))
 
     def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
-        """Load the world and the robot that the file names; None if it names none. Raises InvalidInput."""
+        """Load the world and the robot of the file; None for a missing world or robot. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
         world = assets.world_of(self.spec.world, self.tree, self.file)
         if self.spec.robot is not None:
@@ -62,7 +61,7 @@ class LoadedCriteria:
 def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
     """Load the criteria in the file `path`, merged with the files that it extends and with `defaults.yaml`.
 
-    Other files must lie in `root` or a folder of `world_path`. Raises InvalidInput with all problems.
+    All files must lie in `root` or in a folder of `world_path`. Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path))
     file = library.sandbox.resolve_argument(path)
@@ -75,11 +74,11 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
     spec = check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
-    return _loaded(file, tree, library)
+    return _load_tree(file, tree, library)
 
 
-def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
-    """Return the criteria in a tree of `file`. Raises InvalidInput, for example for unknown places or masks."""
+def _load_tree(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
+    """Return the criteria in the YAML tree of `file`. Raises InvalidInput, also for unknown places and masks."""
     spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))

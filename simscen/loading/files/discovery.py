@@ -1,4 +1,4 @@
-"""Find the files that the path arguments of a command select, and the default root."""
+"""Files that the path arguments of a command select, and the default root folder."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,21 +17,21 @@ STUDY_SUFFIXES = (".study.yaml", ".study.yml")
 STACK_SUFFIXES = (".stack.yaml", ".stack.yml")
 BASE_SUFFIXES = (".base.yaml", ".base.yml")
 SUFFIXES = SCENARIO_SUFFIXES + STUDY_SUFFIXES + WORLD_SUFFIXES + ROBOT_SUFFIXES + STACK_SUFFIXES + BASE_SUFFIXES
-"""Suffixes of all kinds of files in simscen's own language."""
+"""Suffixes of all kinds of YAML files of simscen."""
 
 REPOSITORY_FOLDERS = (".git", ".hg", ".jj", ".svn")
-"""Folders at the top of a repository."""
+"""Names of the folder of a version control system at the top of a repository."""
 PROJECT_FILES = ("pyproject.toml", "package.xml", "setup.py")
-"""Files at the top of a Python project or a ROS package. They mark the root of a copy without a repository."""
+"""Names of files at the top of a Python project or ROS package."""
 SCENARIOS_FOLDER = "scenarios"
 """Usual name of the folder with the scenarios of a project."""
 
 
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
-    """Return the files that `paths` select, absolute and sorted.
+    """Return the absolute paths of the files that `paths` select, sorted.
 
-    A file selects itself. A folder selects the files with one of `suffixes` in and below it. Raises InvalidInput for
-    missing paths, and for scenarios that would write to the same output folder. Raises NothingSelected if no file is
+    A file selects itself. A folder selects all files with one of `suffixes` in it and in its subfolders. Raises
+    InvalidInput for missing paths, and for scenarios with the same output folder. Raises NothingSelected if no file is
     selected.
     """
     problems = [problem for path in paths if (problem := _missing_path_problem(path))]
@@ -49,18 +49,18 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
 
 
 def sibling(file: Path, label: str) -> Path:
-    """Return the path of a scenario file next to `file`: `goal.minimal.scenario.yaml` for the label `minimal`."""
+    """Return the path of another scenario file next to `file`, e.g. `goal.minimal.scenario.yaml` for "minimal"."""
     suffixes = (*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)
     name = next((file.name.removesuffix(end) for end in suffixes if file.name.endswith(end)), file.stem)
     return file.with_name(f"{name}.{label}{SCENARIO_SUFFIXES[0]}")
 
 
 def default_root(paths: Iterable[Path]) -> Path:
-    """Return the folder of the project that contains all `paths`. Only names of files are considered.
+    """Return the folder of the project that contains all `paths`.
 
-    This is the first that exists of: the nearest parent with a repository; the nearest parent with a project file; the
-    parent of the nearest folder called `scenarios`; the working folder if it contains the paths; their common folder.
-    The root of the file system and the home folder only count if they have a repository or a project file.
+    This is the nearest parent that is a repository. If there is none, it is the nearest parent with a project file,
+    else the parent of the nearest folder `scenarios`, else the working folder if it contains the paths, else their
+    common folder.
     """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
@@ -79,7 +79,7 @@ def _contains_any(folder: Path, names: tuple[str, ...]) -> bool:
 
 
 def _is_too_wide(folder: Path) -> bool:
-    """Return whether a folder is too wide to be a project: `/`, the home folder or one of its parents."""
+    """Return whether a folder is `/`, the home folder, or a parent of the home folder."""
     return folder == folder.parent or Path(os.path.realpath(Path("~").expanduser())).is_relative_to(folder)
 
 
@@ -94,7 +94,7 @@ def _missing_path_problem(path: Path) -> Problem | None:
 
 
 def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:
-    """Yield the files that `path` selects; add a problem for each folder that cannot be searched."""
+    """Yield the files that `path` selects. Add a problem for each folder that cannot be searched."""
     if not is_folder(path):
         yield path
         return
@@ -113,9 +113,9 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
 
 
 def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield a problem for each scenario whose output folder would lie in the folder of a run of another scenario.
+    """Yield a problem for each scenario with an output folder inside the folder of a run of another scenario.
 
-    For example, the scenario `a/seed-1/b` would be written into the run with seed 1 of the scenario `a`.
+    For example, the scenario `a/seed-1/b` conflicts with the run of the scenario `a` with seed 1.
     """
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
@@ -132,10 +132,7 @@ def _display_name(file: Path, root: Path) -> str:
 
 
 def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield a problem for each scenario with the same id as another one.
-
-    Ids that differ only in case count as the same: some file systems cannot distinguish their output folders.
-    """
+    """Yield a problem for each scenario with the same id as another scenario, ignoring case."""
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)

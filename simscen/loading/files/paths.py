@@ -1,4 +1,4 @@
-"""Resolve paths inside files: they must be relative, and inside the root or a folder allowed on the command line."""
+"""Resolution of paths in YAML files. Paths must be relative, and lead into the root or a folder of --world-path."""
 
 import errno
 import os
@@ -14,16 +14,13 @@ from simscen.loading.yaml.textfile import os_error_reason
 MODEL_SCHEME = "model://"
 """Scheme of the URIs with which Gazebo names models."""
 
-_INVALID_IN_NAMES = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-"""Characters that the id of a scenario cannot contain, because it appears in names of folders and in XML.
-
-These are control and bidirectional characters, and the surrogates that stand for bytes that are not UTF-8 (PEP 383).
-"""
+_INVALID_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Characters that the id of a scenario cannot contain: control characters, bidirectional characters, and surrogates."""
 
 
 @dataclass(frozen=True)
 class PathSandbox:
-    """Folders from which a scenario may read files: `root`, and those of `--world-path`, searched in order."""
+    """Folders from which a scenario may read files: `root`, and the folders of `--world-path` in this order."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
@@ -34,11 +31,11 @@ class PathSandbox:
         return cls(_resolved(root), tuple(_resolved(folder) for folder in world_path))
 
     def find(self, written: str, folder: Path) -> "Path | PathProblem":
-        """Return the existing file or folder that the path `written` in a file in `folder` leads to, or a problem.
+        """Return the existing file or folder with the path `written`, or a problem.
 
-        A relative path is resolved from `folder` first. If it leads out of the sandbox or does not exist there, it is
-        searched in the folders of `--world-path`. `model://name/…` is searched only there. Problems do not reveal which
-        files exist outside of the sandbox.
+        The path is relative to `folder`, the folder of the YAML file that contains it. If it does not exist there or
+        leads out of the sandbox, it is searched in the folders of `--world-path`. `model://name/…` is only searched in
+        these folders.
         """
         if problem := _invalid_form(written):
             return problem
@@ -57,9 +54,9 @@ class PathSandbox:
         return self._in_world_path(written) or problem or _outside_problem(written)
 
     def resolve_argument(self, path: Path) -> Path | Problem:
-        """Return the absolute path of a file named on the command line.
+        """Return the absolute path of a file on the command line, which need not exist.
 
-        Returns a problem if it is outside the sandbox, or if its name has invalid characters. It need not exist.
+        Return a problem if it is outside the sandbox, or if its path has invalid characters.
         """
         file = _resolved(path.parent) / path.name
         if self.contains(file):
@@ -67,16 +64,16 @@ class PathSandbox:
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose the root with --root")
 
     def contains(self, path: Path) -> bool:
-        """Return whether a path, with symbolic links resolved, is inside one of the folders."""
+        """Return whether a path, with symbolic links resolved, is in one of the folders."""
         real = _resolved(path)
         return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
 
     def display_name(self, path: Path) -> str:
-        """Return the name of a file in problems: its path relative to the root if it is inside, else the full path."""
+        """Return the path of a file for messages: relative to the root if it is inside, else absolute."""
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def _in_world_path(self, written: str) -> Path | None:
-        """Return the first existing file or folder with this path in the folders of `--world-path`, or None."""
+        """Return the first existing file or folder with this path relative to a folder of `--world-path`, or None."""
         if ".." in PurePosixPath(written).parts:
             return None
         candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
@@ -84,18 +81,18 @@ class PathSandbox:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; False for an invalid name, for which Path.exists raises an error."""
+    """Return whether a path exists; False for an invalid path, for which Path.exists raises an error."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder; False for an invalid name, for which Path.is_dir raises an error."""
+    """Return whether a path is a folder; False for an invalid path, for which Path.is_dir raises an error."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
 @dataclass(frozen=True)
 class PathProblem:
-    """Reason why a path in a file cannot be used. The caller knows the position, and makes it a Problem."""
+    """Problem with a path in a YAML file, without its position."""
 
     code: str
     message: str
@@ -103,7 +100,7 @@ class PathProblem:
 
 
 def _invalid_form(written: str) -> PathProblem | None:
-    """Return a problem with a path that is not relative or has control characters; else None."""
+    """Return a problem if a path is not relative or has control characters; else None."""
     if any(not c.isprintable() for c in written):
         return PathProblem("SC017", f"control character in the path {quoted(written)}")
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
@@ -114,8 +111,8 @@ def _invalid_form(written: str) -> PathProblem | None:
 
 
 def _name_problem(path: Path, name: str) -> Problem | None:
-    """Return a problem if the displayed `name` of the file `path` has invalid characters; else None."""
-    character = _INVALID_IN_NAMES.search(name)
+    """Return a problem if `name`, the path of the file for messages, has invalid characters; else None."""
+    character = _INVALID_IN_IDS.search(name)
     if character is None:
         return None
     code = ord(character[0])
@@ -125,7 +122,7 @@ def _name_problem(path: Path, name: str) -> Problem | None:
 
 
 def _resolved(path: Path) -> Path:
-    """Return the absolute path with symbolic links resolved; unlike Path.resolve, without an error for a loop."""
+    """Return the absolute path with symbolic links resolved. A loop of links is no error, unlike in Path.resolve."""
     return Path(os.path.realpath(path))
 
 
@@ -135,7 +132,7 @@ def _outside_problem(written: str) -> PathProblem:
 
 
 def _stat_problem(error: OSError, written: str, path: Path) -> PathProblem:
-    """Return the problem for the error of `path.stat()`; `written` is the path as written."""
+    """Return the problem for an error of `path.stat()`. `written` is the path in the YAML file."""
     code = "SC022" if error.errno == errno.ELOOP else "SC023"
     return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _similar_name_hint(path))
 

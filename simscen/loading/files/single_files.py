@@ -1,4 +1,4 @@
-"""Load a robot or a world file without a scenario, and write a world as a `*.world.yaml` file."""
+"""Loading of robot and world files without a scenario, and text of `*.world.yaml` files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,21 +19,21 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class RobotFile:
-    """Robot that was loaded from a file, and the reader of its files."""
+    """Loaded robot, and the reader of its files."""
 
     robot: LoadedRobot
     library: Library
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """The root and the folders of `--world-path`."""
+        """Folders that the files of the robot must lie in: the root and the folders of `--world-path`."""
         return (self.library.sandbox.root, *self.library.sandbox.world_path)
 
 
 def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
     """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or a robot that ships with simscen.
 
-    `written` is the path of the file, or the name of the shipped robot. Its files must lie in `root` or a folder of
+    `written` is the path of the file or the name of the shipped robot. All files must lie in `root` or in a folder of
     `world_path`. Raises InvalidInput with all problems.
     """
     shipped = shipped_robots()
@@ -57,8 +57,8 @@ def load_world_file(
 ) -> LoadedWorld:
     """Load the world in a `*.world.yaml`, a ROS map, or an SDF file.
 
-    Its files must lie in `root` or a folder of `world_path`. `unsaved` contains the texts of files that are changed in
-    an editor, but not saved. Raises InvalidInput with all problems.
+    All files must lie in `root` or in a folder of `world_path`. `unsaved` are texts that replace the content of files,
+    such as unsaved texts of an editor. Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)
@@ -82,7 +82,7 @@ def world_text(spec: WorldSpec) -> str:
 
 
 def _in_order(value: Any) -> Any:
-    """Return data in which the version and the name come first in each mapping."""
+    """Return the data with the keys `simscen` and `name` first in each mapping."""
     if isinstance(value, list):
         return [_in_order(item) for item in value]
     if not isinstance(value, dict):
@@ -92,20 +92,20 @@ def _in_order(value: Any) -> Any:
 
 
 class CompactDumper(Dumper):
-    """YAML writer that uses one line for a list of values, and for a mapping that contains a plain value."""
+    """YAML dumper that writes lists without mappings, and mappings with a scalar, in brackets or braces."""
 
 
-def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
-    """Return the node of a list, which is in brackets unless it contains mappings."""
+def _represent_list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
+    """Return the YAML node of a list, in brackets unless it contains mappings."""
     flat = not any(isinstance(item, dict) for item in value)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
 
 
-def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
-    """Return the node of a mapping, which is in braces if it contains a plain value and is not the whole file."""
+def _represent_mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
+    """Return the YAML node of a mapping, in braces if it contains a scalar and is not the whole file."""
     flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
     return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
 
 
-CompactDumper.add_representer(list, _list)
-CompactDumper.add_representer(dict, _mapping)
+CompactDumper.add_representer(list, _represent_list)
+CompactDumper.add_representer(dict, _represent_mapping)

@@ -1,1 +1,1 @@
-"""Validate a YAML tree against a pydantic model and report every problem with its position."""
+"""Validation of YAML trees against pydantic models. All problems are reported with their positions."""

@@ -1,7 +1,7 @@
 """Hints for common mistakes in YAML files.
 
-A choice is a mapping whose key selects its kind, such as the criterion `collisions: {max: 0}`. A `loc` is the location
-of an error in pydantic: keys and indices of the file, and between them names of the members of unions.
+A choice is a mapping whose only key selects its kind, such as the criterion `collisions: {max: 0}`. A `loc` is the
+location of a validation error in pydantic: keys and list indices, with tags of union members between them.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,19 +17,19 @@ from simscen.spec.places import PoseSpec
 HINTS_FOR_BOUNDS: dict[Keys, str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
 }
-"""Reasons for bounds that may surprise users, by the keys of the value."""
+"""Hints for values outside their bounds, by the keys of the value."""
 MAX_SEARCH_DEPTH = 3
-"""Levels below a mapping in which a misplaced key is searched."""
+"""Number of levels below a mapping in which the place of a misplaced key is searched."""
 
 
-def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
-    """Return how to correct the value `node` at `loc` in `model`, where a mapping or a list is expected; "" if unknown.
+def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
+    """Return how to write the value `node` at `loc` as the mapping or list that `model` expects; "" if unknown.
 
-    `kind` is pydantic's type of the error, such as "list_type".
+    `error_type` is pydantic's type of the error, such as "list_type".
     """
     models = models_at(model, loc)
     in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
-    if kind == "list_type":
+    if error_type == "list_type":
         return _list_hint(node, in_list)
     if isinstance(node, SequenceNode):
         return _sequence_for_mapping_hint(models, node)
@@ -40,9 +40,9 @@ def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], n
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return where to move the unknown key `key` of the mapping at `loc`; "" if no suitable place is found.
+    """Return where to move the unknown `key` of the mapping at `loc`; "" if no suitable place is found.
 
-    For a key in an item of a list, only levels inside of this item are considered.
+    A key in an item of a list is only moved inside this item.
     """
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
@@ -57,7 +57,7 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
 
 
 def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
-    """Return a hint for the key `robot` in faults and criteria, and `then` in a step of a sequence; else ""."""
+    """Return a hint for `robot` in faults and criteria, and for `then` in a step of a sequence; "" for other keys."""
     if key == "robot" and loc and loc[0] in ("faults", "pass", "robots"):
         return "write it under the name of the robot: `robots: {NAME: {faults: …, pass: …}}`"
     if key == "then" and "then" in loc:
@@ -66,7 +66,7 @@ def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
 
 
 def _list_hint(node: Node, in_list: bool) -> str:
-    """Return how to write a list instead of `node`; `in_list` means that `node` is an item of a list itself."""
+    """Return how to write `node` as a list; "" if unknown. With `in_list`, `node` is itself an item of a list."""
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
@@ -75,7 +75,7 @@ def _list_hint(node: Node, in_list: bool) -> str:
 
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
-    """Return how to write a list as a mapping: without `-`, or two or three numbers as a pose; else ""."""
+    """Return how to write a list as a mapping: without `-`, or as a pose; "" if unknown."""
     if all(isinstance(item, MappingNode) for item in node.items):
         return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
@@ -91,7 +91,7 @@ def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: Sequence
 
 
 def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
-    """Return how to write a value as the mapping `{key: value}`, or `true` as the empty mapping `{}`; else ""."""
+    """Return how to write a value as the mapping `{key: value}`, or `true` as the mapping `{}`; "" if unknown."""
     plain_models = [model for model in models if not issubclass(model, Choice)]
     matching = {key for model in plain_models for key in keys_of([model]) if _is_valid(model, {key: node.value})}
     if len(matching) == 1 and not isinstance(node.value, bool):
@@ -100,6 +100,7 @@ def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode
 
 
 def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
+    """Return whether `value` is the YAML data of a valid specification of this model."""
     try:
         model.model_validate(value, by_alias=True, by_name=False)
     except ValidationError:
@@ -108,13 +109,13 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
 
 
 def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Return a hint that refers to `simscen explain` if the last key of `loc` is a key of a choice; else ""."""
+    """Return a hint to use `simscen explain` if the last key of `loc` is a key of a choice; "" otherwise."""
     chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
     return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
 
 def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
-    """Return how to write the text `word` as a key of a choice, with a colon and a value; "" if no choice has it."""
+    """Return how to write the text `word` as a key of a choice, with a colon and a value; "" if unknown."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
         if word not in keys:
@@ -128,7 +129,7 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
 
 
 def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
-    """Return the keys that lead from `models` to the nearest mapping in which `key` is valid; None if there is none."""
+    """Return the keys from `models` down to the nearest mapping in which `key` is valid; None if there is none."""
     holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     for name, below in holders:
@@ -142,5 +143,5 @@ def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1)
 
 
 def _is_tag(part: Key) -> bool:
-    """Return whether pydantic added this part for the member of a union: such parts contain a space."""
+    """Return whether this part of a `loc` is the tag of a union member. Only tags contain a space."""
     return isinstance(part, str) and " " in part

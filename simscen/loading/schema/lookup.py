@@ -1,7 +1,7 @@
-"""Find the pydantic models, and their keys, that are possible at a location in a file.
+"""Pydantic models that are possible at a location in a YAML file, and their keys.
 
-A `loc` is the location of an error in pydantic: keys and indices of the file, and between them the names (tags) of the
-members of unions. Models of installed packages are included.
+A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of union members between
+them. Models of installed packages are included.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ from simscen.spec.registry import BrokenPlugin, installed_specs
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
-    """Return the possible models of a mapping at `loc` in a file whose top level is `model`."""
+    """Return the possible models of the mapping at `loc`; `model` is the model of the whole file."""
     candidates: list[Any] = [model]
     for part in loc:
         options = [option for candidate in candidates for option in _union_members(candidate)]
@@ -31,12 +31,12 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
 
 
 def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
-    """Return the valid values of the key `type` in a mapping at `loc`."""
+    """Return the valid values of the key `type` in the mapping at `loc`."""
     return [str(value) for kind in models_at(model, loc) for value in _literal_types(kind)]
 
 
 def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
-    """Return the other values of `type` that would make `key` valid in the mapping at `loc`."""
+    """Return the other values of the key `type` with which `key` would be valid in the mapping at `loc`."""
     own = type_values_at(model, loc)
     if not loc or loc[-1] not in own:
         return []
@@ -45,18 +45,18 @@ def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -
 
 
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
-    """Return the keys of these models as written in YAML."""
+    """Return the keys in YAML of all these models."""
     keys = [field.alias or name for model in models for name, field in model.model_fields.items()]
     return list(dict.fromkeys(keys))
 
 
 def has_no_required_keys(model: type[BaseModel]) -> bool:
-    """Return whether `{}` is valid for a model."""
+    """Return whether the empty mapping `{}` is valid for a model."""
     return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """Return the type of the field with this key; None if there is no such field, or its package cannot be imported."""
+    """Return the type of the field with this key in YAML; None if it is unknown, or its package cannot be imported."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
             return _type_of(field)
@@ -91,7 +91,7 @@ def _union_members(kind: Any) -> list[Any]:
 
 
 def _types_below(kind: Any, part: Key) -> list[Any]:
-    """Return the possible types of the value under a key or index `part` of a value of type `kind`."""
+    """Return the possible types of the value at the key or index `part` of a value of type `kind`."""
     unwrapped = _unwrapped(kind)
     if _is_model(unwrapped) and isinstance(part, str):
         matches = field_type(unwrapped, part)
@@ -104,7 +104,7 @@ def _types_below(kind: Any, part: Key) -> list[Any]:
 
 
 def _tags(option: Any) -> set[str]:
-    """Return the names that a `loc` may contain for this member of a union."""
+    """Return the tags that a `loc` can contain for this member of a union."""
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
     unwrapped = _unwrapped(option)
     if _is_model(unwrapped):
@@ -113,7 +113,7 @@ def _tags(option: Any) -> set[str]:
 
 
 def _literal_types(model: type[BaseModel]) -> tuple[Any, ...]:
-    """Return the values that a model allows for its key `type`; () if it has no such key."""
+    """Return the valid values of the key `type` of a model; () if it has no such key."""
     field = model.model_fields.get("type")
     return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
 
@@ -124,12 +124,12 @@ def _metadata(kind: Any) -> tuple[Any, ...]:
 
 
 def _extensible_union(kind: Any) -> ExtensibleUnion | None:
-    """Return the mark of a union to which installed packages can add members; None for other types."""
+    """Return the ExtensibleUnion annotation of a type; None if it has none."""
     return next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None)
 
 
 def _unwrapped(kind: Any) -> Any:
-    """Return the type inside of `Annotated`; lazy specifications are imported, and choices have installed kinds."""
+    """Return the type inside `Annotated`. Import a LazySpec, and extend a Choice by the keys of installed packages."""
     while get_origin(kind) is Annotated:
         kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, LazySpec)), get_args(kind)[0])
     return with_installed_choices(kind) if _is_model(kind) and issubclass(kind, Choice) else kind

@@ -1,4 +1,4 @@
-"""Translate errors of pydantic to messages for authors of YAML files; format values and suggestions for messages."""
+"""Messages for users about validation errors of pydantic, and formatting of values and suggestions in messages."""
 
 import difflib
 import re
@@ -9,7 +9,7 @@ from simscen.loading.yaml.textfile import lookalike_hint
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 from simscen.spec.places import ROS_NAMESPACE_PATTERN
 
-_KINDS = {
+_EXPECTED_TYPES = {
     "model_type": "a mapping",
     "model_attributes_type": "a mapping",
     "dict_type": "a mapping",
@@ -20,19 +20,19 @@ _KINDS = {
     "float_type": "a number",
     "bool_type": "true or false",
 }
-"""Error type of pydantic → what is expected."""
+"""Description of the expected value, by error type of pydantic."""
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
-"""Error type of pydantic → words for the bound, and the key of the bound in the context of the error."""
+"""Words for a bound, and the key of its value in the context of the error, by error type of pydantic."""
 MAX_LISTED_CHOICES = 40
 """Largest number of choices in a message."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
-_TEXTS = {
+_TEMPLATES = {
     "finite_number": ("SC013", "must be a finite number"),
     "too_short": ("SC017", "expected {min_length} or more values, got {actual_length}"),
     "too_long": ("SC017", "expected no more than {max_length} values"),
@@ -40,7 +40,7 @@ _TEXTS = {
     "path_name": ("SC017", "a name must not be a path"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
 }
-"""Error type of pydantic → error code, and message with placeholders for values of the context."""
+"""Error code, and message with placeholders for values of the error's context, by error type of pydantic."""
 
 
 class Message(NamedTuple):
@@ -52,7 +52,7 @@ class Message(NamedTuple):
 
 
 def describe_node(node: Node) -> str:
-    """Return a node as messages describe it, e.g. "the text `abc`"."""
+    """Return a description of a node for messages, e.g. "the text `abc`"."""
     if isinstance(node, MappingNode):
         return "a mapping"
     if isinstance(node, SequenceNode):
@@ -68,7 +68,7 @@ def describe_node(node: Node) -> str:
 
 
 def quoted(text: str, max_chars: int = 60) -> str:
-    """Return user text for a message: in backquotes, on one line, printable, shortened to `max_chars` characters."""
+    """Return text of a user for a message: in backquotes, printable, and shortened to `max_chars` characters."""
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
     return f"`{printable if len(printable) <= max_chars else printable[: max_chars - 1] + '…'}`"
 
@@ -84,74 +84,75 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def _listed(choices: list[str]) -> str:
-    """Return the choices separated by commas, without those beyond the limit: a world may have hundreds of names."""
+    """Return the choices separated by commas; at most MAX_LISTED_CHOICES and the number of further choices."""
     more = len(choices) - MAX_LISTED_CHOICES
     return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
 
 
-def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """Return the message for an error of pydantic at `node`.
+def translate_error(error_type: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
+    """Return the message for a validation error of pydantic at `node`.
 
-    `kind` is pydantic's type of the error, `context` are its values, such as the bound, and `text` is its own message.
+    `error_type`, `context`, and `text` are the fields `type`, `ctx`, and `msg` of the error.
     """
-    if kind in _KINDS:
-        return Message("SC011", f"expected {_KINDS[kind]}, got {describe_node(node)}", _type_hint(kind, node))
-    if kind in _BOUNDS:
-        words, key = _BOUNDS[kind]
+    if error_type in _EXPECTED_TYPES:
+        text = f"expected {_EXPECTED_TYPES[error_type]}, got {describe_node(node)}"
+        return Message("SC011", text, _type_hint(error_type, node))
+    if error_type in _BOUNDS:
+        words, key = _BOUNDS[error_type]
         return Message("SC013", f"must be {words} {_number(context[key])}, got {short_value(node)}")
-    if kind in _TEXTS:
-        code, template = _TEXTS[kind]
+    if error_type in _TEMPLATES:
+        code, template = _TEMPLATES[error_type]
         return Message(code, template.format_map(context))
-    if kind == "literal_error":
+    if error_type == "literal_error":
         word = str(node.value) if isinstance(node, ScalarNode) else ""
         return Message(
             "SC014",
             f"{short_value(node)} is not one of the choices",
             suggestion(word, _choices(str(context["expected"]))),
         )
-    if kind == "value_error":
+    if error_type == "value_error":
         reason = str(context["error"])
         is_empty_choice = reason.startswith("expected one of")
         return Message("SC016", "a key is missing here", reason) if is_empty_choice else Message("SC016", reason)
-    if kind == "plugin":
+    if error_type == "plugin":
         return Message("SC019", str(context["problem"]), str(context["hint"]))
-    if kind == "quantity":
+    if error_type == "quantity":
         units = f"units: {context['units']}; a number without a unit is in SI units"
         written = str(node.value) if isinstance(node, ScalarNode) else ""
         return Message("SC015", str(context["problem"]), lookalike_hint(written) or _quoted_number_hint(node) or units)
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
-    is_name = kind == "string_pattern_mismatch"
+    is_name = error_type == "string_pattern_mismatch"
     return _invalid_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
 
 
-def _type_hint(kind: str, node: Node) -> str:
+def _type_hint(error_type: str, node: Node) -> str:
     """Return how to correct a value of the wrong type; "" if unknown."""
-    if kind == "string_type" and isinstance(node, ScalarNode) and node.value is not None:
+    if error_type == "string_type" and isinstance(node, ScalarNode) and node.value is not None:
         return "put it in quotes"
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
         return ""
-    if kind in ("int_type", "float_type"):
+    if error_type in ("int_type", "float_type"):
         return _quoted_number_hint(node)
     if hint := lookalike_hint(node.value):
         return hint
-    if kind == "bool_type" and node.value.lower() in ("true", "false"):
+    if error_type == "bool_type" and node.value.lower() in ("true", "false"):
         return "remove the quotes"
-    if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
+    if error_type == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
         return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
     return ""
 
 
 def _quoted_number_hint(node: Node) -> str:
-    """Return how to correct text that is a number with quotes or leading zeros; "" for other values."""
+    """Return how to correct text that is a number in quotes or with a leading zero; "" for other values."""
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
         return ""
     return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
 
 
 def short_value(node: Node) -> str:
-    """Return the value of a node in backquotes, shortened; words such as "a list" for collections."""
+    """Return a scalar in backquotes, shortened; for other nodes a description such as "a list"."""
     if isinstance(node, ScalarNode) and node.value is not None:
         return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
     return describe_node(node)

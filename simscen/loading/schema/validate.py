@@ -1,4 +1,4 @@
-"""Validate a tree against a pydantic model, and translate pydantic's errors to problems with positions and hints."""
+"""Validation of a YAML tree against a pydantic model. Errors become problems with positions and hints."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -32,12 +32,12 @@ Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1
 """Version of the scenario language, which files state under the key `simscen`."""
 
-MissingKeys = Callable[[MappingNode], list[Problem]]
-"""Function that returns the problems of a file with missing keys that are required only if other keys are absent."""
+FindMissingKeys = Callable[[MappingNode], list[Problem]]
+"""Function that returns problems for missing keys of a file that are only required if other keys are absent."""
 
 
-def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None = None) -> Model | list[Problem]:
-    """Return the specification in `tree`, or all its problems, including those that `find_missing_keys` returns."""
+def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | None = None) -> Model | list[Problem]:
+    """Return the specification in `tree`; or all its problems, including those of `find_missing_keys`."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -48,7 +48,7 @@ def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None 
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """Return the problems of a file that other files extend. Missing keys are allowed, except in items of lists."""
+    """Return the problems of a file in which keys may be missing, except in items of lists."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -57,14 +57,14 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
 
 
 def _supported_mapping(tree: Node) -> MappingNode | Problem:
-    """Return the tree, or a problem if it is no mapping or needs another version of the language."""
+    """Return the tree; or a problem if it is not a mapping, or written for another version of the language."""
     if isinstance(tree, MappingNode):
         return _wrong_version(tree) or tree
     return _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
 
 def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list[dict[str, Any]]]:
-    """Return the specification (None if it is invalid) and pydantic's errors, except those that empty values cause."""
+    """Return the specification (None if it is invalid), and pydantic's errors that empty values do not cause."""
     try:
         return model.model_validate(tree.plain, by_alias=True, by_name=False), []
     except ValidationError as error:
@@ -75,7 +75,7 @@ def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list
 def _problems(
     model: type[BaseModel], tree: MappingNode, errors: list[dict[str, Any]], missing: Sequence[Problem] = ()
 ) -> list[Problem]:
-    """Return the problems of empty values, then `missing`, then the problems for pydantic's errors."""
+    """Return problems for empty values, then the problems `missing`, then problems for pydantic's errors."""
     empty = [_empty_value_problem(model, tree, keys) for keys in _empty_values(tree)]
     return _without_duplicates([*empty, *missing, *(_translate(model, tree, error) for error in errors)])
 
@@ -87,7 +87,7 @@ def _is_missing_key(error: dict[str, Any]) -> bool:
 
 
 def _wrong_version(tree: MappingNode) -> Problem | None:
-    """Return a problem if the file is written for another version; None if its version is right, missing or invalid."""
+    """Return a problem if the file is written for another version of the language; None if not, or if unknown."""
     version = child(tree, "simscen")
     if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
         return None
@@ -98,7 +98,7 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
 
 
 def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
-    """Return the problem for an error of pydantic."""
+    """Return the problem for a validation error of pydantic."""
     loc: Keys = error["loc"]
     kind: str = error["type"]
     if kind == "extra_forbidden":
@@ -125,7 +125,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
 
 
 def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
-    """Return the problem of the unknown key at the end of `loc`, with a hint what was meant or where it belongs."""
+    """Return the problem of the unknown key at the end of `loc`."""
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
@@ -171,7 +171,7 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, 
 
 
 def _empty_values(tree: Node) -> Iterator[Keys]:
-    """Yield the keys of empty values: `off:` instead of `off: {}`, or a forgotten value."""
+    """Yield the keys of all values that are empty, such as `off:` instead of `off: {}`."""
     return (keys for keys, node in nodes_with_keys(tree) if isinstance(node, ScalarNode) and node.value is None)
 
 
@@ -189,7 +189,7 @@ def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
 
 
 def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
-    """Return whether an error of pydantic is only a consequence of an empty value."""
+    """Return whether an empty value, which is reported separately, causes an error of pydantic."""
     node = node_at(tree, error["loc"])
     if isinstance(node, ScalarNode):
         return node.value is None
@@ -198,9 +198,9 @@ def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
 
 
 def _without_duplicates(problems: list[Problem]) -> list[Problem]:
-    """Return one problem per mistake.
+    """Return one problem for each mistake.
 
-    Pydantic reports a mistake once for each member of a union, and a misspelled key also as a missing key.
+    Pydantic reports a mistake once for each member of a union. It reports a misspelled key also as a missing key.
     """
     first_at: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:
@@ -215,7 +215,7 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
 
 
 def _spelling_hint(missing: Problem) -> str:
-    """Return the hint that a misspelled key has if the missing key was meant."""
+    """Return the hint of the unknown key that is a misspelling of this missing key."""
     return f"did you mean {missing.message.split()[2]}?"
 
 

@@ -57,7 +57,7 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
     text = read_text(path, display_name)
     if isinstance(text, Problem):
         return [text]
-    tree, problems = parse_yaml(text, display_name, last_wins=True)
+    tree, problems = parse_yaml(text, display_name, allow_duplicates=True)
     notes = tuple(problem for problem in problems if problem.severity == "warning")
     if len(notes) < len(problems) or tree is None:
         return [problem for problem in problems if problem not in notes]
@@ -86,7 +86,7 @@ def is_nav2_parameter_file(text: str, display_name: str) -> bool:
     """Return whether the text of a file consists of ROS 2 parameters of nodes, and is not in simscen's language."""
     if PARAMETERS not in text:
         return False
-    tree, _ = parse_yaml(text, display_name, last_wins=True)
+    tree, _ = parse_yaml(text, display_name, allow_duplicates=True)
     return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_nodes(tree, ""))
 
 

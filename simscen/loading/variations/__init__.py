@@ -1,1 +1,1 @@
-"""Expand the section `variations:` of a scenario to one scenario for each combination of values."""
+"""Variations: expansion of a scenario with `variations` to one scenario for each combination of values."""

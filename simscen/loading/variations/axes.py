@@ -1,7 +1,7 @@
-"""Build the axes of a block of variations.
+"""Axes of a block of variations.
 
-An axis is a list of options. Each variation of a block combines one option of each axis. An option is one value of one
-path, or several values that belong together.
+An axis is a list of options. An option is a new value for one path, or new values for several paths. Each variation of
+a block combines one option of each axis.
 """
 
 from collections.abc import Sequence
@@ -31,40 +31,43 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass
 class AxisBuilder:
-    """Builds the axes of all blocks of the scenario `tree`, which has no `variations` itself.
-
-    `problems` are the problems found so far. `targets` are the targets of all paths that are varied, by path.
-    """
+    """Builds the axes of all blocks of a scenario."""
 
     tree: MappingNode
+    """YAML tree of the scenario without its key `variations`."""
     problems: list[Problem] = field(default_factory=list)
+    """Problems found so far."""
     targets: dict[str, Target] = field(default_factory=dict)
+    """Targets of all varied paths found so far, by path."""
     _names: dict[str, Position] = field(default_factory=dict)
-    """Names of variations that the author gave, in lower case, and their positions."""
+    """Positions of the names of variations in the file, by name in lower case."""
 
     def build_axes(
         self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]
     ) -> list[Sequence[Option]]:
-        """Return the axes of a block, whose tree is `node`: one for each path of `grid`, and one for each other kind.
+        """Return the axes of a block: one for each path under `grid`, and one for each other kind of variation.
 
-        `conditions` are those of the block; `pairwise` considers them.
+        `node` is the YAML tree of the block, `conditions` are its conditions.
         """
         found: list[Sequence[Option]] = [
-            [Option((change,)) for change in column] for column in self._columns(child(node, "grid"), True)
+            [Option((change,)) for change in changes] for changes in self._changes_by_path(child(node, "grid"), True)
         ]
         if block.pairwise is not None:
-            found.append(self._pairwise(child(node, "pairwise"), conditions))
+            found.append(self._pairwise_options(child(node, "pairwise"), conditions))
         if block.pairs is not None:
-            found.append(self._pairs(child(node, "pairs")))
+            found.append(self._pairs_options(child(node, "pairs")))
         if block.list_ is not None:
-            found.append(self._list(child(node, "list")))
+            found.append(self._list_options(child(node, "list")))
         if block.sampled is not None:
-            found.append(self._sampled(block.sampled, node_at(node, ("sampled", "values"))))
+            found.append(self._sampled_options(block.sampled, node_at(node, ("sampled", "values"))))
         self._report_overlaps(found)
         return found
 
-    def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return the changes to the listed values for each path; reports equal values of a path if `distinct`."""
+    def _changes_by_path(self, node: Node | None, distinct: bool) -> list[list[Change]]:
+        """Return a list of changes for each path in a mapping from paths to lists of values.
+
+        With `distinct`, equal values of a path are reported.
+        """
         if not isinstance(node, MappingNode):
             return []
         found = []
@@ -72,15 +75,15 @@ class AxisBuilder:
             assert isinstance(entry.value, SequenceNode)
             if distinct:
                 self._report_duplicates(entry.value)
-            if (target := self._target(path, entry)) is not None:
+            if (target := self._resolve_target(path, entry)) is not None:
                 found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
         return found
 
-    def _pairwise(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
-        """Return options in which each allowed pair of values occurs. Conditions on other paths are not considered."""
+    def _pairwise_options(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
+        """Return options in which each pair of values of two paths occurs, unless the conditions exclude it."""
         from simscen.loading.variations.sampling import Row, covering_array
 
-        columns = self._columns(node, True)
+        columns = self._changes_by_path(node, True)
         if self.problems or not columns:
             return []
 
@@ -95,8 +98,8 @@ class AxisBuilder:
 
         return [option(row) for row in covering_array([len(column) for column in columns], is_allowed)]
 
-    def _pairs(self, node: Node | None) -> list[Option]:
-        """Return options that take the first values of all paths, then the second values, and so on."""
+    def _pairs_options(self, node: Node | None) -> list[Option]:
+        """Return one option with the first values of all paths, one with the second values, and so on."""
         assert isinstance(node, MappingNode)
         lengths = {
             path: len(entry.value.items)
@@ -110,26 +113,26 @@ class AxisBuilder:
                 hint = "the lists of `pairs` must have the same length"
                 self.add_problem(node.entries[path].value.position, "SC016", message, hint)
                 return []
-        return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
+        return [Option(changes) for changes in zip(*self._changes_by_path(node, False), strict=True)]
 
-    def _list(self, node: Node | None) -> list[Option]:
-        """Return an option for each item of `list`, which the author may have given a name."""
+    def _list_options(self, node: Node | None) -> list[Option]:
+        """Return an option for each item of `list`."""
         assert isinstance(node, SequenceNode)
         found = []
         for number, item in enumerate(node.items, start=1):
             assert isinstance(item, MappingNode)
-            name = self._given_name(item)
+            name = self._item_name(item)
             entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
             if not entries:
                 self.add_problem(item.position, "SC010", "this variation changes nothing", "add a path and its value")
-            targets = [(self._target(path, entry), entry) for path, entry in entries]
+            targets = [(self._resolve_target(path, entry), entry) for path, entry in entries]
             changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
             self._report_overlaps([[Option((change,))] for change in changes])
             found.append(Option(tuple(changes), name))
         return found
 
-    def _given_name(self, item: MappingNode) -> str:
-        """Return the name that the author gave an item, "" for none; reports invalid and repeated names."""
+    def _item_name(self, item: MappingNode) -> str:
+        """Return the `name` of an item of `list`; "" for none. Report invalid and repeated names."""
         entry = item.entries.get("name")
         if entry is None:
             return ""
@@ -142,14 +145,14 @@ class AxisBuilder:
             self.add_problem(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
-    def _sampled(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
-        """Return options with drawn values; reports distributions that are invalid. `node` is the tree of `values`."""
+    def _sampled_options(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
+        """Return options with drawn values. Report invalid distributions; `node` is their YAML tree."""
         from simscen.loading.variations.sampling import draw_value, draw_values
 
         assert isinstance(node, MappingNode)
         targets = []
         for path, entry in node.entries.items():
-            target = self._target(path, entry)
+            target = self._resolve_target(path, entry)
             try:
                 draw_value(sampled, path, 0)
             except ValueError as error:
@@ -168,8 +171,8 @@ class AxisBuilder:
         ]
         return [Option(changes) for changes in zip(*columns, strict=True)]
 
-    def _target(self, path: str, entry: Entry) -> Target | None:
-        """Return the target of a path, and remember it; reports a path that leads nowhere, and returns None."""
+    def _resolve_target(self, path: str, entry: Entry) -> Target | None:
+        """Return the target of a path, and add it to `targets`. For an invalid path, report it and return None."""
         try:
             target = resolve_path(path, entry.key, self.tree)
         except PathError as error:
@@ -187,7 +190,7 @@ class AxisBuilder:
             seen.append(item.plain)
 
     def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
-        """Report paths of different axes if they lead to the same value, or one to a part of the other's value."""
+        """Report paths of different axes that lead to the same value, or to a value and a part of this value."""
         targets = [
             {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
             for axis in axes
@@ -201,7 +204,7 @@ class AxisBuilder:
                     self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
     def read_conditions(self, block: Node) -> list[Condition]:
-        """Return the conditions under the key `require` of a block; reports those that cannot be read."""
+        """Return the conditions under the key `require` of a block. Report invalid conditions."""
         node, found = child(block, "require"), list[Condition]()
         for item in node.items if isinstance(node, SequenceNode) else ():
             assert isinstance(item, ScalarNode)
@@ -214,7 +217,8 @@ class AxisBuilder:
     def check_condition_paths(self, conditions: Sequence[Condition], block: Node) -> None:
         """Report paths in the conditions of a block that are neither varied nor written in the scenario.
 
-        Call it after `build_axes`. It reports nothing if some conditions of the block could not be read.
+        Call it after `build_axes`. `conditions` is the result of `read_conditions`; nothing is reported if it reported
+        an invalid condition.
         """
         node = child(block, "require")
         if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):
@@ -226,7 +230,7 @@ class AxisBuilder:
                     self.add_problem(item.position, "SC030", message, "write its value, or vary it")
 
     def add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
-        """Add a problem unless it has been added before."""
+        """Add a problem to `problems` unless it is there already."""
         problem = Problem(*position, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)

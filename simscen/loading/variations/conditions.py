@@ -1,6 +1,6 @@
-"""Parse and evaluate the conditions on varied values under `require:`, such as `goals[0].pose.x > robot.pose.x + 1`.
+"""Conditions on varied values, such as `goals[0].pose.x > robot.pose.x + 1`, under the key `require`.
 
-Conditions have the syntax of Python. They are parsed with `ast` and interpreted here, so that they cannot run code. The
+Conditions are Python expressions of paths, numbers, and texts. They are parsed with `ast` and never executed. The
 function `value` takes a path as text, because `pass.clearance.min` is not valid Python.
 """
 
@@ -30,25 +30,26 @@ GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
     "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with words of Python"
 )
-"""Hint that explains the syntax of conditions to users."""
+"""Hint with the syntax of conditions."""
 
 
 class ConditionError(ValueError):
-    """Error for a condition that cannot be read, or cannot be evaluated with the values of a variation."""
+    """A condition is invalid, or cannot be evaluated with the values of a variation."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition: the text as written, its parsed expression, and the paths that it refers to."""
+    """Condition with its text in the file, its parsed expression, and the paths in it."""
 
     text: str
     expression: ast.expr
     paths: tuple[str, ...]
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Return whether the condition holds for `values`, which has the value of each of its paths as written.
+        """Return whether the condition holds for these values, by path.
 
-        Quantities are compared in SI units. Raises ConditionError if the condition cannot be evaluated.
+        Quantities such as "50 cm" are converted to SI units. Raises ConditionError if the condition cannot be
+        evaluated.
         """
         try:
             result = _evaluate(self.expression, values)
@@ -60,7 +61,7 @@ class Condition:
 
 
 def parse_condition(text: str) -> Condition:
-    """Return the condition in a text. Raises ConditionError if it cannot be read."""
+    """Return the condition in a text. Raises ConditionError if it is invalid."""
     try:
         expression = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
@@ -71,7 +72,7 @@ def parse_condition(text: str) -> Condition:
 
 
 def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
-    """Add the paths in an expression to `paths`. Raises ConditionError for syntax that conditions do not have."""
+    """Add the paths in an expression to the keys of `paths`. Raises ConditionError for invalid syntax."""
     match node:
         case ast.BoolOp(values=parts):
             pass
@@ -98,7 +99,10 @@ def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
 
 
 def _path(node: ast.expr, text: str) -> str:
-    """Return an expression such as `goals[0].pose.x` as a path. Raises ConditionError for another expression."""
+    """Return the path that an expression such as `goals[0].pose.x` stands for. Raises ConditionError if it is none.
+
+    `text` is the condition for the message.
+    """
     match node:
         case ast.Name(id=name):
             return name
@@ -112,17 +116,17 @@ def _path(node: ast.expr, text: str) -> str:
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """Return the value of an expression: a number in SI units, a text, or a boolean.
+    """Return the value of an expression: a number in SI units, a text, or a boolean; `values` are the values by path.
 
     Raises TypeError, ZeroDivisionError, or OverflowError if it cannot be evaluated.
     """
     match node:
         case ast.BoolOp(op=ast.And(), values=parts):
-            return all(_truth(part, values) for part in parts)
+            return all(_evaluate_boolean(part, values) for part in parts)
         case ast.BoolOp(values=parts):
-            return any(_truth(part, values) for part in parts)
+            return any(_evaluate_boolean(part, values) for part in parts)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            return not _truth(operand, values)
+            return not _evaluate_boolean(operand, values)
         case ast.UnaryOp(operand=operand):
             return -_evaluate(operand, values)
         case ast.BinOp(left=left, op=op, right=right):
@@ -139,8 +143,8 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
     return si_number(values[_path(node, "")])
 
 
-def _truth(node: ast.expr, values: Mapping[str, Any]) -> bool:
-    """Return the value of an expression that must be a boolean. Raises TypeError if it is something else."""
+def _evaluate_boolean(node: ast.expr, values: Mapping[str, Any]) -> bool:
+    """Return the boolean value of an expression. Raises the errors of `_evaluate`, also TypeError for other values."""
     result = _evaluate(node, values)
     if not isinstance(result, bool):
         raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of true or false")
@@ -148,7 +152,7 @@ def _truth(node: ast.expr, values: Mapping[str, Any]) -> bool:
 
 
 def plain_values(tree: MappingNode, conditions: Iterable[Condition], changes: Iterable[Change]) -> dict[str, Any]:
-    """Return the value of each path in the conditions: that of the change if it is changed, else that in `tree`."""
+    """Return the values of all paths in the conditions: the value in `changes`, or else the value in `tree`."""
     changed = {change.target.path: change.value.plain for change in changes}
     paths = {path for condition in conditions for path in condition.paths}
     return {path: changed[path] if path in changed else written_value(tree, path) for path in sorted(paths)}
@@ -160,7 +164,7 @@ def all_hold(conditions: Iterable[Condition], values: Mapping[str, Any]) -> bool
 
 
 def written_value(tree: MappingNode, path: str) -> Any:
-    """Return the value that is written in the scenario at a path; None if there is none."""
+    """Return the YAML data at a path of the scenario; None if there is no value."""
     try:
         keys = resolve_path(path, tree.position, tree).keys
     except PathError:

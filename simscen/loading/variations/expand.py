@@ -1,6 +1,7 @@
-"""Expand a scenario with `variations:` to one scenario for each variation.
+"""Expansion of a scenario with `variations` to one scenario for each variation.
 
-`variations:` consists of one or more blocks. Each block combines the options of its axes (see axes.py).
+`variations` has one or more blocks. A block has axes, and an axis has options (new values for some paths). Each
+variation of a block combines one option of each axis.
 """
 
 import math
@@ -18,33 +19,33 @@ from simscen.loading.variations.paths import Target, set_value
 from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
-"""Keys of a scenario."""
+"""Top-level keys of a scenario."""
 MAX_TOTAL_VALUES = 5_000_000
-"""Limit on the number of keys and values of all variations of a scenario together, which bounds their memory."""
+"""Largest number of keys and values in all variations of a scenario together."""
 MAX_REJECTED_DRAWS = 10_000
-"""Number of consecutive draws that do not meet `require` after which drawing is given up with an error."""
+"""Number of consecutive random draws that may fail the conditions before an error is raised."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
-"""Top-level keys that do not change what happens in a run. Their values do not appear in names of variations."""
+"""Top-level keys that do not affect a run. Their values are not part of the names of variations."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """Tree of a scenario in which `changes` have been made. A file without variations has one, with the name ""."""
+    """Scenario `tree` that contains the new values in `changes`. `name` is "" for a file without variations."""
 
     name: str
     tree: MappingNode = field(repr=False)
     changes: tuple[Change, ...] = ()
 
     @classmethod
-    def of(cls, name: str, tree: MappingNode, changes: Sequence[Change]) -> "Variation":
-        """Make the changes to `tree`, and return the variation."""
+    def with_changes(cls, name: str, tree: MappingNode, changes: Sequence[Change]) -> "Variation":
+        """Return the variation of the scenario `tree` with these changes."""
         for change in changes:
             tree = set_value(tree, change.target, change.value)
         return cls(name, tree, tuple(changes))
 
     @property
     def set_by(self) -> Mapping[Position, str]:
-        """The path that set a value, by the position of the value; also for the parts of a changed mapping or list."""
+        """The path of the change that set a value, by the position of the value or of a part of it."""
         return {
             position: change.target.path
             for change in self.changes
@@ -53,15 +54,15 @@ class Variation:
 
     @property
     def values(self) -> dict[str, Any]:
-        """The changed values by path."""
+        """The new values by path."""
         return {change.target.path: change.value.plain for change in self.changes}
 
 
 @dataclass(frozen=True)
 class Block:
-    """A block of variations: axes whose options are combined, and conditions that a combination must meet.
+    """Block of variations. Each combination of one option of each axis that meets the conditions is a variation.
 
-    With `is_random`, it has a single axis, whose options are drawn at random.
+    With `is_random`, it has a single axis with options that are drawn at random.
     """
 
     axes: Sequence[Sequence[Option]]
@@ -74,7 +75,7 @@ class Block:
         return math.prod(map(len, self.axes))
 
     def options(self, index: int) -> list[Option]:
-        """Return the options of the combination with this index, from 0. The last axis changes fastest."""
+        """Return the combination with this index, from 0: one option of each axis. The last axis changes fastest."""
         if self.is_random:
             return [self.axes[0][index]]
         chosen = []
@@ -86,26 +87,28 @@ class Block:
 
 @dataclass(frozen=True)
 class VariationSpace:
-    """All variations of the scenario `tree`. They are numbered from 1 and built on demand.
-
-    `targets` are the targets of all varied paths, by path. With `is_random`, the variations are independent random
-    draws, and there is no largest number.
-    """
+    """All variations of a scenario. They are numbered from 1 and built on demand."""
 
     tree: MappingNode
+    """YAML tree of the scenario without its key `variations`."""
     blocks: Sequence[Block]
     targets: Mapping[str, Target]
+    """Targets of all varied paths, by path."""
     is_random: bool
+    """Whether the variations are independent random draws. There is no largest number then."""
 
     @property
     def count(self) -> int:
-        """Number of variations, including those that do not meet the conditions; of random draws, the number to run."""
+        """Number of variations, including variations that do not meet the conditions.
+
+        With `is_random`, the number of draws in the file.
+        """
         return sum(block.count for block in self.blocks)
 
     def variation(self, number: int) -> Variation | None:
-        """Return the variation with this number, called `variation-<number>`; None if it does not meet the conditions.
+        """Return the variation with this number, named `variation-<number>`; None if it does not meet the conditions.
 
-        Raises ConditionError if a condition cannot be evaluated, and IndexError if there is no such variation.
+        Raises ConditionError if a condition cannot be evaluated, and IndexError for an unknown number.
         """
         options = self._options(number)
         return None if options is None else self._build(numbered_name(number), options)
@@ -115,10 +118,10 @@ class VariationSpace:
         return self._options(number) is not None
 
     def numbers(self) -> Iterator[int]:
-        """Yield the numbers of the variations that `simscen run` runs: those that meet the conditions.
+        """Yield the numbers of the variations that meet the conditions; with `is_random`, only the first `count`.
 
-        For random draws, these are the first `count` of them. Raises ConditionError if a condition cannot be evaluated,
-        or if too many draws in a row do not meet the conditions.
+        Raises ConditionError if a condition cannot be evaluated, or if too many consecutive draws do not meet the
+        conditions.
         """
         if not self.is_random:
             yield from (number for number in range(1, self.count + 1) if self._options(number) is not None)
@@ -132,8 +135,8 @@ class VariationSpace:
             elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
 
-    def all_named(self) -> list[Variation]:
-        """Return the variations that `simscen run` runs, named after the values that differ. Raises ConditionError."""
+    def named_variations(self) -> list[Variation]:
+        """Return the variations with these numbers, named by the values that differ. Raises ConditionError."""
         numbers = list(self.numbers())
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
@@ -148,7 +151,10 @@ class VariationSpace:
         return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
 
     def _options(self, number: int) -> list[Option] | None:
-        """Return the options of a variation; None if it does not meet the conditions. Raises IndexError."""
+        """Return the options of a variation; None if it does not meet the conditions.
+
+        Raises ConditionError, and IndexError for an unknown number.
+        """
         index = number - 1
         for block in self.blocks:
             if index < block.count or self.is_random:
@@ -160,14 +166,14 @@ class VariationSpace:
         raise IndexError(number)
 
     def _build(self, name: str, options: Sequence[Option]) -> Variation:
-        return Variation.of(name, self.tree, [change for option in options for change in option.changes])
+        return Variation.with_changes(name, self.tree, [change for option in options for change in option.changes])
 
 
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
-    """Return all variations of a scenario in order, or those with these `numbers`; or problems of `variations:`.
+    """Return the variations of a scenario that meet the conditions; or the problems of its `variations`.
 
-    Numbers that do not exist, or whose variations do not meet the conditions, are skipped. A scenario without
-    `variations:` is returned as one variation with the name "".
+    `numbers` selects variations; None selects all. Unknown numbers are ignored. A scenario without `variations` is
+    returned as one variation with the name "".
     """
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):
@@ -178,7 +184,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
             return [one for number in numbers if (one := _numbered(space, number)) is not None]
         if problem := _too_many_problem(space, position):
             return [problem]
-        found = space.all_named()
+        found = space.named_variations()
     except ConditionError as error:
         return [Problem(*_require_position(tree), "SC016", str(error), "")]
     if not found and space.count:
@@ -187,7 +193,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
 
 
 def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
-    """Return the variations of a scenario; None if it has no `variations:`; or the problems of its `variations:`."""
+    """Return the space of variations of a scenario; None without `variations`; or the problems of its `variations`."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return None
@@ -214,7 +220,7 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
 
 
 def _numbered(space: VariationSpace, number: int) -> Variation | None:
-    """Return the variation with this number; None if it does not exist or does not meet the conditions."""
+    """Return the variation with this number; None if it is unknown or does not meet the conditions."""
     try:
         return space.variation(number)
     except IndexError:
@@ -222,7 +228,7 @@ def _numbered(space: VariationSpace, number: int) -> Variation | None:
 
 
 def _too_many_problem(space: VariationSpace, position: Position) -> Problem | None:
-    """Return a problem if there are too many variations, or too many values in all of them; else None."""
+    """Return a problem if there are too many variations, or too many values in all variations; else None."""
     from simscen.model.variations import MAX_VARIATIONS
 
     if space.count > MAX_VARIATIONS:
@@ -241,7 +247,7 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
 
 
 def _require_position(tree: MappingNode) -> Position:
-    """Return the position of the first `require`; that of `variations` if there is none."""
+    """Return the position of the first `require` in `variations`; of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
     for block in value.items if isinstance(value, SequenceNode) else [value]:
         if isinstance(block, MappingNode) and "require" in block.entries:
@@ -250,7 +256,7 @@ def _require_position(tree: MappingNode) -> Position:
 
 
 def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
-    """Return the name of the variation with these options; `keys` has the short name of each path that it shows."""
+    """Return the name of a variation with these options. `keys` are short names by path, only of paths in the name."""
     parts = []
     for option in options:
         shown = [change for change in option.changes if change.target.path in keys]

@@ -1,4 +1,4 @@
-"""Options of the axes of variations: changes of values that belong together, listed in a file or drawn at random."""
+"""Options of the axes of variations: new values for one or several paths, listed in a file or drawn at random."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass(frozen=True)
 class Change:
-    """New value of a target. `number` is the number of the value among the values for this target, from 1."""
+    """New value of a target. `number` is the number of the value in the list of values of its path, from 1."""
 
     target: Target
     value: Node
@@ -22,21 +22,18 @@ class Change:
 
 @dataclass(frozen=True)
 class Option:
-    """Changes that are made together, and the name that the author gave them; "" for none."""
+    """Changes that are made together. `name` is the name in the file; "" for none."""
 
     changes: tuple[Change, ...]
     name: str = ""
 
 
 class RandomOptions(Sequence[Option]):
-    """Options of `sampled` with `method: random`, which are drawn on demand.
+    """Options with random values, drawn on demand. Indices beyond the length are valid as well."""
 
-    The length is the `count` in the file, but higher indices can be drawn as well.
-    """
-
-    def __init__(self, sampled: "Sampled", ranges: MappingNode, targets: Sequence[Target]) -> None:
-        """Create the options; `ranges` is the tree of the distributions in `sampled`, by path."""
-        self._sampled, self._ranges, self._targets = sampled, ranges, targets
+    def __init__(self, sampled: "Sampled", distributions: MappingNode, targets: Sequence[Target]) -> None:
+        """Draw from the distributions in `sampled`. `distributions` is their YAML tree by path."""
+        self._sampled, self._distributions, self._targets = sampled, distributions, targets
 
     def __len__(self) -> int:
         return self._sampled.count
@@ -53,7 +50,7 @@ class RandomOptions(Sequence[Option]):
         drawn = [(target, draw_value(self._sampled, target.path, index)) for target in self._targets]
         return Option(
             tuple(
-                Change(target, value_node(self._ranges.entries[target.path].value, value), index + 1)
+                Change(target, value_node(self._distributions.entries[target.path].value, value), index + 1)
                 for target, value in drawn
             )
         )
@@ -63,9 +60,9 @@ class RandomOptions(Sequence[Option]):
 
 
 def value_node(distribution: Node, value: object) -> Node:
-    """Return the node of a value that was drawn from a distribution, whose tree is `distribution`.
+    """Return the YAML node of a value that was drawn from a distribution; `distribution` is its YAML tree.
 
-    For a ChoiceIndex, this is the node of the choice; for other values, a new node at the position of the distribution.
+    A ChoiceIndex stands for an item of a `choice`. Other values become a new node at the position of the distribution.
     """
     from simscen.loading.variations.sampling import ChoiceIndex
 
@@ -78,5 +75,5 @@ def value_node(distribution: Node, value: object) -> Node:
 
 
 def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
-    """Return options that represent the axis: all, but only the first of random ones, which change the same targets."""
+    """Return the options of an axis that together change all its targets: the first of random options, else all."""
     return axis[:1] if isinstance(axis, RandomOptions) else axis

@@ -1,7 +1,7 @@
-"""Resolve paths to the values that a variation changes: `robot.pose.x`, `goals[0].pose`, `faults.lidar.noise.std`.
+"""Paths to values of a scenario that a variation changes, such as `goals[0].pose` or `faults.lidar.noise.std`.
 
-The parts of a path are joined by dots. An item of a list is given by its index from 0, as `[0]` or `.0`, or by a name:
-its `name` or `id`, the place of a goal, the sensor of a fault, or the kind of a criterion or metric.
+A path selects an item of a list by its index from 0 (`[0]` or `.0`), or by its name: the value of `name` or `id`, the
+place of a goal, the sensor of a fault, or the kind of a criterion or metric.
 """
 
 import re
@@ -24,22 +24,22 @@ from simscen.loading.yaml.tree import (
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
 """Top-level keys of a scenario that contain lists."""
 KEYS_BY_KIND = frozenset({"pass", "metrics"})
-"""Top-level keys with lists whose items may be given by their kind."""
+"""Top-level keys with lists in which the kind of an item is a name of the item."""
 FIXED_KEYS = {
     "simscen": "all variations use one version of the language",
     "extends": "all variations extend the same file; vary the values that differ",
     "variations": "variations cannot be nested",
     "name": "each variation has its own name",
 }
-"""Keys that a variation cannot change, and the reason."""
-_PART = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
-"""One part of a path: a key, or a key or an index in brackets; a dot before it is skipped."""
+"""Top-level keys that a variation cannot change, with the reason."""
+_PART_PATTERN = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
+"""Pattern of one part of a path: a key, or a key or index in brackets. A dot can precede it."""
 _NAME_KEYS = ("name", "id", "sensor", "pose")
-"""Keys whose texts can name an item of a list."""
+"""Keys of an item of a list whose text is a name of the item."""
 
 
 class PathError(ValueError):
-    """Error for a path that is invalid, or leads to no value; `hint` says what to do."""
+    """A path is invalid, or leads to no value. `hint` is the next step for the user."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -48,7 +48,7 @@ class PathError(ValueError):
 
 @dataclass(frozen=True)
 class Target:
-    """Value that a variation changes: the path as written, the position of the path, and the keys of the value."""
+    """Value that a variation changes: its path, the position of the path in the file, and the keys of the value."""
 
     path: str
     position: Position
@@ -56,28 +56,29 @@ class Target:
 
 
 def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
-    """Return the target of a path that is written at `position`. Raises PathError.
+    """Return the target of a path in the scenario `tree`. `position` is the position of the path in the file.
 
-    The value need not exist in the scenario: missing keys of mappings are allowed, missing items of lists are not.
+    Keys of mappings may be missing in the scenario. Raises PathError for a missing item of a list, an invalid path, and
+    a key that a variation cannot change.
     """
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
-    return Target(path, position, _keys(path, parts, tree))
+    return Target(path, position, _resolve_keys(path, parts, tree))
 
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
-    """Return the scenario with `value` at the target. New mappings and keys have the position of the path."""
+    """Return a copy of the scenario with `value` at the target. Missing mappings get the position of the path."""
     changed = replace_at(tree, target.keys, value, target.position)
     assert isinstance(changed, MappingNode)
     return changed
 
 
 def split_path(path: str) -> list[str]:
-    """Return the parts of a path, without dots and brackets. Raises PathError for a path that is not valid."""
+    """Return the parts of a path without dots and brackets. Raises PathError for an invalid path."""
     parts, position = [], 0
     while position < len(path):
-        match = _PART.match(path, position)
+        match = _PART_PATTERN.match(path, position)
         part = match and next((group for group in match.groups() if group is not None), "").strip()
         if not match or not part or (position == 0 and path.startswith(".")):
             raise PathError(f"{quoted(path)} is not a valid path", "join keys with dots, e.g. `goals[0].pose.x`")
@@ -88,8 +89,8 @@ def split_path(path: str) -> list[str]:
     return parts
 
 
-def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
-    """Return the keys of the value to which the parts of a path lead. Raises PathError if they lead nowhere."""
+def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
+    """Return the keys of the value at a path with these parts. Raises PathError if the path leads nowhere."""
     node: Node | None = tree
     keys: list[Key] = []
     for number, part in enumerate(parts):
@@ -98,7 +99,7 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
                 keys.append(part)
                 node = node.entries[part].value if part in node.entries else None
             case SequenceNode():
-                found = _item(path, keys, node, part, parts[number + 1 :])
+                found = _item_keys(path, keys, node, part, parts[number + 1 :])
                 keys += found
                 for key in found:
                     node = child(node, key)
@@ -114,10 +115,11 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
     return tuple(keys)
 
 
-def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
-    """Return the index of the item that `part` gives in the list at `keys`; then the kind, if `part` is a kind.
+def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
+    """Return the index of the item that `part` of a path selects in the list at `keys`.
 
-    `rest` are the parts of the path after it. Raises PathError if there is no such item, or several.
+    If `part` is the kind of a criterion or metric, the kind follows the index, unless the path itself continues with a
+    key of the item. `rest` are the parts after `part`. Raises PathError if no item or several items match.
     """
     holder = dotted_path(keys)
     if part.isascii() and part.isdecimal():
@@ -153,7 +155,7 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
 
 
 def _names(item: Node) -> list[str]:
-    """Return the names of an item of a list; the name of a text is the text itself."""
+    """Return the names of an item of a list. The name of a text is the text itself."""
     if isinstance(item, ScalarNode):
         return [item.value] if isinstance(item.value, str) else []
     if not isinstance(item, MappingNode):
@@ -162,12 +164,12 @@ def _names(item: Node) -> list[str]:
     return [value.value for value in values if isinstance(value, ScalarNode) and isinstance(value.value, str)]
 
 
-def _describe(leaf: ScalarNode) -> str:
-    return short_value(leaf) if leaf.value is not None else "empty"
+def _describe(scalar: ScalarNode) -> str:
+    return short_value(scalar) if scalar.value is not None else "empty"
 
 
 def _scalar_hint(keys: list[Key]) -> str:
-    """Return what to do if a path leads into the scalar at `keys`, which names a file or a place; else ""."""
+    """Return the hint for a path that leads into the name of a file or place at `keys`; "" for other scalars."""
     if keys in (["world"], ["map"], ["robot", "model"]):
         what = "name other files by the path of this key" + (", or write the world inline" if keys == ["world"] else "")
         return f"values in another file cannot be varied; {what}"

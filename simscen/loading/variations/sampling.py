@@ -1,6 +1,6 @@
-"""Choose values of variations: draw them from distributions, or combine them so that each pair of values occurs.
+"""Sampling of values for variations: draws from distributions, and pairwise combinations (covering arrays).
 
-A drawn value depends only on the seed, the path, and the number of the draw, so a further path does not change it.
+A drawn value depends only on the seed, the path, and the number of the draw.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, S
 from simscen.spec.quantities import Amount, to_common_unit
 
 _SIGNIFICANT_DIGITS = 6
-"""Significant digits to which drawn numbers are rounded."""
+"""Number of significant digits to which drawn numbers are rounded."""
 
 
 class ChoiceIndex(NamedTuple):
@@ -24,69 +24,73 @@ class ChoiceIndex(NamedTuple):
 
 
 def draw_values(sampled: Sampled, path: str) -> list[Any]:
-    """Return the values of a path, in the order of the variations. Raises ValueError for an invalid distribution."""
-    return [value_at(sampled.values[path], u) for u in _probabilities(sampled, path)]
+    """Return the values of a path for all variations in order. Raises ValueError for an invalid distribution."""
+    return [quantile(sampled.values[path], u) for u in _probabilities(sampled, path)]
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
-    """Return the random value of a path with this index, from 0. It may exceed the `count` in the file.
+    """Return the random value of a path with this index, from 0, which may exceed `sampled.count`.
 
     Raises ValueError for an invalid distribution.
     """
-    return value_at(sampled.values[path], _hash(sampled.seed, path, "value", index))
+    return quantile(sampled.values[path], _hashed_uniform(sampled.seed, path, "value", index))
 
 
 def _probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return a cumulative probability between 0 and 1 (both excluded) for each variation, by the sampling method."""
+    """Return a cumulative probability between 0 and 1 (both excluded) for each variation.
+
+    The sampling method is `random`, Latin hypercube, or Sobol.
+    """
     count = sampled.count
     if sampled.method == "sobol":
         return _sobol_probabilities(sampled, path)
-    probabilities = [_hash(sampled.seed, path, "value", number) for number in range(count)]
+    probabilities = [_hashed_uniform(sampled.seed, path, "value", number) for number in range(count)]
     if sampled.method == "random":
         return probabilities
     # Latin hypercube: each of `count` equal intervals is used once, in a random order.
-    order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
+    order = sorted(range(count), key=lambda number: _hashed_uniform(sampled.seed, path, "stratum", number))
     return [(stratum + offset) / count for stratum, offset in zip(order, probabilities, strict=True)]
 
 
 def _sobol_probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return the coordinates of a path in the points of a Sobol sequence, shifted by a random number modulo 1.
+    """Return the coordinates of a path in the points of a Sobol sequence with a random shift modulo 1.
 
     (Joe and Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008; Cranley and Patterson:
     Randomization of Number Theoretic Methods for Multiple Integration, 1976.)
     """
     coordinate = sorted(sampled.values).index(path)
-    shift = _hash(sampled.seed, path, "shift", 0)
+    shift = _hashed_uniform(sampled.seed, path, "shift", 0)
     points = _sobol_points(len(sampled.values), sampled.count)[:, coordinate]
     return [min(max(float(u), 2.0**-53), 1 - 2.0**-53) for u in (points + shift) % 1.0]
 
 
 @cache
 def _sobol_points(dimensions: int, count: int) -> Any:
-    """Return the first points of the Sobol sequence without scrambling, shape (count, dimensions)."""
+    """Return the first `count` points of the unscrambled Sobol sequence, shape (count, dimensions)."""
     from scipy.stats.qmc import Sobol  # the import takes half a second
 
     exponent = max(0, math.ceil(math.log2(count)))
     return Sobol(dimensions, scramble=False).random_base2(exponent)[:count]
 
 
-def _hash(seed: int, path: str, purpose: str, number: int) -> float:
-    """Return a pseudorandom number from the uniform distribution on (0, 1) that depends only on the arguments."""
+def _hashed_uniform(seed: int, path: str, purpose: str, number: int) -> float:
+    """Return a number from the uniform distribution on (0, 1), computed by a hash of the arguments."""
     digest = hashlib.sha256(f"{seed}\0{path}\0{purpose}\0{number}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
 
 
-def value_at(draw: Draw, u: float) -> Any:
-    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1 (its quantile).
+def quantile(distribution: Draw, u: float) -> Any:
+    """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1.
 
-    Quantities are texts with their unit, choices are ChoiceIndex. Raises ValueError for an invalid distribution.
+    A quantity is text with its unit, an item of a `choice` is a ChoiceIndex. Raises ValueError for an invalid
+    distribution.
     """
-    match draw.chosen:
+    match distribution.chosen:
         case Uniform(root=ends):
-            (low, high), unit = _ordered(ends)
+            (low, high), unit = _ends_in_common_unit(ends)
             return _with_unit(low + u * (high - low), unit)
         case LogUniform(root=ends):
-            (low, high), unit = _ordered(ends)
+            (low, high), unit = _ends_in_common_unit(ends)
             if low <= 0:
                 raise ValueError("the ends of `log_uniform` must be greater than 0")
             return _with_unit(low * (high / low) ** u, unit)
@@ -97,11 +101,11 @@ def value_at(draw: Draw, u: float) -> Any:
         case OneOf(root=values):
             return ChoiceIndex(math.floor(u * len(values)))
         case Normal() as normal:
-            return _normal(normal, u)
-    raise AssertionError(draw.kind)
+            return _truncated_normal_quantile(normal, u)
+    raise AssertionError(distribution.kind)
 
 
-def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
+def _ends_in_common_unit(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
     """Return the ends of a range as numbers and their common unit. Raises ValueError if the range is empty."""
     (low, high), unit = to_common_unit(ends)
     if low > high:
@@ -109,8 +113,8 @@ def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
     return (low, high), unit
 
 
-def _normal(normal: Normal, u: float) -> Any:
-    """Return the quantile of a normal distribution that is truncated to `min` and `max`. Raises ValueError."""
+def _truncated_normal_quantile(normal: Normal, u: float) -> Any:
+    """Return the quantile of a normal distribution truncated to `min` and `max`. Raises ValueError if it is invalid."""
     from statistics import NormalDist  # slow to import, rarely needed
 
     ends = [end for end in (normal.min, normal.max) if end is not None]
@@ -131,26 +135,26 @@ def _normal(normal: Normal, u: float) -> Any:
 
 
 def _with_unit(number: float, unit: str) -> Any:
-    """Return a rounded number; with a unit, as text such as "0.5 m"."""
+    """Return the rounded number; with a unit as text, such as "0.5 m"."""
     rounded = float(f"{number:.{_SIGNIFICANT_DIGITS}g}")
     return f"{rounded!r} {unit}" if unit else rounded
 
 
 Row = tuple[int, ...]
-"""Combination of values: for each parameter, the index of its value."""
+"""Combination of values: the index of the value of each parameter."""
 Pair = tuple[int, int, int, int]
-"""Pair of values of two parameters: (parameter, index of its value, later parameter, index of its value)."""
-CANDIDATE_ROWS = 30
-"""Number of rows that are tried for each row of the array; the one with the most new pairs is used."""
+"""Pair of values of two parameters: (first parameter, index of value, second parameter, index of value)."""
+CANDIDATES_PER_ROW = 30
+"""Number of candidates for each row of a covering array. The candidate with the most new pairs is used."""
 MAX_CHECKED_ROWS = 200_000
-"""Largest number of rows that are searched for one that contains a given pair and is allowed."""
+"""Largest number of rows that are searched for an allowed row with a given pair."""
 
 
 def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> list[Row]:
-    """Return few allowed rows that together contain each pair of values that occurs in any allowed row.
+    """Return a pairwise covering array: few allowed rows that contain each pair of values of two parameters.
 
-    `counts` are the numbers of values of the parameters. The search is greedy and deterministic. (Cohen et al.: The
-    AETG System, 1997.)
+    Pairs that no allowed row contains are left out. `counts` are the numbers of values of the parameters. The search is
+    greedy and deterministic. (Cohen et al.: The AETG System, 1997.)
     """
     if len(counts) == 1:
         return [(value,) for value in range(counts[0]) if is_allowed((value,))]
@@ -166,8 +170,8 @@ def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> 
         best = max(
             (
                 row
-                for attempt in range(CANDIDATE_ROWS)
-                if (row := _complete(pair, counts, uncovered, attempt, is_allowed)) is not None
+                for attempt in range(CANDIDATES_PER_ROW)
+                if (row := _candidate_row(pair, counts, uncovered, attempt, is_allowed)) is not None
             ),
             key=lambda row: len(pairs_of(row) & uncovered),
             default=None,
@@ -187,17 +191,17 @@ def pairs_of(row: Row) -> set[Pair]:
     return {(a, row[a], b, row[b]) for a, b in combinations(range(len(row)), 2)}
 
 
-def _complete(
+def _candidate_row(
     pair: Pair,
     counts: Sequence[int],
     uncovered: set[Pair],
     attempt: int,
     is_allowed: Callable[[Row], bool],
 ) -> Row | None:
-    """Return a row that contains the pair; None if the row that was found is not allowed.
+    """Return a row that contains `pair` and many pairs of `uncovered`; None if this row is not allowed.
 
-    The other values are chosen one by one so that the row gets most pairs of `uncovered`. `attempt` changes the order
-    of the parameters, and of values that are equally good.
+    The other values are chosen greedily, one parameter after the other. `attempt` changes the order of the parameters
+    and values.
     """
     a, x, b, y = pair
     chosen = {a: x, b: y}
@@ -224,7 +228,7 @@ def _complete(
 
 
 def _any_row_with(pair: Pair, counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> Row | None:
-    """Return the first allowed row that contains the pair; None if there is none among the first MAX_CHECKED_ROWS."""
+    """Return the first allowed row that contains `pair`, among the first MAX_CHECKED_ROWS with the pair; else None."""
     a, x, b, y = pair
     fixed = {a: (x,), b: (y,)}
     choices = [fixed.get(parameter, range(count)) for parameter, count in enumerate(counts)]

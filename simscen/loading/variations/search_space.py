@@ -1,4 +1,4 @@
-"""Space of values that `simscen falsify` searches: one dimension for each path under `sampled` in `variations:`."""
+"""Space of values that `simscen falsify` searches: one dimension for each path under `sampled` of `variations`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,47 +10,48 @@ from simscen.loading.variations.conditions import Condition, all_hold, plain_val
 from simscen.loading.variations.expand import VARIATIONS, Variation
 from simscen.loading.variations.options import Change, value_node
 from simscen.loading.variations.paths import Target
-from simscen.loading.variations.sampling import value_at
+from simscen.loading.variations.sampling import quantile
 from simscen.loading.yaml.tree import MappingNode, SequenceNode, node_at
 from simscen.model.variations import OneOf, Sampled, VariationsSection
 
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Distributions of the values of `targets`, and conditions on them. Each target is one dimension, in this order.
-
-    `tree` is the scenario without `variations`, and `ranges` is the tree of the distributions, by path.
-    """
+    """Distributions of the values of some paths, and conditions on the values. Each path is one dimension."""
 
     tree: MappingNode
+    """YAML tree of the scenario without its key `variations`."""
     sampled: Sampled
-    ranges: MappingNode
+    """Distributions by path."""
+    distributions: MappingNode
+    """YAML tree of the distributions by path."""
     targets: Sequence[Target]
+    """Target of each dimension."""
     conditions: Sequence[Condition]
 
     @property
     def choice_counts(self) -> list[int]:
-        """For each dimension, the number of values of a `choice`; 0 for other distributions."""
+        """Number of values of each dimension that is a `choice`; 0 for other distributions."""
         chosen = [self.sampled.values[target.path].chosen for target in self.targets]
         return [len(one.root) if isinstance(one, OneOf) else 0 for one in chosen]
 
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
-        """Return the scenario with the values at `point` as a variation; None if they do not meet the conditions.
+        """Return the variation at a point; None if it does not meet the conditions.
 
-        `point` has a cumulative probability (0 < p < 1) for each dimension, at which the value is taken from its
-        distribution. Raises ConditionError if a condition cannot be evaluated.
+        The coordinates of the point are cumulative probabilities between 0 and 1 (both excluded); the values are the
+        quantiles of the distributions. Raises ConditionError if a condition cannot be evaluated.
         """
         changes = []
-        for target, u in zip(self.targets, point, strict=True):
-            value = value_at(self.sampled.values[target.path], u)
-            changes.append(Change(target, value_node(self.ranges.entries[target.path].value, value), 1))
+        for target, probability in zip(self.targets, point, strict=True):
+            value = quantile(self.sampled.values[target.path], probability)
+            changes.append(Change(target, value_node(self.distributions.entries[target.path].value, value), 1))
         if not all_hold(self.conditions, plain_values(self.tree, self.conditions, changes)):
             return None
-        return Variation.of(name, self.tree, changes)
+        return Variation.with_changes(name, self.tree, changes)
 
 
 def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
-    """Return the space that `variations: {sampled: …}` of a scenario describes; or the problems of `variations:`."""
+    """Return the search space of a scenario with `variations: {sampled: …}`; or the problems of its `variations`."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         message, hint = "the scenario has no `variations` to search", "add `sampled` with the range of each value"
@@ -70,8 +71,8 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
     builder.check_condition_paths(conditions, node)
     if builder.problems:
         return builder.problems
-    ranges = node_at(node, ("sampled", "values"))
-    assert isinstance(ranges, MappingNode)
+    distributions = node_at(node, ("sampled", "values"))
+    assert isinstance(distributions, MappingNode)
     assert block.sampled is not None
-    targets = [builder.targets[path] for path in ranges.entries]
-    return SearchSpace(own, block.sampled, ranges, targets, conditions)
+    targets = [builder.targets[path] for path in distributions.entries]
+    return SearchSpace(own, block.sampled, distributions, targets, conditions)

@@ -1,9 +1,4 @@
-"""Parse YAML to a tree with positions, within limits on depth and size.
-
-The tree is built from PyYAML's events, not by its constructors. These accept duplicate keys silently, raise plain
-ValueErrors, expand alias bombs (aliases of aliases that grow exponentially), and overflow the C stack at 30 000
-brackets.
-"""
+"""YAML parser that returns a tree with positions, and limits the depth and size of files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -21,10 +16,11 @@ MAX_DEPTH = 40
 MAX_VALUES = 100_000
 """Largest number of keys and values of a file, after the expansion of aliases."""
 
-# libyaml, if PyYAML was built with it, yields the same events ten times faster.
+# The tree is built from PyYAML's events. PyYAML's constructors accept duplicate keys silently, expand alias bombs, and
+# overflow the C stack at 30 000 brackets. libyaml yields the same events ten times faster, if PyYAML was built with it.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
-"""Message of libyaml for its own limit on the depth."""
+"""Message of libyaml if a file exceeds its own limit on the depth."""
 
 
 class _ParseError(Exception):
@@ -34,15 +30,15 @@ class _ParseError(Exception):
         self.problem = problem
 
 
-def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
+def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    `path` is the name of the file in problems. With `last_wins`, the last of several equal keys is used, and the others
-    are warnings, as in parameter files of ROS 2.
+    `path` is the path of the file in messages. With `allow_duplicates`, the last of several equal keys is used with a
+    warning, as in ROS 2 parameter files.
     """
-    composer = _Composer(path, text, last_wins)
+    composer = _Composer(path, text, allow_duplicates)
     try:
-        root = composer.document()
+        root = composer.compose_document()
     except _ParseError as error:
         return None, [*composer.problems, error.problem]
     return root, composer.problems
@@ -50,40 +46,40 @@ def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node |
 
 @dataclass(frozen=True)
 class _Anchor:
-    """Anchored node, the number of its keys and values, and the number of levels below it.
-
-    Each alias of the node counts them again toward the limits.
-    """
+    """Node with an anchor. Each alias of the node counts its values and levels again toward the limits."""
 
     node: Node
-    values: int
-    depth: int
+    value_count: int
+    """Number of keys and values in the node."""
+    height: int
+    """Number of levels below the node."""
 
 
 @dataclass
 class _Composer:
     """Builds the tree of a text from PyYAML's events, and collects problems.
 
-    Methods that return a node return with it the number of levels below it. `depth` is the level of a node, from 1.
+    `depth` is the level of a node, from 1. A method that returns a node also returns its height, the number of levels
+    below the node.
     """
 
     path: str
     text: str
-    last_wins: bool = False
+    allow_duplicates: bool = False
     problems: list[Problem] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._events = self._parse()
+        self._events = self._parse_events()
         self._anchors: dict[str, _Anchor | None] = {}
-        self._values = 0
+        self._value_count = 0
 
-    def document(self) -> Node | None:
-        """Return the root of the only document. Raises _ParseError if there is none, or a second one."""
+    def compose_document(self) -> Node | None:
+        """Return the root of the only document. Raises _ParseError if there is no document, or a second one."""
         next(self._events)  # the start of the stream
         if isinstance(next(self._events), ev.StreamEndEvent):
             raise _ParseError(self._problem(None, "SC004", "the file is empty"))
         start = next(self._events)
-        root, _ = self._node(start, 1)
+        root, _ = self._compose_node(start, 1)
         next(self._events)  # the end of the document
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
@@ -91,12 +87,10 @@ class _Composer:
             raise _ParseError(self._problem(after, "SC004", message, "put each scenario into its own file"))
         return root
 
-    def _parse(self, end: int | None = None, skip: int = 0) -> Iterator[ev.Event]:
-        """Yield the events of the text up to the index `end`, without the first `skip` events.
-
-        libyaml reads ahead of its events, and since 0.2.6 it fails at a depth of 1000. The text before that place is
-        then parsed again, because its events show where it becomes deeper than MAX_DEPTH.
-        """
+    def _parse_events(self, end: int | None = None, skip: int = 0) -> Iterator[ev.Event]:
+        """Yield the events of the text up to the index `end`, without the first `skip` events. Raises _ParseError."""
+        # libyaml reads ahead of its events, and since 0.2.6 it fails at a depth of 1000. The text before that place is
+        # then parsed again, because its events show where it becomes deeper than MAX_DEPTH.
         count = 0
         try:
             for count, event in enumerate(yaml.parse(self.text[:end], Loader=_Loader), 1):
@@ -104,38 +98,38 @@ class _Composer:
                     yield event
         except yaml.MarkedYAMLError as error:
             if end is None and error.problem == _LIBYAML_TOO_DEEP and error.problem_mark:
-                yield from self._parse(error.problem_mark.index, count)
+                yield from self._parse_events(error.problem_mark.index, count)
             raise _ParseError(self._syntax_problem(error)) from None
         except yaml.YAMLError as error:
             raise _ParseError(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
-    def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
-        """Return the node that begins with `event`, and the number of levels below it. Raises _ParseError."""
+    def _compose_node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
+        """Return the node that begins with `event`, and its height. Raises _ParseError."""
         if isinstance(event, ev.AliasEvent):
-            return self._alias(event, depth)
+            return self._compose_alias(event, depth)
         if depth > MAX_DEPTH:
             raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
         assert isinstance(event, ev.NodeEvent)
         self._report_tag(event)
-        self._count(event, 1)
-        before = self._values
+        self._count_values(event, 1)
+        before = self._value_count
         if event.anchor is not None:
             self._anchors[event.anchor] = None
-        node, height = self._content(event, depth)
+        node, height = self._compose_content(event, depth)
         if event.anchor is not None:
-            self._anchors[event.anchor] = _Anchor(node, self._values - before + 1, height)
+            self._anchors[event.anchor] = _Anchor(node, self._value_count - before + 1, height)
         return node, height
 
-    def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
-        """Return the node that begins with `event`, which is not an alias."""
+    def _compose_content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        """Return the scalar, sequence, or mapping that begins with `event`, and its height."""
         if isinstance(event, ev.ScalarEvent):
-            return ScalarNode(self._position_of(event), self._scalar(event)), 0
+            return ScalarNode(self._position_of(event), self._scalar_value(event)), 0
         if isinstance(event, ev.SequenceStartEvent):
-            return self._sequence(event, depth)
-        return self._mapping(event, depth)
+            return self._compose_sequence(event, depth)
+        return self._compose_mapping(event, depth)
 
-    def _scalar(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
-        """Return the value of a scalar; reports an integer that is too large, and returns 0 instead."""
+    def _scalar_value(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        """Return the value of a scalar; for an integer that is too large, report a problem and return 0."""
         if not event.implicit[0]:
             return str(event.value)
         try:
@@ -144,35 +138,35 @@ class _Composer:
             self.problems.append(self._problem(event, "SC008", str(error)))
             return 0
 
-    def _sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+    def _compose_sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
         items, height = [], 0
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
-            item, below = self._node(event, depth + 1)
+            item, below = self._compose_node(event, depth + 1)
             items.append(item)
             height = max(height, below)
         return SequenceNode(self._position_of(start), tuple(items)), height + 1
 
-    def _mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+    def _compose_mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
         entries: dict[str, Entry] = {}
         merged: list[Node] = []
         height = 0
         while not isinstance(event := next(self._events), ev.MappingEndEvent):
-            key = self._key(event)
-            value, below = self._node(next(self._events), depth + 1)
+            key = self._read_key(event)
+            value, below = self._compose_node(next(self._events), depth + 1)
             height = max(height, below)
             if key == "<<" and isinstance(value, MappingNode | SequenceNode):
                 merged.extend(value.items if isinstance(value, SequenceNode) else [value])
                 continue
             if key in entries:
                 self._report_duplicate(event, key, entries[key].key)
-            if self.last_wins or key not in entries:
+            if self.allow_duplicates or key not in entries:
                 entries[key] = Entry(self._position_of(event), value)
-        return MappingNode(self._position_of(start), self._merge(start, entries, merged)), height + 1
+        return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged)), height + 1
 
-    def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Return `entries` with the keys of the mappings `merged` that were given by the merge key `<<`.
+    def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
+        """Return `entries` with the keys of the mappings `merged`, the values of the merge key `<<`.
 
-        The keys in `entries` have priority, then those of earlier mappings.
+        Keys in `entries` have priority, then keys of earlier mappings.
         """
         for other in merged:
             if not isinstance(other, MappingNode):
@@ -181,33 +175,38 @@ class _Composer:
             entries = {**other.entries, **entries} if other.entries.keys() - entries.keys() else entries
         return entries
 
-    def _key(self, event: ev.Event) -> str:
+    def _read_key(self, event: ev.Event) -> str:
+        """Return the key of a mapping as text. Raises _ParseError if it is not a scalar."""
         if not isinstance(event, ev.ScalarEvent):
             raise _ParseError(self._problem(event, "SC003", "a key must be text; it is a list, a mapping or an alias"))
         self._report_tag(event)
-        self._count(event, 1)
+        self._count_values(event, 1)
         return str(event.value)
 
-    def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
-        """Return the node of the anchor to which an alias refers. Raises _ParseError if there is none, or a circle."""
+    def _compose_alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
+        """Return the node to which an alias refers, and its height.
+
+        Raises _ParseError if there is no such anchor, or if the node contains the alias itself.
+        """
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         anchor = self._anchors[event.anchor]
         if anchor is None:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
-        if depth + anchor.depth > MAX_DEPTH:
+        if depth + anchor.height > MAX_DEPTH:
             raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
-        self._count(event, anchor.values)
-        return anchor.node, anchor.depth
+        self._count_values(event, anchor.value_count)
+        return anchor.node, anchor.height
 
-    def _count(self, event: ev.Event, values: int) -> None:
-        """Add to the number of values. Raises _ParseError if there are too many."""
-        self._values += values
-        if self._values > MAX_VALUES:
+    def _count_values(self, event: ev.Event, count: int) -> None:
+        """Add `count` to the number of values. Raises _ParseError if there are too many."""
+        self._value_count += count
+        if self._value_count > MAX_VALUES:
             subject = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
             raise _ParseError(self._problem(event, "SC006", f"{subject} more than {MAX_VALUES} values"))
 
     def _report_tag(self, event: ev.Event) -> None:
+        """Add a problem if the node has a YAML tag such as `!!int`."""
         tag = getattr(event, "tag", None)
         if tag is not None:
             short = tag.replace("tag:yaml.org,2002:", "!!", 1)
@@ -216,8 +215,9 @@ class _Composer:
             )
 
     def _report_duplicate(self, event: ev.Event, key: str, first: Position) -> None:
+        """Add a problem or warning for a key that occurred at the position `first` before."""
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
-        if self.last_wins:
+        if self.allow_duplicates:
             problem = self._problem(event, "SC007", message, "this one is used, as in ROS 2")
             self.problems.append(replace(problem, severity="warning"))
         else:
@@ -233,7 +233,7 @@ class _Composer:
         return Problem(*position, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
-        """Return the problem for a syntax error of PyYAML, in words that name the likely mistake."""
+        """Return the problem for a syntax error of PyYAML."""
         mark = error.problem_mark or error.context_mark
         if mark is None:
             return self._problem(None, "SC003", error.problem or "cannot be read as YAML")
@@ -256,7 +256,7 @@ class _Composer:
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
 
     def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """Return a problem if a character in the lines `first` to `last` (from 0) only looks like YAML syntax."""
+        """Return a problem for the first lookalike character in the lines `first` to `last`, from 0, or None."""
         for number in range(first, min(last + 1, len(lines))):
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:

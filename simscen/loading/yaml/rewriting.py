@@ -1,4 +1,4 @@
-"""Write changed content over a YAML text, so that the parts that did not change keep their lines and comments."""
+"""New content for a YAML text. Unchanged parts keep their lines and comments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,15 +10,15 @@ from simscen.loading.yaml.scalars import Dumper, to_yaml
 from simscen.loading.yaml.tree import MappingNode, SequenceNode
 
 LINE_WIDTH_CHARS = 100
-"""Width at which lists and mappings in new lines are broken."""
+"""Length of a line above which new lists and mappings are continued in the next line."""
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
-    """Return `content` as YAML text. Top-level keys and list items that are equal in `text` keep their lines.
+    """Return `content` as YAML text. Top-level keys and list items with the same value in `text` keep their lines.
 
-    The lines of a key or item include the comments directly above it. `path` is the name of the file of `text`.
-    `comment` is put at the top, with `# ` before each of its lines. If lines cannot be kept, for example because they
-    refer to anchors in other lines, all of `content` is written anew.
+    The lines of a key or item include the comments directly above it. No lines are kept if the result would not be
+    equal to `content`, for example because of YAML anchors. `path` is the path of `text` in messages. `comment` becomes
+    a comment at the top.
     """
     original, _ = parse_yaml(text, path)
     lines = text.splitlines()
@@ -28,7 +28,7 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
     parts = [head]
     for key, value in content.items():
         if key in segments and known.get(key) == value:
-            parts.append(_block(segments[key]))
+            parts.append(_joined_lines(segments[key]))
         elif isinstance(original, MappingNode) and key in segments and isinstance(value, list):
             parts.append(_list_text(key, value, original, lines, segments[key]))
         else:
@@ -41,7 +41,7 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
 
 
 def _segments(original: MappingNode, lines: Sequence[str]) -> dict[str, list[str]]:
-    """Return the lines of each top-level key with the comments directly above it; {} if the mapping is in braces."""
+    """Return the lines of each top-level key, with the comments directly above it; {} for a mapping in braces."""
     keys = sorted(original.entries, key=lambda key: original.entries[key].key.line)
     if any(original.entries[key].key.col != 1 for key in keys):
         return {}
@@ -51,16 +51,16 @@ def _segments(original: MappingNode, lines: Sequence[str]) -> dict[str, list[str
 
 
 def _with_comments(start: int, lines: Sequence[str]) -> int:
-    """Return the index of the first of the comment lines directly above the line `start`; `start` if there are none."""
+    """Return the index of the first comment line directly above the line `start`; `start` if there is no comment."""
     while start > 0 and lines[start - 1].lstrip().startswith("#"):
         start -= 1
     return start
 
 
 def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequence[str], segment: Sequence[str]) -> str:
-    """Return the text of a top-level key with a list whose unchanged items keep their lines.
+    """Return the text of a top-level key with the list `value`. Unchanged items keep their lines.
 
-    `lines` are all lines of the original text, `segment` are those of the key.
+    `lines` are all lines of the original text, `segment` are the lines of this key.
     """
     node = original.entries[key].value
     start = original.entries[key].key.line - 1
@@ -76,8 +76,8 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     end = _with_comments(start, lines) + len(segment)
     ends = [*starts[1:], end]
     indent = len(lines[first_lines[0]]) - len(lines[first_lines[0]].lstrip())
-    texts = [_block(lines[first:last]) for first, last in zip(starts, ends, strict=True)]
-    head = _block(lines[_with_comments(start, lines) : starts[0]])
+    texts = [_joined_lines(lines[first:last]) for first, last in zip(starts, ends, strict=True)]
+    head = _joined_lines(lines[_with_comments(start, lines) : starts[0]])
     parts, rest = [], list(zip((item.plain for item in node.items), texts, strict=True))
     for item in value:
         same = next((index for index, (plain, _) in enumerate(rest) if plain == item), None)
@@ -89,7 +89,7 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     return head + "".join(parts)
 
 
-def _block(lines: Sequence[str]) -> str:
+def _joined_lines(lines: Sequence[str]) -> str:
     """Return lines as text, without blank lines at the end."""
     trimmed = list(lines)
     while trimmed and not trimmed[-1].strip():
@@ -102,20 +102,21 @@ def _indented(text: str, columns: int) -> str:
 
 
 def _dumped(data: Any) -> str:
-    """Return the YAML of a list or top-level mapping; only the innermost collections are in braces and brackets."""
+    """Return the YAML text of a list or mapping. Only the innermost collections are in braces or brackets."""
     if isinstance(data, dict):
         return "".join(_entry(key, value) for key, value in data.items())
-    return _flow(data)
+    return _dump_innermost_flow(data)
 
 
 def _entry(key: str, value: Any) -> str:
-    """Return a top-level key with its value, on the same line if that is short."""
-    text = _flow({key: value})
+    """Return the YAML text of a top-level key and its value."""
+    text = _dump_innermost_flow({key: value})
     is_braced = text.startswith("{")
     return f"{text.strip()[1:-1]}\n" if is_braced else text
 
 
-def _flow(data: Any) -> str:
+def _dump_innermost_flow(data: Any) -> str:
+    """Return YAML text with only the innermost collections in braces or brackets."""
     text: str = yaml.dump(
         data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=LINE_WIDTH_CHARS, default_flow_style=None
     )

@@ -1,4 +1,4 @@
-"""Find where each value of a YAML text begins and ends, so that an editor can replace single values in the text."""
+"""Start and end of each value in a YAML text, so that an editor can replace single values."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,18 +14,15 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True)
 class SourceNode:
-    """Value in a text: `text[start:end]` is the value without its anchor and tag, and without comments after it.
-
-    `flow` is true for collections in brackets or braces, and for values inside of them (YAML's flow style). `style` is
-    the first character of a scalar that is quoted or a block (`"`, `'`, `|`, or `>`); "" for other values. Sequences
-    have `items`, mappings have `entries`.
-    """
+    """Value in a YAML text. `text[start:end]` is the value without its anchor, its tag, and comments after it."""
 
     kind: Literal["scalar", "sequence", "mapping", "alias"]
     start: int
     end: int
     flow: bool
+    """Whether the value is in YAML's flow style: a collection in brackets or braces, or a value inside one."""
     style: str = ""
+    """First character of a quoted scalar or block scalar: `"`, `'`, `|`, or `>`; "" for other values."""
     items: tuple["SourceNode", ...] = ()
     entries: dict[str, "SourceEntry"] = field(default_factory=dict)
 
@@ -40,17 +37,17 @@ class SourceEntry:
 
 
 def parse_source(text: str) -> SourceNode | None:
-    """Return the root of the first document of a text; None if it cannot be parsed."""
+    """Return the root of the first YAML document in a text; None if it cannot be parsed."""
     try:
         events = yaml.parse(text, Loader=_Loader)
         start = next(event for event in events if isinstance(event, ev.NodeEvent))
-        return _Composer(text, events).node(start, flow=False)
+        return _Composer(text, events).compose_node(start, flow=False)
     except (yaml.YAMLError, StopIteration, RecursionError):
         return None
 
 
 def source_at(node: SourceNode, keys: Sequence[Key]) -> SourceNode | None:
-    """Return the node at `keys`; None if there is none, or if it belongs to an alias, and so is written elsewhere."""
+    """Return the node at `keys`; None if there is none, or if an alias contains it."""
     for key in keys:
         if isinstance(key, int) and node.kind == "sequence" and 0 <= key < len(node.items):
             node = node.items[key]
@@ -67,8 +64,8 @@ class _Composer:
     def __init__(self, text: str, events: Iterator[ev.Event]) -> None:
         self._text, self._events = text, events
 
-    def node(self, event: ev.Event, flow: bool) -> SourceNode:
-        """Return the node that begins with `event`; `flow` means that it is inside of brackets or braces."""
+    def compose_node(self, event: ev.Event, flow: bool) -> SourceNode:
+        """Return the node that begins with `event`. `flow` is true inside brackets or braces."""
         start, end = _index(event.start_mark), _index(event.end_mark)
         if isinstance(event, ev.AliasEvent):
             return SourceNode("alias", start, end, flow)
@@ -80,30 +77,30 @@ class _Composer:
             return SourceNode("scalar", start, end, flow, style)
         flow = flow or self._text[start : start + 1] in ("[", "{")
         if isinstance(event, ev.SequenceStartEvent):
-            return self._sequence(start, flow)
-        return self._mapping(start, flow)
+            return self._compose_sequence(start, flow)
+        return self._compose_mapping(start, flow)
 
-    def _sequence(self, start: int, flow: bool) -> SourceNode:
+    def _compose_sequence(self, start: int, flow: bool) -> SourceNode:
         items = []
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
-            items.append(self.node(event, flow))
+            items.append(self.compose_node(event, flow))
         end = _index(event.end_mark) if flow or not items else items[-1].end
         return SourceNode("sequence", start, end, flow, items=tuple(items))
 
-    def _mapping(self, start: int, flow: bool) -> SourceNode:
+    def _compose_mapping(self, start: int, flow: bool) -> SourceNode:
         entries: dict[str, SourceEntry] = {}
         last = start
         while not isinstance(event := next(self._events), ev.MappingEndEvent):
-            key = self.node(event, flow)
+            key = self.compose_node(event, flow)
             name = event.value if isinstance(event, ev.ScalarEvent) else self._text[key.start : key.end]
-            value = self.node(next(self._events), flow)
+            value = self.compose_node(next(self._events), flow)
             last = max(value.end, key.end)
             entries.setdefault(str(name), SourceEntry(key.start, key.end, value))
         end = _index(event.end_mark) if flow else last
         return SourceNode("mapping", start, end, flow, entries=entries)
 
     def _after_properties(self, event: ev.NodeEvent, start: int) -> int:
-        """Return the index after the anchor and the tag (YAML's node properties) of a node that begins at `start`."""
+        """Return the index after the anchor and the tag of a node that begins at the index `start`."""
         for _ in range(2):
             if self._text[start : start + 1] in ("&", "!") and (event.anchor or getattr(event, "tag", None)):
                 while start < len(self._text) and not self._text[start].isspace():

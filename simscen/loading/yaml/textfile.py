@@ -1,4 +1,4 @@
-"""Read text files from untrusted sources, and explain unsuitable content: control characters and lookalikes."""
+"""Reading of text files from untrusted sources, and messages about control characters and lookalike characters."""
 
 import errno
 import os
@@ -17,10 +17,9 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u
 
 
 def read_text(path: Path, display_name: str) -> str | Problem:
-    """Return the text of a file with line breaks as \\n, or a problem; `display_name` is the name in problems.
+    """Return the text of a file with line breaks as \\n, or a problem. `display_name` is its path in messages.
 
-    The file must be in UTF-8, without control characters, and not larger than 1 MiB. A FIFO, device, socket or folder
-    is rejected without being read.
+    It must be a regular file in UTF-8, without control characters, of at most 1 MiB.
     """
     try:
         raw = _read_bytes(path)
@@ -32,7 +31,7 @@ def read_text(path: Path, display_name: str) -> str | Problem:
 
 
 def os_error_reason(error: OSError) -> str:
-    """Return why a file could not be opened."""
+    """Return the reason for an error for messages, such as "permission denied"."""
     known = {
         errno.ENOENT: "no such file or directory",
         errno.EACCES: "permission denied",
@@ -45,7 +44,7 @@ def os_error_reason(error: OSError) -> str:
 
 
 def _read_bytes(path: Path) -> bytes | str:
-    """Return the content of a file, or why it is not accepted. Raises OSError if it cannot be read."""
+    """Return the content of a file, or the reason why it is rejected. Raises OSError if it cannot be read."""
     if not stat.S_ISREG(path.stat().st_mode):
         return "not a regular file"
     # Between stat and open the file may have become a FIFO: O_NONBLOCK keeps the open from waiting for a writer.
@@ -58,7 +57,7 @@ def _read_bytes(path: Path) -> bytes | str:
 
 
 def _decode(raw: bytes, display_name: str) -> str | Problem:
-    """Return the text in the bytes of a file, or a problem with its encoding or its characters."""
+    """Return the text in the bytes of a file, or a problem with its encoding or a control character."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -79,7 +78,7 @@ def _normalize_line_breaks(text: str) -> str:
 
 
 def _position(text: str, index: int) -> tuple[int, int]:
-    """Return the line and the column of a character, both from 1."""
+    """Return the line and the column of the character at `index`, both from 1."""
     line = text.count("\n", 0, index) + 1
     return line, index - (text.rfind("\n", 0, index) + 1) + 1
 
@@ -101,7 +100,7 @@ LOOKALIKES = {
     "\u2014": ("dash", "`-`"),
     "\u2212": ("minus sign", "`-`"),
 }
-"""Character that looks like YAML syntax, often copied from a web page → (its name, what to write instead)."""
+"""Names and replacements of characters that look like YAML syntax, but are different characters."""
 
 
 def find_lookalike(text: str) -> int | None:
@@ -110,12 +109,12 @@ def find_lookalike(text: str) -> int | None:
 
 
 def describe_lookalike(character: str) -> str:
-    """Return the name of a lookalike character: "no-break space (U+00A0)"."""
+    """Return the name of a lookalike character, e.g. "no-break space (U+00A0)"."""
     return f"{LOOKALIKES[character][0]} (U+{ord(character):04X})"
 
 
 def lookalike_hint(text: str) -> str:
-    """Return what to write instead of the first lookalike character; "" if there is none."""
+    """Return a hint on how to replace the first lookalike character in a text; "" if there is none."""
     index = find_lookalike(text)
     if index is None:
         return ""

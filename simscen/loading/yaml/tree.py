@@ -1,7 +1,7 @@
 """Tree of a YAML file with the positions of its keys and values.
 
-Trees are immutable. A changed tree shares the nodes that did not change. Some functions take a `loc`: keys, or the
-location of an error in pydantic, which also names members of unions between the keys. These names are skipped.
+Trees are immutable. A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of
+union members between them. Functions skip parts of a `loc` that do not exist in the tree, such as tags.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in a file. `path` is relative to the root of the scenario if possible. `line` and `col` count from 1."""
+    """Position in a file. `path` is that of messages, usually relative to the root. `line` and `col` count from 1."""
 
     path: str
     line: int
@@ -88,7 +88,7 @@ def child(node: Node | None, key: Key) -> Node | None:
 
 
 def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
-    """Yield a node and all nodes below it in the order of the file, each with its keys; `keys` are those of `node`."""
+    """Yield a node and all nodes below it with their keys, in the order of the file. `keys` are the keys of `node`."""
     yield keys, node
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
@@ -99,7 +99,7 @@ def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
 
 
 def replace_at(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
-    """Return the tree `node` with `value` at `keys`. Missing mappings and keys are added; they get `position`."""
+    """Return a copy of the tree `node` with `value` at `keys`. Missing mappings are added at `position`."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]
@@ -119,7 +119,7 @@ def existing_keys(node: Node, loc: Sequence[Key]) -> Keys:
 
 
 def key_position(node: Node, loc: Sequence[Key]) -> Position:
-    """Return the position of the last existing part of `loc`: of a key or an item; of `node` if no part exists."""
+    """Return the position of the last key or item in `loc` that exists; the position of `node` if none exists."""
     return [node.position, *(position for _, position in _existing(node, loc))][-1]
 
 
@@ -132,14 +132,14 @@ def value_position(node: Node, loc: Sequence[Key]) -> Position:
 
 
 def node_at(node: Node, loc: Sequence[Key]) -> Node:
-    """Return the node to which the existing parts of `loc` lead."""
+    """Return the node at `loc`. Parts of `loc` that do not exist are skipped."""
     for part in loc:
         node = child(node, part) or node
     return node
 
 
 def _existing(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
-    """Yield the existing parts of `loc` with their positions."""
+    """Yield the parts of `loc` that exist in the tree, with the positions of the keys or items."""
     for part in loc:
         below = child(node, part)
         if below is None:
@@ -149,6 +149,6 @@ def _existing(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
 
 
 def dotted_path(keys: Sequence[Key]) -> str:
-    """Return keys as messages show them: `pass[0].goals_reached`."""
+    """Return keys in the form for messages, e.g. `pass[0].goals_reached`."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return text.lstrip(".")
