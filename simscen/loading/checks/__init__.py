@@ -1,1 +1,1 @@
-"""Check what valid files mean: whether names exist, events can happen, criteria can fail, and goals can be reached."""
+"""Semantic checks of valid files: names exist, events can happen, criteria can fail, and goals can be reached."""

@@ -11,7 +11,7 @@ from simscen.loading.yaml.tree import Keys
 
 @MEANING.check("SC050")
 def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find stops of pedestrians with a duration: pedestrians do not walk on after a stop."""
+    """Find `stop` actions with a duration for pedestrians, who do not walk on after a stop."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
@@ -22,7 +22,7 @@ def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
-    """Return the name of the event, the keys, and the specification of each action that switches a zone on or off."""
+    """Return the event name, the keys, and the specification of each action that switches a zone on or off."""
     return [
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
@@ -33,7 +33,7 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 @MEANING.check("SC050")
 def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that switch on a speed zone for which no speed limit is given anywhere."""
+    """Find actions that switch on a speed zone without a speed limit."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
@@ -45,7 +45,7 @@ def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that set a speed limit that is not below the top speed of the robot."""
+    """Find actions with a speed limit at or above the top speed of the robot."""
     robot = loaded.robot.spec
     for _, keys, action in _zone_actions(loaded):
         if robot is None or not _limits_speed(keys, action):
@@ -56,13 +56,13 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _limits_speed(keys: Keys, action: Any) -> bool:
-    """Return whether an action at `keys` that switches a zone switches on a speed zone."""
+    """Return whether the zone action at `keys` switches on a speed zone."""
     return keys[-1] == "speed_zone" and action.enabled and action.region is not None
 
 
 @MEANING.check("SC055", severity="warning")
 def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find pushes of zero, and pushes of objects without mass or of pedestrians."""
+    """Find pushes of zero, pushes of objects without mass, and pushes of pedestrians."""
     world = loaded.world.spec
     spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
     things = [*(world.objects if world else []), *spawned]

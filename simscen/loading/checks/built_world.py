@@ -15,20 +15,20 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
-"""Lowest and highest z between which an obstacle blocks most robots. World files are checked without a robot."""
-RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M = 0.1, 0.35, 0.03
-"""Wheel radius, maximum slope, and maximum step of an assumed robot that climbs typical ramps."""
+"""Lowest and highest z between which an obstacle blocks most robots."""
+RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1, 0.35, 0.03
+"""Assumed robot that climbs typical ramps."""
 
 
 class BuiltWorld(NamedTuple):
-    """A world, and the loaded file that it was built from."""
+    """Built world, and the loaded file from which it was built."""
 
     world: World
     source: LoadedWorld
 
     @property
     def tree(self) -> MappingNode | None:
-        """The tree of the world file; None for a world in another format."""
+        """YAML tree of the world file; None for a ROS map or SDF file."""
         return self.source.tree
 
 
@@ -36,7 +36,7 @@ BUILT_WORLD: CheckStage[BuiltWorld] = CheckStage("built world")
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
-    """Return warnings about a world file, without the texts of their source lines; [] for other formats."""
+    """Return warnings about a `*.world.yaml`, without source lines; [] for a ROS map or SDF file."""
     return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorld(world, source))
 
 
@@ -76,8 +76,8 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 
 def _without_platforms(world: World) -> World:
-    """Return the world with only the solids that block a robot that climbs ramps: places may be on platforms."""
+    """Return the world without the solids that the assumed robot can climb."""
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
-    solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)
+    solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M)
     return replace(world, solids=solids)

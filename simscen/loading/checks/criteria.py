@@ -1,4 +1,4 @@
-"""Checks that find criteria that no run can pass, and criteria that hardly any run can fail."""
+"""Checks for criteria that no run can pass, and for criteria that hardly any run can fail."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -15,19 +15,19 @@ GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", 
 NO_ERROR = 0
 """Nav2's error code for success."""
 LOOSE_SPEED_RATIO = 1.2
-"""Bounds on the speed above this multiple of the top speed are loose. Lower bounds can still limit an overshoot."""
+"""Bounds on the speed above this multiple of the top speed are loose."""
 LOOSE_PATH_RATIO = 10.0
 """Bounds on the path length above this multiple of the shortest path are loose."""
 LOOSE_COLLISION_COUNT = 1000
 """Bounds on the number of collisions from this number on are loose."""
 
 LooseBounds = Iterator[tuple[str, str]]
-"""Loose bounds of a criterion, which hardly any run can exceed: the key of each, and the reason."""
+"""Key and reason of each loose bound of a criterion. Hardly any run can violate a loose bound."""
 
 
 @MEANING.check("SC036")
 def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find criteria that need more time to be judged than the run has."""
+    """Find criteria that need more time than the time limit of the run."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
         horizon = getattr(entry.chosen, "horizon", 0.0)
@@ -38,7 +38,7 @@ def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC036")
 def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find a time limit that ends the run before the second sample of the truth, so that no motion can be judged."""
+    """Find a time limit before the second sample of the ground truth, so that no motion can be judged."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
@@ -56,13 +56,13 @@ def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
-    """Return the reason if a criterion needs a goal and there is none; else None."""
+    """Return the reason why a criterion of this kind is impossible without a goal; None if it is possible."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
 
 
 def _why_impossible_result(loaded: LoadedScenario, result: Any) -> str | None:
-    """Return why no run can have the result that a criterion requires; None if a run can."""
+    """Return the reason why no run can have the required result; None if a run can."""
     cancels = any(action.may_do("cancel_goal") for step in loaded.spec.steps for action in step.actions)
     if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
@@ -74,12 +74,12 @@ def _why_impossible_result(loaded: LoadedScenario, result: Any) -> str | None:
 
 
 def _why_no_recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
-    """Return why no run can have the recoveries that a criterion requires; None if a run can."""
+    """Return the reason why no run can have the required recoveries; None if a run can."""
     return why_no_recovery(loaded, recoveries.name) if recoveries.min else None
 
 
 _WHY_IMPOSSIBLE = {"result": _why_impossible_result, "recoveries": _why_no_recoveries}
-"""Function that returns why a criterion of this kind is impossible; None if it is possible."""
+"""Functions that return the reason why a criterion is impossible, or None, by kind of the criterion."""
 
 
 @MEANING.check("SC051")
@@ -105,7 +105,7 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC051")
 def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find goals that are never sent: the goal before is expected to fail, and the scenario stops at a failure."""
+    """Find goals that are never sent, because the run stops at the expected failure of the goal before."""
     spec = loaded.spec
     new_goals = any(action.may_do("new_goal") for step in spec.steps for action in step.actions)
     if spec.on_goal_failure == "continue" or new_goals:
@@ -120,7 +120,7 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC052", severity="warning")
 def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find bounds that physics or the time limit guarantee, so that the criterion can hardly fail."""
+    """Find bounds that hardly any run can violate, because of physics or the time limit."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _LOOSE_BOUNDS.get(entry.kind)
         for key, reason in check(loaded, entry.chosen) if check else ():
@@ -159,14 +159,14 @@ def _loose_goals_reached(loaded: LoadedScenario, reached: Any) -> LooseBounds:
 
 
 def _beyond_limit(loaded: LoadedScenario, criterion: Any, key: str) -> LooseBounds:
-    """Yield the bound `key` if it is a time that is not below the time limit of the run."""
+    """Yield the bound `key`, a time, if it is not below the time limit of the run."""
     value, limit = getattr(criterion, key), loaded.spec.time_limit
     if value is not None and value >= limit:
         yield key, f"the time limit ends the run after {limit:g} s"
 
 
 def _time_bound(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
-    """Return a check of the bound `key`, which is a time."""
+    """Return a function that yields the bound `key`, a time, if it is loose."""
     return lambda loaded, criterion: _beyond_limit(loaded, criterion, key)
 
 
@@ -180,11 +180,11 @@ _LOOSE_BOUNDS: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
     "stopped_within": _time_bound("time"),
     "relocalized_within": _time_bound("time"),
 }
-"""Function that yields the loose bounds of a criterion of this kind."""
+"""Functions that yield the loose bounds of a criterion, by kind of the criterion."""
 
 
 @MEANING.check("SC052", severity="warning")
 def only_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find scenarios whose criteria all have `severity: warn`, so that no run can fail."""
+    """Find scenarios in which all criteria have `severity: warn`, so that no run can fail."""
     if all(entry.severity == "warn" for entry in loaded.spec.pass_):
         yield CheckProblem(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)

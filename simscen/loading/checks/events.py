@@ -1,6 +1,6 @@
-"""Checks that find events and faults whose triggers never fire, or fire less often than specified.
+"""Checks for events and faults with triggers that never fire, or fire less often than specified.
 
-An event can wait for another one, so the events that can happen are determined step by step (see possible_run).
+A step is an event, or a step of its sequence.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,21 +19,21 @@ from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
 
 Reason = tuple[Keys, str]
-"""Keys of the part that prevents a trigger from firing, and the reason as words that follow "can never happen:"."""
+"""Keys of the part of a trigger that prevents it from firing, and the reason as text for messages."""
 
 LATCHING_CONDITIONS = frozenset(
     {"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"}
 )
-"""Conditions that stay true once they have become true."""
+"""Kinds of conditions that stay true after they have become true."""
 MAX_SPEED_RATIO = 1.1
-"""Largest speed of a robot at any time, relative to its top speed, which it can overshoot a little."""
+"""Largest speed of a robot, divided by its top speed. A robot can overshoot its top speed a little."""
 MAX_TRUTH_ERROR_M = 0.5
-"""Upper bound on the localization error of a stack that gets the true pose."""
+"""Upper bound on the localization error if the stack gets the true pose."""
 
 
 @MEANING.check("SC050")
 def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find events and faults that can never happen, whatever the robot does. It is an error if they are required."""
+    """Find events and faults that can never happen. With `required: false`, the problem is only a warning."""
     run = possible_run(loaded)
     for keys, trigger, name, required in run.triggers:
         if trigger is not None and (reason := run.why_never(trigger, keys)):
@@ -42,7 +42,7 @@ def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC052", severity="warning")
 def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find events and faults that should happen several times (`times`), but can happen only once."""
+    """Find events and faults with `times` above 1 that can happen only once."""
     run = possible_run(loaded)
     for keys, trigger, name, _ in run.triggers:
         if trigger is None or trigger.times == 1 or trigger.edge != "rising" or not _stays_true(trigger):
@@ -58,7 +58,7 @@ def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC050")
 def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find steps of a sequence that happen after the time limit at the earliest, or wait for an earlier step."""
+    """Find steps of a sequence that can only happen after the time limit, or that wait for an earlier step."""
     run = possible_run(loaded)
     limit, earliest = loaded.spec.time_limit, dict[int, float]()
     for number, step in enumerate(run.steps):
@@ -78,7 +78,7 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
-    """Return why a recovery behavior (None: any) never runs; None if it can run."""
+    """Return the reason why a recovery behavior never runs; None if it can. `behavior` None stands for any behavior."""
     if not isinstance(loaded.spec.stack, StackSpec):
         return None
     recovery = loaded.spec.stack.recovery
@@ -90,10 +90,10 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return what can happen in a run of the scenario.
+    """Return the events, faults, and marks that can happen in a run of the scenario.
 
-    At first, nothing counts as possible. Then the events that are possible without others are added, then those that
-    wait for them, and so on, until no more are added.
+    This is a fixed-point iteration: start with nothing, and add everything that can happen after what is possible so
+    far, until nothing is added.
     """
     run = PossibleRun(loaded, frozenset())
     while (possible := run.next_possible) != run.possible:
@@ -103,9 +103,10 @@ def possible_run(loaded: LoadedScenario) -> "PossibleRun":
 
 @dataclass(frozen=True)
 class PossibleRun:
-    """What can happen in a run if the events, faults, and marks with the names `possible` can happen.
+    """Run in which the events, faults, and marks with the names `possible` can happen.
 
-    Methods called like a condition take its specification. They return why it can never be true; None if it can.
+    A private method with the name of a condition, such as `_goal`, takes the specification of the condition. It returns
+    the reason why the condition can never be true, or None.
     """
 
     loaded: LoadedScenario
@@ -113,12 +114,12 @@ class PossibleRun:
 
     @cached_property
     def steps(self) -> list[SequenceStep]:
-        """The events, each followed by the steps of its sequence."""
+        """The events of the scenario, each followed by the steps of its sequence."""
         return self.loaded.spec.steps
 
     @property
     def triggers(self) -> Iterator[tuple[Keys, Trigger | None, str, bool]]:
-        """Yield the keys, the trigger, the name, and `required` of each reachable event or step, then of each fault."""
+        """The keys, trigger, name, and value of `required` of each reachable step, then of each fault."""
         for step in self.steps:
             if self.is_reached(step):
                 yield (*step.keys, "when"), step.when, step.name, step.required
@@ -126,18 +127,18 @@ class PossibleRun:
             yield ("faults", index, "when"), fault.when, fault.label, fault.required
 
     def is_reached(self, step: SequenceStep) -> bool:
-        """Return whether the step before `step` in its sequence can happen; True for an event."""
+        """Return whether the step before `step` in its sequence can happen; True if there is none."""
         return step.after is None or self.steps[step.after].name in self.possible
 
     def earlier_steps(self, step: SequenceStep) -> frozenset[str]:
-        """Return the names of the event and the steps before `step` in its sequence."""
+        """Return the names of the steps before `step` in its sequence."""
         if step.after is None:
             return frozenset()
         return self.earlier_steps(self.steps[step.after]) | {self.steps[step.after].name}
 
     @property
     def next_possible(self) -> frozenset[str]:
-        """The names of the events, faults, and marks that can happen if those in `possible` can."""
+        """The names of the events, faults, and marks that can happen after those in `possible`."""
         triggers = [
             *((step.when, step.name) for step in self.steps if self.is_reached(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
@@ -148,7 +149,7 @@ class PossibleRun:
         return frozenset(happening | marks)
 
     def why_never(self, trigger: Trigger, keys: Keys) -> Reason | None:
-        """Return why the trigger at `keys` never fires; None if it can."""
+        """Return the reason why the trigger at `keys` never fires; None if it can."""
         limit = self.loaded.spec.time_limit
         if trigger.probability == 0:
             return (*keys, "probability"), "its probability is 0"
@@ -161,7 +162,7 @@ class PossibleRun:
         return self._why_never_true(trigger, keys)
 
     def _why_never_true(self, test: AnyCondition, keys: Keys) -> Reason | None:
-        """Return why the condition at `keys` is never true; None if it can be."""
+        """Return the reason why the condition at `keys` is never true; None if it can be true."""
         if not self.loaded.includes_robot(test.robot):
             return None
         limit = self.loaded.spec.time_limit
@@ -181,17 +182,17 @@ class PossibleRun:
         return ((*keys, test.kind), reason) if reason else None
 
     def _why_parts_never_true(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
-        """Return the reason for each of the conditions in the list at `keys`; None for those that can be true."""
+        """Return the reason why each condition in the list at `keys` is never true; None for each that can be true."""
         return [self._why_never_true(test, (*keys, k)) for k, test in enumerate(tests)]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether a possible event can do what actions of these kinds do."""
+        """Return whether an action of a possible step can have the effect of one of these kinds of actions."""
         return any(
             action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
         )
 
     def goal_count(self, goal: str | None) -> int:
-        """Return how many goals with this name (None: any name) the robot can get."""
+        """Return how many goals with this name the robot can get; None stands for any name."""
         listed = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
         sent = sum(
             1 if step.when is None else step.when.times
@@ -277,13 +278,13 @@ class PossibleRun:
 
     @property
     def _top_speed(self) -> float | None:
-        """The top speed in m/s; None if it is not known, or if an action can make the robot faster."""
+        """Top speed of the robot in m/s; None if it is unknown, or if an action can make the robot faster."""
         spec = self.loaded.robot.spec
         return None if spec is None or self.may_do("push", "kidnap") else spec.top_speed
 
     @property
     def _may_be_pushed(self) -> bool:
-        """Whether something that moves could push the robot."""
+        """Whether a moving object, pedestrian, or robot could push the robot."""
         world = self.loaded.world
         if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
@@ -307,22 +308,22 @@ _CONDITIONS = {
     "pedestrian": PossibleRun._pedestrian,
     "event": PossibleRun._event,
 }
-"""Method that returns why a condition of this kind can never be true; None if it can."""
+"""Methods that return the reason why a condition can never be true, or None, by kind of the condition."""
 
 
 def _stays_true(test: AnyCondition) -> bool:
-    """Return whether a condition stays true once it has become true."""
+    """Return whether a condition stays true after it has become true."""
     parts = test.all or test.any
     return all(map(_stays_true, parts)) if parts else test.kind in LATCHING_CONDITIONS
 
 
 def _earliest_true_s(test: AnyCondition) -> float:
-    """Return a lower bound on the time in s at which a condition counts as true, that is, after its `for`."""
+    """Return a lower bound on the time in s at which a condition has been true for its duration `for`."""
     return (test.for_ or 0.0) + _earliest_condition_s(test)
 
 
 def _earliest_condition_s(test: AnyCondition) -> float:
-    """Return a lower bound on the time in s at which a condition becomes true, without its `for`."""
+    """Return a lower bound on the time in s at which a condition becomes true."""
     if test.all is not None:
         return max(map(_earliest_true_s, test.all))
     if test.any is not None:

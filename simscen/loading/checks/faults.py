@@ -1,4 +1,4 @@
-"""Checks of faults: whether they can affect their sensor, whether they can happen, and whether they have an effect."""
+"""Checks of faults: whether they can affect their sensor, can happen, and have an effect."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -15,22 +15,22 @@ from simscen.model.robot import RobotSpec
 from simscen.model.stack import StackSpec
 from simscen.triggers.base import Trigger
 
-NOUNS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
-"""Kind of a target of faults that is no sensor → words in messages."""
+TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
+"""Descriptions of fault targets that are no sensors for messages, by kind of the target."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Faults that compute the measurement anew, which is only possible at the time of the measurement."""
+"""Faults that measure again, which is only possible at the time of the measurement."""
 
 
 class ListedFault(NamedTuple):
-    """A fault, its number in the list from 0, and its target (None if the robot does not have it)."""
+    """Fault with its index in `faults`, and its target; None if the robot does not have the target."""
 
-    number: int
+    index: int
     entry: FaultEntry
     target: FaultTarget | None
 
 
 def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, FaultTarget]:
-    """Return all things that faults can affect, by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
+    """Return all targets of faults by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: FaultTarget(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -44,7 +44,7 @@ def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Faul
 
 
 def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
-    """Yield all faults; nothing for a robot that is only a URDF and not built yet, whose sensors are not known."""
+    """Yield all faults of the scenario; nothing if the sensors of the robot are not known yet."""
     if loaded.robot.spec is not None:
         known = fault_targets(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
@@ -65,7 +65,7 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC032")
 def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults of a kind that cannot affect their sensor, or whose values do not fit the sensor."""
+    """Find faults that cannot affect their kind of sensor, and faults with values that do not fit the sensor."""
     loaded = scope.loaded
     for index, entry, target in _listed_faults(loaded):
         if target is None:
@@ -76,7 +76,7 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
             known = fault_targets(loaded, loaded.robot.spec)
             suitable = [name for name, one in known.items() if one.kind in entry.fault.affects]
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
-            what = NOUNS.get(target.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
+            what = TARGET_DESCRIPTIONS.get(target.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(target):
@@ -87,7 +87,7 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC032")
 def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults of the map in scenarios without a map, and faults of the map with a time."""
+    """Find map faults in scenarios without a map, and map faults with `when` or `for`."""
     loaded = scope.loaded
     for index, entry, target in _suitable_faults(loaded):
         if target.kind != MAP:
@@ -103,7 +103,7 @@ def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check(STACK_CANNOT)
 def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults of the localizer of a stack that is not one of simscen's own, and so cannot be disturbed."""
+    """Find localizer faults for stacks that do not come with simscen."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
     for index, _, target in _suitable_faults(scope.loaded):
@@ -114,7 +114,7 @@ def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, FaultTarget]]:
-    """Yield the index, the fault, and the target of each fault that can affect its target."""
+    """Yield the index, the entry, and the target of each fault that can affect its target."""
     for index, entry, target in _listed_faults(loaded):
         if target is not None and target.kind in entry.fault.affects and not entry.fault.unsuitable_key(target):
             yield index, entry, target
@@ -122,7 +122,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 @NAMES.check("SC032")
 def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that compute the measurement anew, but are listed after a fault that delays the messages."""
+    """Find faults that measure again, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, target in _listed_faults(loaded):
@@ -138,7 +138,7 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC050")
 def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find faults that are so short that they can begin and end between two messages of their sensor."""
+    """Find faults that can begin and end between two messages of their sensor."""
     if loaded.robot.spec is None:
         return
     rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
@@ -157,7 +157,7 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _start_time_s(when: Trigger | None) -> float | None:
-    """Return the time in s at which a fault begins; None if it depends on something else than the time."""
+    """Return the time in s at which a fault begins; None if it does not depend on the time alone."""
     if when is None:
         return 0.0
     return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
@@ -165,7 +165,7 @@ def _start_time_s(when: Trigger | None) -> float | None:
 
 @MEANING.check("SC055", severity="warning")
 def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find faults whose values have no effect."""
+    """Find faults with values that have no effect, such as a noise of 0."""
     for index, entry in enumerate(loaded.spec.faults):
         neutral = entry.fault.neutral_values
         if neutral and all(getattr(entry.chosen, key) == value for key, value in neutral.items()):

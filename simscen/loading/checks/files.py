@@ -1,4 +1,4 @@
-"""Recognize the kind of a file (scenario, world, robot, …), and check a file of any kind."""
+"""Kinds of files (scenario, world, robot, …), and checks of a file of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,20 +17,22 @@ from simscen.loading.files.discovery import (
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
-from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
+from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
-"""Numbers of the variations of a study that are checked. The others are checked before they run."""
+"""Numbers of the variations of a study that are checked."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
 _ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
+"""Top-level keys that only robot files have."""
 _WORLD_KEYS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
+"""Top-level keys that only world files have."""
 _SCENARIO_KEYS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
-"""Top-level keys that only files of this kind have."""
+"""Top-level keys that only scenarios have."""
 _SUFFIXES_BY_KIND = (
     ("scenario", SCENARIO_SUFFIXES),
     ("study", STUDY_SUFFIXES),
@@ -39,13 +41,13 @@ _SUFFIXES_BY_KIND = (
     ("robot", (*ROBOT_SUFFIXES, *URDF_SUFFIXES)),
     ("stack", STACK_SUFFIXES),
 )
-"""Kinds of files, each with its suffixes."""
+"""Kinds of files with their suffixes."""
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """Return the errors and warnings of a file and of the files that it names; `kind` is what `file_kind` returns.
+    """Return the errors and warnings of a file of this kind (see `file_kind`) and of the files that it names.
 
-    The other files must lie in `root` or a folder of `world_path`.
+    All files must lie in `root` or in a folder of `world_path`.
     """
     if kind in ("scenario", "study"):
         loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
@@ -58,11 +60,9 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
     if kind in STACK_KINDS:
-        from simscen.loading.stacks.choice import read_stack_file
-
         return found if isinstance(found := read_stack_file(path, library), list) else found[1]
     if kind == "base":
-        return check_base_file(path, library)
+        return _base_file_problems(path, library)
     assets = Assets(library)
     world_problems: list[Problem] = []
     if kind == "world":
@@ -76,10 +76,9 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 
 
 def file_kind(file: Path, root: Path) -> str:
-    """Return the kind of a file, by its suffix, or else by keys that only files of one kind have.
+    """Return the kind of a file, recognized by its suffix or its top-level keys.
 
-    The kinds are "scenario", "study", "world", "robot", "stack", "base", "map" (a ROS map), and NAV2_FILE_KIND. A file
-    without a known suffix or key counts as a scenario.
+    It is "study", "world", "robot", "stack", "base", "map" (a ROS map), NAV2_FILE_KIND, or else "scenario".
     """
     if file.name == DEFAULTS_FILE:
         return "base"
@@ -100,11 +99,8 @@ def file_kind(file: Path, root: Path) -> str:
     return "robot" if keys & _ROBOT_KEYS else "world" if keys & _WORLD_KEYS else "scenario"
 
 
-def check_base_file(file: Path, library: Library) -> list[Problem]:
-    """Return the problems of a base file (`*.base.yaml`, `defaults.yaml`) and of the world and robot that it names.
-
-    Missing keys are no problems, because scenarios that extend the file may have them.
-    """
+def _base_file_problems(file: Path, library: Library) -> list[Problem]:
+    """Return the problems of a file that scenarios extend, and of the world and robot that it names."""
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
@@ -115,7 +111,7 @@ def check_base_file(file: Path, library: Library) -> list[Problem]:
 
 
 def _with_plain_keys(tree: Node) -> Node:
-    """Return the tree with keys such as `pass+` renamed to `pass`, so that their items are checked as well."""
+    """Return the YAML tree with keys such as `pass+` renamed to `pass`."""
     if not isinstance(tree, MappingNode):
         return tree
     entries = {

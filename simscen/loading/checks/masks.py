@@ -1,4 +1,4 @@
-"""Checks that find keepout zones and filter masks that forbid the start or a goal, or have no effect."""
+"""Checks for keepout zones and filter masks that forbid the start or a goal, or have no effect."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -24,29 +24,29 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 
 ZoneTest = Callable[[Pose2, float], bool]
-"""Function that takes a pose and a distance in m. Returns whether a zone contains all positions within the distance."""
+"""Function of a pose and a distance in m. Returns whether a zone contains all positions within the distance."""
 
 MIN_DEPTH_M = 0.1
-"""Depth inside a zone from which a goal is certainly forbidden. A costmap can round the edge of the zone to cells."""
+"""Depth inside a zone at which a goal is certainly forbidden, although a costmap rounds the zone to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate. A start is only reported if it is at least this deep inside a zone."""
+"""Possible error of the initial estimate. A start is only reported this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
-"""Reason in messages why a speed mask has no effect."""
+"""Reason for messages why a speed mask has no effect."""
 
 
 def stack_masks(scene: Scene) -> FilterMasks:
-    """Load the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of the stack. Raises InvalidInput for an unusable mask."""
     return load_masks(scene.loaded)
 
 
 def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
-    """Load the filter masks of criteria, by path as written. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of criteria, by path as in the scenario. Raises InvalidInput for an unusable mask."""
     return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.with_source_line)
 
 
 @WORLD.check("SC302")
 def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals in zones that the stack keeps out of, and starts in them (a warning)."""
+    """Find goals in keepout zones of the stack, and starts in keepout zones (a warning)."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, ZoneTest]] = [
         (("stack", "keepout", index), f"in `{region}`", _region_test(regions[region]))
@@ -54,7 +54,7 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
     ]
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None:
-        zones.append((KEEPOUT_MASK_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
+        zones.append((KEEPOUT_MASK_KEYS, "in a cell that the keepout mask forbids", _mask_test(keepout)))
     for keys, where, forbids in zones:
         for goal_keys, goal in scene.targets:
             if forbids(goal.pose, MIN_DEPTH_M):
@@ -68,12 +68,12 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _region_test(corners: Polygon) -> ZoneTest:
-    """Return the test for a region."""
+    """Return the test for a zone with these corners."""
     return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 
-def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
-    """Return the test for the area that a keepout mask forbids. It samples the positions as densely as the cells."""
+def _mask_test(mask: OccupancyGrid) -> ZoneTest:
+    """Return the test for the area that a keepout mask forbids. The test samples positions in the spacing of cells."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
@@ -85,7 +85,7 @@ def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
 
 @WORLD.check("SC055", severity="warning")
 def masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
-    """Find masks of the stack that forbid or limit nothing."""
+    """Find keepout masks of the stack that forbid nothing, and speed masks that limit nothing."""
     masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
         yield CheckProblem(KEEPOUT_MASK_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
@@ -95,7 +95,7 @@ def masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC311", severity="warning")
 def partly_occupied_mask_cells(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout masks with cells that are neither free nor occupied, and so have no effect."""
+    """Find keepout masks with cells that are neither free nor occupied. Such cells have no effect."""
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None and (keepout.cells == OCCUPIED).any():
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
@@ -106,7 +106,7 @@ def partly_occupied_mask_cells(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC055", severity="warning")
 def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
-    """Find masks of criteria that forbid or limit nothing."""
+    """Find keepout masks of criteria that forbid nothing, and speed masks that limit nothing."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
@@ -123,7 +123,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC051")
 def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria whose mask forbids the start or a goal."""
+    """Find keepout criteria with a mask that forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
@@ -136,7 +136,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
         if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
-        forbids = forbidden_test(mask.grid)
+        forbids = _mask_test(mask.grid)
         inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
         if inside:
             message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"

@@ -1,4 +1,4 @@
-"""Checks of names: whether they exist, whether they are unique, and whether they are allowed where they are written."""
+"""Checks of names: whether they exist, are unique, and are allowed in their place."""
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
@@ -38,7 +38,7 @@ def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC035")
 def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find names of fixed parts of the world, or of robots, where only movable objects can be named."""
+    """Find names of fixed objects or robots where the name of a movable object is expected."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
@@ -47,7 +47,7 @@ def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
             continue
         what = (
             "one of the robots"
-            if reference.name in _robots_not_allowed(scope, reference)
+            if reference.name in _forbidden_robots(scope, reference)
             else "a fixed part of the world"
         )
         message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
@@ -55,22 +55,22 @@ def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
-    """Return whether a reference to a movable object names something that exists, but cannot be moved."""
+    """Return whether a reference to a movable object names an existing object or robot that is not allowed."""
     if reference.target not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
-    return reference.name in (*_robots_not_allowed(scope, reference), *objects)
+    return reference.name in (*_forbidden_robots(scope, reference), *objects)
 
 
-def _robots_not_allowed(scope: NameScope, reference: Reference) -> tuple[str, ...]:
-    """Return the robots to which a reference to a movable object must not refer."""
+def _forbidden_robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
+    """Return the names of the robots that a reference to a movable object must not name."""
     own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 
 
 @NAMES.check("SC031")
 def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find triggers by the age of the scans of a lidar that the robot does not have."""
+    """Find `scan_age` triggers for a lidar that the robot does not have."""
     loaded = scope.loaded
     if loaded.robot.spec is None:
         return
@@ -107,7 +107,7 @@ def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC033")
 def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find marks with the name of an event or fault, and goals of events with the name of another goal."""
+    """Find marks with the name of an event or fault, and `new_goal` actions with the name of another goal."""
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = listed_goal_names(loaded)
@@ -126,7 +126,7 @@ def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC033")
 def reserved_goal_names(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find goals with names such as `shelf#2`, which goals get in the second and later loops."""
+    """Find goals with names such as `shelf#2`, which are reserved for goals in the second and later loops."""
     for index, goal in enumerate(scope.loaded.spec.goals):
         if goal.name is not None and LOOP_NAME.fullmatch(goal.name):
             message = f"{quoted(goal.name)} is reserved for the goals of the second and later loops"
@@ -162,7 +162,7 @@ def robots_named_like_objects(scope: NameScope) -> Iterator[CheckProblem]:
 
 @ROBOT_NAMES.check("SC030")
 def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find triggers and actions with the name of a robot that does not exist."""
+    """Find triggers and actions that name a robot that does not exist."""
     spec = scenario.spec
     robots = spec.robots or {}
     for keys, part in walk({"events": spec.events, "faults": spec.faults, ROBOTS: robots}):
@@ -176,7 +176,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find triggers and actions that do not name a robot, although they apply to one of several robots."""
+    """Find triggers and actions of one robot that do not name which of several robots."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -194,7 +194,7 @@ def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 
 def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
-    """Yield the keys and the kind of each condition that applies to one robot, or to its fault, but names no robot.
+    """Yield the keys and the kind of each condition on one robot or on its fault that names no robot.
 
     `faults` are the names of the faults of all robots.
     """
@@ -214,7 +214,7 @@ def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[
 
 @ROBOT_NAMES.check("SC030")
 def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find names under `expected.criteria` that no verdict has. Those of a robot's verdicts begin with `<robot>/`."""
+    """Find names under `expected.criteria` of several robots that no verdict has."""
     spec = scenario.spec
     if not spec.robots:
         return

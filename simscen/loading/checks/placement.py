@@ -1,4 +1,4 @@
-"""Checks that find poses of the robot, of goals, and of objects of events inside an obstacle or outside the map."""
+"""Checks for poses of robots, goals, objects, and pedestrians inside an obstacle or outside the map."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -34,16 +34,16 @@ from simscen.worlds.geometry.prisms import upright_prism
 
 FREE_SPACE_HINT = "move it to free space"
 MAX_PLATFORM_HEIGHT_M = 0.3
-"""Largest height of an obstacle in a Gazebo world that may be meant as the floor."""
+"""Largest height of an obstacle in a Gazebo world that could be the floor."""
 TOLERANCE_FRACTIONS = (-0.9, 0.0, 0.9)
-"""Offsets that are tried around the exact pose of a goal, as fractions of its tolerances."""
+"""Offsets from the pose of a goal that are tried, as fractions of its tolerances."""
 
 MotionStop = tuple[Keys, str, tuple[float, float]]
-"""Keyframe, waypoint, or other position of a motion: its keys below the motion, a description, and (x, y) in m."""
+"""Keyframe or waypoint of a motion: its keys in the motion, a description for messages, and (x, y) in m."""
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
-    """Return the problems of starts, goals, and kidnap poses at which the robot cannot be, by the keys of the pose."""
+    """Return the problems of blocked starts, goals, and kidnap poses, by the keys of the pose."""
     found = [*_blocked_start(scene), *_blocked_goals(scene), *_blocked_kidnap_poses(scene)]
     return {problem.keys: problem for problem in found}
 
@@ -55,16 +55,16 @@ def blocked_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield a problem if the start is blocked by the fixed world, or by a body at its initial pose."""
+    """Yield a problem if a fixed solid, or a movable body at its initial pose, blocks the start."""
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
         yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
 
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield a problem for each goal in the fixed world, and a warning for each goal in a body that stays there."""
+    """Yield an error for each goal blocked by fixed solids, and a warning for each goal inside an unmoved body."""
     for keys, goal in scene.targets:
-        code = "GOAL_OUTSIDE_MAP" if scene.area.outside(goal.pose) else "GOAL_OCCUPIED"
+        code = "GOAL_OUTSIDE_MAP" if scene.area.why_outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if found and not _fits_nearby(scene, goal):
@@ -76,11 +76,11 @@ def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
-    """Return whether a pose within the tolerances of a goal is free, although the exact pose is blocked.
+    """Return whether a pose within the tolerances of a blocked goal is free.
 
-    Poses are only tried for a footprint that is not round, and if no obstacle overlaps its inscribed circle.
+    False for a round footprint, and if an obstacle overlaps the inscribed circle of the footprint at the goal.
     """
-    outside = scene.area.outside(goal.pose)
+    outside = scene.area.why_outside(goal.pose)
     if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
         return False
     x, y, yaw = goal.pose
@@ -93,7 +93,7 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
 
 
 def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield a problem for each blocked pose to which an event kidnaps the robot."""
+    """Yield a problem for each blocked pose to which an event moves (kidnaps) the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"
@@ -105,8 +105,8 @@ def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[CheckProblem]:
-    """Yield a problem if the robot cannot be at a pose among `solids`; `what` describes the pose in the message."""
-    conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
+    """Yield a problem if `solids` or the limits of the area block a pose. `what` describes the pose in the message."""
+    conflict = scene.area.why_outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
             hint = _hint_in_gazebo_world(scene, pose, solids, hint)
@@ -114,11 +114,8 @@ def _pose_problem(
 
 
 def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
-    """Return the hint for a blocked pose: outside of the world, or on a low slab that may be meant as the floor.
-
-    In other cases, `hint` itself is returned.
-    """
-    if scene.area.outside(pose):
+    """Return `hint`, or a better hint for a pose outside the world or inside an obstacle that could be the floor."""
+    if scene.area.why_outside(pose):
         return f"{hint}; or drive with `map: none`"
     position = pose.x, pose.y
     solid = next((each for each in solids if first_solid_in_disc([each], position, TOUCH_M, scene.z_range)), None)
@@ -140,7 +137,7 @@ def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
-    """Return "inside obstacle …" if an obstacle contains all of a spawned object, so that nothing can touch it."""
+    """Return "inside obstacle …" if an obstacle contains a spawned object completely; else None."""
     if spawn.pose is None:
         return None
     corners = place_polygon(_outline(spawn), spawn.pose.pose)
@@ -154,9 +151,9 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Return "on the robot" if a spawned object certainly overlaps the robot; else None.
+    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if this depends on the run.
 
-    That is certain for an object that appears relative to the robot, or at t = 0. `when` is its trigger, if known.
+    It is known for an object that appears relative to the robot or at t = 0. `when` is the trigger, or None.
     """
     if spawn.z >= scene.size.height:
         return None
@@ -170,7 +167,7 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
 
 
 def _outline(spawn: Spawn) -> Polygon:
-    """Return the outline of an object on the floor in its own frame."""
+    """Return the outline of an object on the floor, in the frame of the object."""
     solid = spawn.solid(spawn.name)
     prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
@@ -178,7 +175,7 @@ def _outline(spawn: Spawn) -> Polygon:
 
 @WORLD.check("SC304")
 def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
-    """Find pedestrians whose start or goals are closer to an obstacle than their radius."""
+    """Find pedestrians with a start or goal that is closer to an obstacle than their radius."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
         if not isinstance(action, Pedestrian):
@@ -210,7 +207,7 @@ def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC305")
 def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
-    """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
+    """Find scripted motions that are so fast that contact with the robot could be missed between two ticks."""
     tick = 1 / scene.loaded.spec.physics.tick_rate
     for keys, tree, name, path, solids in _motions(scene):
         step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
@@ -220,9 +217,9 @@ def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
-    """Yield keys, their tree (None: the scenario), name, path, and solids of each scripted motion of a body.
+    """Yield the keys, their YAML tree, the name of the body, the path, and the solids of each scripted motion.
 
-    Motions that depend on the run, for example on the position of the robot, are left out.
+    The tree is None for the scenario. Motions that depend on the run are left out.
     """
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
@@ -253,9 +250,9 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
 
 
 def check_robots_apart(scenes: Sequence[Scene]) -> Iterator[Problem]:
-    """Yield a problem for each pair of robots whose footprints overlap at their starts (SC044).
+    """Yield a problem for each pair of robots with overlapping footprints at their starts.
 
-    `scenes` has a scene for each robot of a scenario. This check is not in a stage, because it needs all scenes.
+    `scenes` are the scenes of all robots of a scenario.
     """
     for one, other in combinations(scenes, 2):
         if polygons_overlap(place_polygon(one.outline, one.start), place_polygon(other.outline, other.start)):

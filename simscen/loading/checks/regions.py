@@ -1,13 +1,8 @@
-"""Checks of triggers, criteria, and goals that compare positions with each other and with the geometry of the world.
-
-They find trigger areas that the robot cannot reach, keepout regions that contain the start or a goal, goals that the
-robot has already reached when they are sent, and localization bounds that are larger than the world.
-"""
+"""Checks for unreachable trigger areas, keepout regions with a goal, goals reached at once, and loose bounds."""
 
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.polygons import depth_inside_polygon
@@ -20,9 +15,6 @@ from simscen.loading.checks.route_search import robot_routes, trigger_areas
 from simscen.loading.checks.scene import START, WORLD, Scene
 from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
 
-if TYPE_CHECKING:
-    pass
-
 
 def _start_is_blocked(scene: Scene) -> bool:
     return START in scene.cached(blocked_poses)
@@ -30,7 +22,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
-    """Find events and faults that wait for the robot in an area that it cannot reach, or not within the time limit."""
+    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit."""
     if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
@@ -45,7 +37,7 @@ def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC051")
 def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria whose region contains the start or a goal."""
+    """Find keepout criteria with a region that contains the start or a goal."""
     if _start_is_blocked(scene):
         return
     for index, entry in enumerate(scene.loaded.spec.pass_):
@@ -65,7 +57,7 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC055", severity="warning")
 def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals that the robot has already reached when it is sent to them."""
+    """Find goals within whose tolerances the robot already is when the goal is sent."""
     if _start_is_blocked(scene):
         return
     own = [(keys, goal) for keys, goal in scene.targets if keys[0] == "goals"]

@@ -1,13 +1,12 @@
-"""Interface of semantic checks, and the stages in which checks run.
+"""Semantic checks, and the stages in which they run.
 
-A check is a generator function that yields a CheckProblem for each problem, and is named after what it finds. It is
-registered for a stage together with the error code that it reports:
+A check is a generator function that yields problems. It is registered for a stage with its error code:
 
     @MEANING.check("SC050")
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
-These are the stages in the order in which they run. If a stage finds errors, later stages do not run, except that NAMES
-always runs with WORLD_FILE.
+The stages run in this order. If a stage finds errors, later stages do not run, except that NAMES always runs. A view is
+the scenario of one of several robots alone.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|
@@ -32,34 +31,34 @@ from simscen.model.scenario import ScenarioSpec
 
 
 class CheckProblem(NamedTuple):
-    """Problem that a check found, by keys instead of a position in a file."""
+    """Problem that a check found. It has the keys of a value instead of a position in a file."""
 
     keys: Keys
-    """Keys of the value to mark."""
+    """Keys of the value that the message marks."""
     message: str
-    """What is wrong."""
+    """Description of the problem."""
     hint: str = ""
-    """What to do."""
+    """Next step for the user."""
     at_key: bool = False
-    """Whether to mark the key itself instead of its value."""
+    """Whether the message marks the last key instead of its value."""
     warning: bool = False
-    """Whether this is a warning even if the check is registered for errors."""
+    """Whether this is a warning, although the check reports errors."""
     tree: MappingNode | None = None
-    """Tree that `keys` refer to, such as that of the robot file; None for the tree of the subject of the check."""
+    """YAML tree that contains `keys`, such as the robot file; None for the tree of the subject."""
 
     def problem(self, code: str, tree: MappingNode, severity: str = "error") -> Problem:
-        """Return the problem with its position in `tree`, the tree of the subject, but without its source line."""
+        """Return the problem with its position, but without its source line. `tree` is the YAML tree of the subject."""
         position_of = key_position if self.at_key else value_position
         position = position_of(self.tree or tree, self.keys)
         return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
 
 
 class Subject(Protocol):
-    """Object that the checks of a stage examine. It has the tree of the file in which problems are reported."""
+    """Object that the checks of a stage examine, such as a loaded scenario."""
 
     @property
     def tree(self) -> MappingNode | None:
-        """The tree of the file; None for a file that is not in simscen's language, which is not checked."""
+        """YAML tree in which problems are reported; None if the subject is not checked."""
         ...
 
 
@@ -71,11 +70,11 @@ C = TypeVar("C", bound=Callable[..., Any])
 
 @dataclass
 class CheckStage(Generic[S]):
-    """Checks that run together, in the order in which they were registered."""
+    """Checks that run together, in the order of their registration."""
 
     name: str
     checks: list[tuple[str, str, Check[S]]] = field(default_factory=list)
-    """Error code, severity and function of each check."""
+    """Error code, severity, and function of each check."""
 
     def check(self, code: str, severity: str = "error") -> Callable[[C], C]:
         """Register the decorated function as a check that reports problems with this code."""
@@ -87,7 +86,7 @@ class CheckStage(Generic[S]):
         return register
 
     def problems(self, subject: S) -> list[Problem]:
-        """Return the problems that all checks of this stage find, without their source lines."""
+        """Return the problems of a subject, without source lines; [] for a subject without a tree."""
         tree = subject.tree
         if tree is None:
             return []
@@ -99,21 +98,21 @@ class CheckStage(Generic[S]):
 
 
 class WrittenScenario(NamedTuple):
-    """Scenario as written, with all its robots, before it is split into views."""
+    """Scenario with all its robots, before it is split into views."""
 
     spec: ScenarioSpec
     tree: MappingNode
 
 
 class NameScope(NamedTuple):
-    """View of a scenario, and its built world, in which names are looked up. `world` is None before it is built."""
+    """View of a scenario, and its built world, in which names are searched. `world` is None before it is built."""
 
     loaded: LoadedScenario
     world: World | None = None
 
     @property
     def tree(self) -> MappingNode:
-        """The tree of the scenario."""
+        """YAML tree of the view."""
         return self.loaded.tree
 
 

@@ -1,4 +1,4 @@
-"""Check the geometry of a robot: its file against its URDF, and whether its wheels are on the ground."""
+"""Checks of a robot: whether its file agrees with its URDF, and whether its wheels are on the ground."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,13 +15,13 @@ from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
 from simscen.sim.body.undercarriage import Wheel
 
 DIMENSION_TOLERANCE = 0.01
-"""Relative difference from the URDF that a dimension of the drive may have."""
+"""Largest relative difference between a dimension of the drive in the robot file and in the URDF."""
 
 
 def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
     """Return warnings about a robot with a URDF: wrong dimensions in its file, or wheels and casters off the ground.
 
-    `spec` and `body` are those of the robot. Files that it refers to must lie in `roots`.
+    `spec` and `body` are the results of `robot_from_file`. All files of the robot must lie in the folders `roots`.
     """
     if robot.urdf is None:
         return []
@@ -49,7 +49,7 @@ def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]
 
 
 def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
-    """Return the dimensions of the drive in m according to its wheels, by key of the drive in a robot file."""
+    """Return the dimensions of the drive in m, computed from its wheels, by key under `drive` of a robot file."""
     driven = [wheel for wheel in wheels if wheel.is_driven]
     if not driven:
         return {}
@@ -64,7 +64,7 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
 
 
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Return the errors and warnings about a robot that only building it reveals."""
+    """Build a robot, and return the errors and warnings about it."""
     robot = file.robot
     try:
         if robot.urdf is not None:

@@ -1,4 +1,4 @@
-"""Search routes of the robot to its goals and to areas that triggers wait for. Checks use the results.
+"""Route search for checks: routes of the robot to its goals and to the areas of triggers.
 
 A fast approximate search runs first. If it finds no route, an exact search decides.
 """
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 
 
 MAX_ROUTE_SILL_M = 0.03
-"""Height of obstacles that a route may cross. For starts and goals, it is the lower SILL_M of scene.py."""
+"""Largest height of an obstacle that a route can cross."""
 
 
 @dataclass(frozen=True)
 class RobotRoutes:
     """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
 
-    `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas. `solids` are
-    the obstacles that block the robot. Methods without this parameter consider the fixed solids of the world.
+    `stops` are starts, goals, and corners of trigger areas. Methods without the parameter `solids` (obstacles) use the
+    fixed solids of the world.
     """
 
     scene: Scene
     stops: tuple[Pose2, ...]
 
     def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
-        """Return whether a route may lead from one of `starts` to the goal; False proves that there is none."""
+        """Return whether there may be a route from one of `starts` to the goal; False proves that there is none."""
         approximate = self._approximate_paths(solids)
         if approximate is not None and any(approximate.length(start[:2], goal[:2]) < float("inf") for start in starts):
             return True
@@ -47,9 +47,9 @@ class RobotRoutes:
         return any(exact_paths.may_reach(start, goal) for start in starts)
 
     def can_enter(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
-        """Return whether the center of the robot may get from one of `starts` into an area; False proves the opposite.
+        """Return whether there may be a route from one of `starts` into an area; False proves that there is none.
 
-        `distance` returns the distance of a pose from the area in m, at most 0 inside. `towards` is a point of the
+        `distance` returns the distance in m of a pose from the area, at most 0 inside. `towards` is a point in the
         area, to which the search is directed.
         """
         approximate = self._approximate_paths(self.scene.world.solids)
@@ -74,46 +74,47 @@ class RobotRoutes:
 
     @property
     def z_range(self) -> tuple[float, float]:
-        """Lowest and highest z in m between which an obstacle blocks a route."""
+        """Lowest and highest z in m between which an obstacle blocks routes."""
         return self.scene.heights_above(MAX_ROUTE_SILL_M)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Bounds of the world, enlarged to contain all stops: (min x, min y, max x, max y) in m."""
+        """Bounds of the world extended to all stops: (min x, min y, max x, max y) in m."""
         return extend_bounds(self.scene.world.bounds, list(self.stops))
 
     @cached_property
     def _paths_around_fixed(self) -> SimplePaths | None:
-        """The fast search around the fixed solids of the world; None if a solid is too complex for it."""
+        """Fast path search between the fixed solids of the world; None if a solid is too complex for it."""
         return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
     def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
-        """Return the fast search; None if a solid is too complex for it."""
+        """Return the fast path search between `solids`; None if a solid is too complex for it."""
         if solids is self.scene.world.solids:
             return self._paths_around_fixed
         return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
-        """Return the exact search."""
+        """Return the exact path search between `solids`."""
         return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 
 class TriggerArea(NamedTuple):
-    """Area that the robot must enter before an event or a fault can start.
-
-    `keys` are those of the condition, and `event` is the name of the event or fault. `corners` has (x, y) in m, or a
-    single point. `distance` returns the distance in m of a pose from the area; it is at most 0 inside.
-    """
+    """Area that the robot must enter before an event or fault can start."""
 
     keys: Keys
+    """Keys of the condition in the scenario."""
     event: str
+    """Name of the event or fault."""
     description: str
+    """Description of the area for messages."""
     corners: Polygon
+    """Corners (x, y) in m of the region, or the center of a circle."""
     distance: Callable[[Pose2], float]
+    """Function that returns the distance in m of a pose from the area, at most 0 inside."""
 
 
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
-    """Return the areas of all triggers of events and faults."""
+    """Return the areas that the triggers of events and faults wait for."""
     spec = scene.loaded.spec
     tests: list[tuple[Keys, str, AnyCondition | None]] = [
         ((*step.keys, "when"), step.name, step.when) for step in spec.steps
@@ -123,7 +124,10 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
 
 
 def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
-    """Yield the areas that the robot must enter for the condition `test` of the event or fault `name` to be true."""
+    """Yield the areas that the robot must enter before the condition `test` at `keys` can be true.
+
+    `name` is the name of the event or fault.
+    """
     if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
         return
     if test.all is not None:
@@ -147,7 +151,7 @@ def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> 
 
 
 def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
-    """Return the `distance` of the area that consists of a region and everything within `max_distance` m of it."""
+    """Return the function `distance` of the area of all positions within `max_distance` m of a region."""
     return lambda pose: distance_to_polygon(pose, corners) - max_distance
 
 

@@ -1,4 +1,4 @@
-"""Checks that find goals to which no route leads, and bounds on time or path length that no drive can meet."""
+"""Checks for goals without a route, and for bounds on time or path length that no drive can meet."""
 
 import math
 from collections.abc import Iterator
@@ -20,20 +20,20 @@ from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 GAP_EDGE_M = 0.03
-"""Distance from the edge of a gap within which the solid at the edge is searched, to name it."""
+"""Distance from the edge of a gap within which the solid at the edge is searched."""
 
 
 class Gap(NamedTuple):
-    """Narrowest place of the widest way to a goal: a description for messages, and its position (x, y) in m."""
+    """Narrowest place of the widest way to a goal: its description for messages, and its position (x, y) in m."""
 
     description: str
     position: tuple[float, float]
 
 
 def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
-    """Return a problem for each goal without a route, and the gap that is too narrow.
+    """Return a problem for each goal without a route, with the gap that is too narrow.
 
-    The problem is an error if fixed walls block the way, and a warning if the robot might get through after all.
+    The problem is a warning if the goal could be reachable after all, for example over a ramp.
     """
     blocked = scene.cached(blocked_poses)
     if START in blocked:
@@ -67,7 +67,7 @@ def goals_without_route(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _ramp_hint(scene: Scene) -> str:
-    """Return the hint that a goal is reachable if a tilted solid is a ramp that the robot can climb."""
+    """Return the hint that a tilted solid on the way could be a ramp that the robot can climb."""
     from simscen.loading.builders import load_robot
     from simscen.sim.body.robot_body import compute_climb_limits
 
@@ -77,7 +77,7 @@ def _ramp_hint(scene: Scene) -> str:
 
 
 def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
-    """Return the gap between `solids` that is too narrow, on the way to the goal with the widest gaps."""
+    """Return the gap between `solids` that is too narrow, on the widest way to the goal."""
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
@@ -95,32 +95,25 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
 
 
 MIN_PATH_RATIO = 0.97
-"""Lower bound on the length of a drive, relative to the computed shortest path.
-
-It is less than 1, because computed lengths are exact to 1 %, and a robot can cut corners a little more than they
-assume.
-"""
+"""Lower bound on the length of a drive, divided by the computed shortest path, which is not exact."""
 MAX_AVERAGE_SPEED_RATIO = 1.02
-"""Upper bound on the average speed of a drive, relative to the top speed of the robot."""
+"""Upper bound on the average speed of a drive, divided by the top speed of the robot."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
-"""Actions by which a robot may arrive earlier than by driving to its goals."""
+"""Actions that can let the robot arrive earlier than by driving to its goals."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive of the robot to all goals in order.
-
-    A leg leads to a goal from the goal before, or from the start. `leg_lengths` are the lengths in m of the shortest
-    paths of the legs.
-    """
+    """Drive of the robot to all goals in order. A leg leads from the start or a goal to the next goal."""
 
     goals: tuple[Goal, ...]
     robot: RobotSpec
     leg_lengths: list[float]
+    """Length in m of the shortest path of each leg."""
 
     @property
     def min_leg_lengths(self) -> list[float]:
-        """Lower bound on the driven length of each leg in m, given the tolerances of the goals."""
+        """Lower bound on the driven length of each leg in m, considering the tolerances of the goals."""
         slack = [0.0, *(goal.xy_tolerance for goal in self.goals)]
         pairs = zip(self.leg_lengths, pairwise(slack), strict=True)
         return [max(0.0, MIN_PATH_RATIO * length - a - b) for length, (a, b) in pairs]
@@ -132,7 +125,7 @@ class Drive:
 
     @property
     def top_speed_text(self) -> str:
-        """The top speed as part of a message."""
+        """Top speed as part of a message."""
         return f"at the robot's top speed of {self.robot.top_speed:g} m/s"
 
     @property
@@ -146,7 +139,7 @@ class Drive:
 
 @TIMING.check("SC303")
 def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
-    """Find timeouts, time limits and bounds of criteria that no drive can meet."""
+    """Find timeouts, time limits, and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
     if not goals or robot is None or failing or scene.may_do(*SHORTCUT_ACTIONS):
@@ -183,7 +176,7 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
 
 
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
-    """Yield the key of each bound of a criterion that the drive violates, and the reason."""
+    """Yield the key and the reason of each bound of a criterion that the drive violates."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
     times, lengths = drive.min_leg_times, drive.min_leg_lengths
     bound = getattr(criterion, "max", None)
@@ -209,7 +202,7 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
-    """Return whether a criterion fails the run unless every goal is reached."""
+    """Return whether a criterion fails the run unless all goals are reached."""
     if entry.kind == "result":
         requires = getattr(entry.chosen, "status", "") == "SUCCEEDED"
     else:

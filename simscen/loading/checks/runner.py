@@ -1,4 +1,4 @@
-"""Run the checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
+"""Checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
 
 from collections.abc import Iterable
 
@@ -17,11 +17,10 @@ MODULES = (actions, criteria, events, faults, names, settings, world_file)
 def check_scenario(
     loaded: LoadedScenario, world: World | None = None, unknown_places: Iterable[Problem] = ()
 ) -> list[Problem]:
-    """Return the errors and warnings of a scenario of one robot, or of a robot's view of a scenario of several.
+    """Return the errors and warnings of a scenario of one robot, or of the view of one of several robots.
 
-    `world` is the built world. It is only needed for names in an imported world, such as one from Gazebo.
-    `unknown_places` are problems with names of places that were found while the scenario was loaded; they are returned
-    first. The meaning of the scenario is checked only if there are no errors before.
+    `world` is the built world, which is only needed to check names in a world from a ROS map or SDF file. The result
+    includes the problems `unknown_places`, which were found while the scenario was loaded.
     """
     problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
     if all(problem.severity == "warning" for problem in problems):
@@ -30,10 +29,10 @@ def check_scenario(
 
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:
-    """Return the errors and warnings of a world file, without their source lines; [] for a ROS map or an SDF file."""
+    """Return the errors and warnings of a world file, without source lines; [] for a ROS map or SDF file."""
     return [] if world.spec is None else WORLD_FILE.problems(world)
 
 
 def check_robot_names(spec: ScenarioSpec, tree: MappingNode) -> list[Problem]:
-    """Return the problems with names of robots in a scenario, without their source lines."""
+    """Return the problems with names of robots in a scenario, without source lines. `tree` is its YAML tree."""
     return ROBOT_NAMES.problems(WrittenScenario(spec, tree))

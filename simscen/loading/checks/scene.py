@@ -1,4 +1,4 @@
-"""Scene: a scenario of one robot in its built world. It is the subject of the checks of the stages WORLD and TIMING."""
+"""Scene: a scenario of one robot in its built world, the subject of the check stages WORLD and TIMING."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -30,20 +30,20 @@ from simscen.worlds.geometry.prisms import upright_prism
 SILL_M = 0.02
 """Height below which an obstacle does not block the start or a goal of a robot on wheels."""
 MIN_HULL_OVERLAP_M = 0.002
-"""Height by which an obstacle must exceed the underside of a hull to touch it certainly."""
+"""Height by which an obstacle must exceed the underside of a hull to count as touching it."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
 """Keys of the start pose in a scenario."""
 MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
-"""Actions that can move or remove a body."""
+"""Kinds of actions that can move or remove a body."""
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class DrivableArea:
-    """Area in which the robot can be: its map `grid`, or else `bounds`; unlimited without either.
+    """Area in which the robot can be: the map `grid`, or else the rectangle `bounds`, or else unlimited.
 
     `bounds` is (min x, min y, max x, max y) in m.
     """
@@ -51,8 +51,8 @@ class DrivableArea:
     bounds: tuple[float, float, float, float] | None = None
     grid: OccupancyGrid | None = None
 
-    def outside(self, pose: Pose2) -> str | None:
-        """Return that a pose is not in the area, as words that follow "is"; None for a pose in the area."""
+    def why_outside(self, pose: Pose2) -> str | None:
+        """Return text such as "outside the map (…)" for a pose outside the area; None for a pose inside."""
         if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
             rows, columns = self.grid.shape
             size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
@@ -68,8 +68,7 @@ class DrivableArea:
 def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
     """Return the area in which the robot of a scenario can be.
 
-    It is the area of the map that the robot gets. For a world without a map, it is the bounds of the world. With
-    `map: none`, it is unlimited, because goals may lie beyond all obstacles.
+    This is the map of the robot, or the bounds of a world without a map. With `map: none`, it is unlimited.
     """
     if loaded.map == "none":
         return DrivableArea()
@@ -79,9 +78,9 @@ def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
 
 @dataclass(frozen=True)
 class Scene:
-    """Scenario of one robot, or one robot's view of a scenario, with its world and the size of the robot.
+    """Scenario of one robot, or the view of one of several robots, in its built world.
 
-    For the checks, `world` has only the solids that block the robot. Positions are in m in the frame of the world.
+    `world` contains only the solids that block the robot. Positions are in m in the frame of the world.
     """
 
     loaded: LoadedScenario
@@ -91,7 +90,7 @@ class Scene:
     _results: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def cached(self, compute: "Callable[[Scene], T]") -> T:
-        """Return `compute(self)`, which is computed once, so that checks can share the result."""
+        """Return `compute(self)`. The result is computed once and kept for later calls."""
         if compute not in self._results:
             self._results[compute] = compute(self)
         result: T = self._results[compute]
@@ -99,7 +98,7 @@ class Scene:
 
     @property
     def tree(self) -> MappingNode:
-        """The tree of the scenario."""
+        """YAML tree of the scenario."""
         return self.loaded.tree
 
     @property
@@ -110,7 +109,7 @@ class Scene:
     def heights_above(self, sill: float) -> tuple[float, float]:
         """Return the lowest and highest z in m between which an obstacle blocks the robot.
 
-        A base on wheels is assumed to climb obstacles of up to `sill` m.
+        Wheels climb obstacles of up to `sill` m.
         """
         underside = self.size.underside
         lowest = sill if underside is None else underside + MIN_HULL_OVERLAP_M
@@ -118,32 +117,32 @@ class Scene:
 
     @cached_property
     def start(self) -> Pose2:
-        """The true start pose of the robot."""
+        """True start pose of the robot."""
         return self.loaded.spec.only_robot.pose.pose
 
     @property
     def start_poses(self) -> list[Pose2]:
-        """The start pose, and the poses to which events kidnap the robot."""
+        """Start pose, and poses to which events move (kidnap) the robot."""
         return [self.start, *(action.pose.pose for _, _, action in self.actions if isinstance(action, Kidnap))]
 
     @cached_property
     def area(self) -> DrivableArea:
-        """The area in which the robot can be."""
+        """Area in which the robot can be."""
         return drivable_area(self.loaded, self.world)
 
     @cached_property
     def bodies(self) -> tuple[Solid, ...]:
-        """The solids of all bodies that can move, at their initial poses."""
+        """Solids of all movable bodies at their initial poses."""
         return tuple(_at_initial_pose(self.world.bodies))
 
     @cached_property
     def unmoved_bodies(self) -> tuple[Solid, ...]:
-        """The solids of bodies that have no motion of their own, and that no event moves or removes."""
+        """Solids of movable bodies that have no scripted motion, and that no event moves or removes."""
         return tuple(_at_initial_pose(b for b in self.world.bodies if b.path is None and b.name not in self._moved))
 
     @cached_property
     def immovable_bodies(self) -> tuple[Solid, ...]:
-        """The solids of unmoved bodies that the robot cannot push either, because they have no mass."""
+        """Solids of unmoved bodies without mass, which the robot cannot push."""
         return tuple(
             _at_initial_pose(
                 b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in self._moved
@@ -152,23 +151,23 @@ class Scene:
 
     @cached_property
     def _moved(self) -> set[str]:
-        """The names of the bodies that an event may move or remove."""
+        """Names of the bodies that an event can move or remove."""
         if self.may_do():
             return {body.name for body in self.world.bodies}
         return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
-        """The fixed solids that certainly block a robot: upright ones, and walls that were made from a map.
+        """Fixed solids that certainly block the robot: upright prisms, and walls from a map.
 
-        Other solids, such as a mesh or a tilted box, may be ramps.
+        Other solids, such as a mesh or a tilted box, could be ramps.
         """
         mapped = self.world.grid is not None
         return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
 
     @cached_property
     def targets(self) -> list[tuple[Keys, Goal]]:
-        """The goals that the robot is expected to reach, also those of events; each with the keys of its pose."""
+        """Keys of the pose, and the goal, of each goal without an expected failure, including goals of events."""
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
@@ -177,20 +176,20 @@ class Scene:
 
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
-        """The keys, the kind, and the specification of each action of an event that applies to this robot."""
+        """Keys, kind, and specification of each action of an event that applies to this robot."""
         located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
         relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether an event can do what actions of these kinds do.
+        """Return whether an action of an event can have the effect of one of these kinds of actions.
 
-        An action of an installed package may do anything. Without kinds, return whether there is such an action.
+        An action of an installed package can have any effect. Without kinds, return whether there is such an action.
         """
         return any(action.may_do(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
-        """Return how the robot at a pose conflicts with a solid, as words that follow "is"; None if it does not."""
+        """Return text such as "inside obstacle …" if the robot at a pose overlaps a solid; else None."""
         if solid := first_solid_in_disc(solids, (pose.x, pose.y), TOUCH_M, self.z_range):
             return f'inside obstacle "{solid}"'
         if solid := self.circle_conflict(pose, solids):
@@ -201,17 +200,17 @@ class Scene:
         return None
 
     def circle_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
-        """Return the name of a solid that the robot's inscribed circle overlaps at a pose; None if there is none."""
+        """Return the name of a solid that overlaps the robot's inscribed circle at a pose; None if there is none."""
         return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
 
     @property
     def outline(self) -> Polygon:
-        """The footprint in the base frame of the robot."""
+        """Footprint in the base frame of the robot."""
         return self.size.footprint
 
 
 def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
-    """Yield the solids of bodies in the frame of the world, with the names of the bodies."""
+    """Yield the solids of bodies in the frame of the world. Each solid has the name of its body."""
     for body in bodies:
         for solid in body.solids:
             yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
@@ -219,17 +218,16 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
 
 WORLD: CheckStage[Scene] = CheckStage("world")
 TIMING: CheckStage[Scene] = CheckStage("timing")
-"""Checks of time bounds. They need routes to all goals, so they run only if all other checks find no errors."""
+"""Checks of time bounds. They run only if the other checks find no errors."""
 
 START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
-"""Error codes of a navigation that fails because of the start pose."""
+"""Error codes of Nav2 for failures because of the start pose."""
 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
-    """Return whether a scenario expects that the robot fails at the goal with this name.
+    """Return whether a scenario expects that the goal with this name fails.
 
-    A scenario states this with `expect` at the goal, or with a criterion: `result` or `error_code` of the whole
-    navigation, or `error_code` of this goal.
+    A scenario states this by `expect` at the goal, or by a criterion `result` or `error_code`.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
@@ -241,14 +239,14 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
 
 
 def expected_failure_hint(keys: Keys, code: str) -> str:
-    """Return the hint how a scenario can expect that the goal at `keys` fails with the error code `code`."""
+    """Return the hint how to expect that the goal at `keys` fails with the error code `code`."""
     if keys[0] == "goals":
         return f"expect the failure with `expect: {{error_code: {code}}}` at the goal"
     return required_failure_hint(code)
 
 
 def required_failure_hint(code: str) -> str:
-    """Return the hint how a scenario can require that the whole navigation fails with the error code `code`."""
+    """Return the hint how to require that the whole navigation fails with the error code `code`."""
     return f"replace `goals_reached` in `pass` by `result: {{status: FAILED, error_code: {code}}}`"
 
 
@@ -258,7 +256,7 @@ def expects_start_failure(spec: ScenarioSpec) -> bool:
 
 
 def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Yield each error code that a criterion requires, and the name of its goal; None for the whole navigation."""
+    """Yield the error codes that criteria require, with the name of the goal; None for the whole navigation."""
     for entry in spec.pass_:
         if entry.severity != "fail":
             continue

@@ -1,7 +1,4 @@
-"""Run the checks that need the built world, such as whether the start is free and every goal can be reached in time.
-
-These are the stages BUILT_WORLD, WORLD, and TIMING. They need no physics engine.
-"""
+"""Checks that need the built world: stages BUILT_WORLD, WORLD, and TIMING. They need no physics engine."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -32,9 +29,9 @@ def check_in_world(
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario in its built world.
 
-    `cache` keeps built worlds for further scenarios. If a folder `pictures` is given, a picture of the world is written
-    to it for a scenario with problems. Raises InvalidInput for unusable files, and UsageError for a picture that cannot
-    be written.
+    `cache` keeps built worlds for further calls. For a scenario with problems, a picture of the world is written to the
+    folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError for a picture that
+    cannot be written.
     """
     cache = cache or WorldCache()
     world = with_stops_in_bounds(cache.world(loaded), loaded)
@@ -49,7 +46,7 @@ def check_in_world(
 
 
 def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
-    """Return the problems of a scenario of one robot, or of one robot's view of a scenario."""
+    """Return the problems of a scenario of one robot, or of the view of one of several robots."""
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems = [*_check_names_again(loaded, world), *_oversized_map(loaded, world)]
@@ -61,7 +58,7 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
 
 
 def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
-    """Return the problems that the stages WORLD and TIMING find; hints name the picture, if one is drawn."""
+    """Return the problems that the stages WORLD and TIMING find. Their hints contain the path of the picture."""
     problems = WORLD.problems(scene)
     if not _has_errors(problems):
         problems += TIMING.problems(scene)
@@ -76,7 +73,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
     """Draw the world, the robot at its start and its goals, and gaps that are too narrow.
 
-    `gaps` are the positions (x, y) of the gaps in m. Returns the image file, which is written to `folder`. Raises
+    `gaps` are the positions (x, y) of the gaps in m. Write an image file to `folder`, and return its path. Raises
     UsageError if it cannot be written.
     """
     from simscen.worlds.built_world import build_world_and_map
@@ -99,7 +96,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
 
 def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
-    """Return the notes that were made while a world was built, as warnings about its file."""
+    """Return the notes of a built world as warnings about its file `source`."""
     display_name = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
     return [
         Problem(display_name, 0, 0, "SC311", note.removeprefix(f"{display_name}: "), severity="warning")
@@ -108,9 +105,9 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Return the problems of names that can only be checked now; [] if all could be checked before.
+    """Return the problems of a scenario with a world from a ROS map or SDF file, or a robot from a URDF alone.
 
-    These are the names in an imported world, and the sensors of a robot that is only a URDF.
+    Only the built world and robot have all names. Return [] for other scenarios, which have been checked before.
     """
     is_urdf = loaded.robot.path == loaded.robot.urdf
     if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
@@ -119,7 +116,7 @@ def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
 
 
 def _oversized_map(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
-    """Yield a problem if the map that would be made of the world is too large."""
+    """Yield a problem if the map of the world would be too large."""
     if world.grid is None and loaded.map is None and (message := map_size_error(world.bounds)):
         yield loaded.problem(("world",), "SC330", message, f"{oversize_hint(world)}, or drive with `map: none`")
 
@@ -134,7 +131,7 @@ def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
-    """Return the scenario with a specification of its robot, which is inferred if the robot is only a URDF."""
+    """Return the scenario with the specification of its robot, which is inferred for a URDF alone."""
     if loaded.robot.spec is not None:
         return loaded
     return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))

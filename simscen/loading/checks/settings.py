@@ -1,4 +1,4 @@
-"""Checks of settings: rates that do not divide the tick rate, too many goals, duplicates, angles in degrees, …"""
+"""Checks of single settings: rates, numbers of goals, duplicates, angles in degrees, and values without effect."""
 
 import math
 from collections.abc import Iterator
@@ -41,9 +41,9 @@ def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> CheckProblem:
-    """Return the problem of the rate at `keys` in `tree`, the tree of the scenario or of the robot file.
+    """Return the problem of the rate at `keys` in `tree`, the YAML tree of the scenario or of the robot file.
 
-    It is marked at the tick rate if the scenario sets it, else at the rate, or where the rate would be written.
+    The message marks the tick rate if the scenario sets it, else the rate.
     """
     owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
     message = f"{'.'.join(str(key) for key in keys)}{owner}: {error}"
@@ -54,7 +54,7 @@ def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: s
 
 @NAMES.check("SC016")
 def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find more goals than a run may have, and keys that only the last goal of navigate_through_poses can have."""
+    """Find too many goals, and keys that only the last goal of navigate_through_poses can have."""
     spec = scope.loaded.spec
     if len(spec.goals) * spec.navigation.loops > MAX_GOALS:
         message = f"{len(spec.goals)} goals in {spec.navigation.loops} loops exceed the limit of {MAX_GOALS} goals"
@@ -73,7 +73,7 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
 
 FULL_TURN_RAD = 2 * math.pi
 SPEED_PARAMETERS = ("desired_linear_vel", "max_vel_x", "vx_max")
-"""Parameters of Nav2's controllers for their forward speed."""
+"""Parameters of controllers for their forward speed, as in Nav2."""
 
 
 @MEANING.check("SC052", severity="warning")
@@ -88,7 +88,7 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find angles of more than one turn without a unit in the scenario, its world, and its own robot file."""
+    """Find angles without a unit above one turn in the scenario, its world, and its robot file."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
@@ -139,7 +139,7 @@ def deprecated_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find parameters of AMCL's recovery in a localizer with `relocalization: scan_matching`, which ignores them."""
+    """Find recovery parameters of AMCL that `relocalization: scan_matching` ignores."""
     localizer = getattr(loaded.spec.stack, "localizer", None)
     if getattr(localizer, "relocalization", None) != "scan_matching":
         return
@@ -152,7 +152,7 @@ def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem
 
 @MEANING.check("SC055", severity="warning")
 def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find `latency: robot` for a robot whose file gives no latency."""
+    """Find `latency: robot` for a robot file without `latency`."""
     robot = loaded.robot.spec
     if getattr(loaded.spec.stack, "latency", None) != "robot":
         return
@@ -165,7 +165,7 @@ def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find speed limits of zones, and speeds of controllers, that are above the top speed of the robot."""
+    """Find speed limits of zones and speeds of controllers above the top speed of the robot."""
     robot, stack = loaded.robot.spec, loaded.spec.stack
     if robot is None:
         return

@@ -1,4 +1,4 @@
-"""Checks of world files: names that are not unique, things of zero size, duplicates, and unknown regions."""
+"""Checks of world files: duplicate names and shapes, things of zero size, and unknown regions."""
 
 from collections.abc import Iterator
 
@@ -10,13 +10,13 @@ from simscen.model.world import WorldObject, WorldSpec
 
 
 def _spec(world: LoadedWorld) -> WorldSpec:
-    assert world.spec is not None, "only worlds in simscen's own language are checked"
+    assert world.spec is not None, "only *.world.yaml files and inline worlds are checked"
     return world.spec
 
 
 @WORLD_FILE.check("SC033")
 def duplicate_names_in_world(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find obstacles and walls with the name of an object or a door, and obstacles with the same name (a warning)."""
+    """Find obstacles and walls with the name of an object or door, and obstacles with the same name (a warning)."""
     spec = _spec(world)
     moving = {world_object.name for world_object in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
@@ -37,7 +37,7 @@ def duplicate_names_in_world(world: LoadedWorld) -> Iterator[CheckProblem]:
 
 @WORLD_FILE.check("SC313")
 def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find walls, ramps, and doors of zero size, and motions that stay at one pose (a warning)."""
+    """Find walls, ramps, and doors of zero length, and motions that stay at one pose (a warning)."""
     spec = _spec(world)
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
@@ -56,7 +56,7 @@ def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
 
 @WORLD_FILE.check("SC054", severity="warning")
 def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find obstacles and objects with the same shape and pose as another one."""
+    """Find obstacles and objects with the same shape and pose as another obstacle or object."""
     spec = _spec(world)
     things: list[tuple[Keys, WorldObject]] = [
         (("obstacles", k), world_object) for k, world_object in enumerate(spec.obstacles)

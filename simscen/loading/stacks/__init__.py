@@ -1,1 +1,1 @@
-"""Load stacks: stack files, Nav2 parameter files, stacks given with `--stack`, and commands of external stacks."""
+"""Stacks: stack files, Nav2 parameter files, the option `--stack`, and commands of external stacks."""

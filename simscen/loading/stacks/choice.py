@@ -1,4 +1,4 @@
-"""The stack that `--stack` selects for all scenarios on the command line, and the stack files that it can name."""
+"""Stack that `--stack` selects for all scenarios, and stack files (`*.stack.yaml` or Nav2 parameter files)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,43 +16,47 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, Scalar
 from simscen.model.stack_files import StackFileSpec
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
-"""Keys of a `stack:` section that describe the world of the scenario. They are kept when another stack is selected."""
+"""Keys under `stack` for zones and masks of the world. Another stack does not replace their values."""
 COMMON_STACK_KEYS = ("controller_frequency",)
-"""Keys that all types of stacks have."""
-GOAL_CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
-"""Key of a `stack:` section, and keys below it."""
-REFERENCE, EXTERNAL = "reference", "external"
-"""Default type of a stack, and the key with the name of an external stack."""
+"""Keys under `stack` that all types of stacks have."""
+GOAL_CHECKER = "goal_checker"
+"""Key under `stack`."""
+TOLERANCES = ("xy_goal_tolerance", "yaw_goal_tolerance")
+"""Keys under `goal_checker`."""
+EXTERNAL = "external"
+"""Key under `stack` with the name of an external stack."""
+REFERENCE = "reference"
+"""Default type of a stack."""
 
 
 @dataclass(frozen=True)
 class StackChoice:
-    """Stack given as `--stack NAME=VALUE`: a stack file, a type of stack, or the command of an external stack."""
+    """Stack in the option `--stack NAME=VALUE`. VALUE is a stack file, a type of stack, or a command."""
 
     name: str
     value: str
     type: str = ""
-    """Type of the stack, such as "reference"; "" for a stack file or a command."""
+    """Type of the stack, e.g. "reference"; "" for a stack file or a command."""
     file: Path | None = None
-    """Stack file."""
+    """Stack file; None if VALUE is no file."""
     section: MappingNode | None = field(default=None, repr=False)
-    """Section `stack:` of the stack file."""
+    """YAML tree of the section `stack` in the stack file; None without a stack file."""
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
-    """Texts of the stack file and of the files that it extends, by their names in messages."""
+    """Texts of the stack file and of the files that it extends, by path as in messages."""
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
-    """Absolute paths of these files, by their names in messages."""
+    """Absolute paths of the same files, by path as in messages."""
     external_command: ExternalCommand | None = field(default=None, repr=False)
-    """Command that starts an external stack."""
+    """Command that starts an external stack; None if VALUE is no command."""
     notes: tuple[Problem, ...] = field(default=(), repr=False)
     """Warnings about the stack file."""
 
     @property
     def written(self) -> str:
-        """The option as given: NAME=VALUE."""
+        """NAME=VALUE as on the command line."""
         return f"{self.name}={self.value}"
 
     def relative_to_folder(self, folder: Path) -> str:
-        """Return NAME=VALUE with the path of the stack file relative to `folder`; absolute if it is outside."""
+        """Return NAME=VALUE with the path of a stack file relative to `folder`, or absolute if it is outside."""
         if self.file is None:
             return self.written
         file = self.file.relative_to(folder).as_posix() if self.file.is_relative_to(folder) else str(self.file)
@@ -60,11 +64,11 @@ class StackChoice:
 
 
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario of one robot with the selected stack instead of its own.
+    """Return a scenario tree of one robot with the selected stack.
 
-    Zones, masks, and goal tolerances of the scenario are kept. If the choice is a stack file, its parameters replace
-    all others. A command or a type of stack has no parameters. Then the parameters of the scenario are kept if its own
-    stack is of the same type. If not, only those are kept that all types of stacks have.
+    Zones, masks, and goal tolerances of the scenario are kept. All other parameters are those of the selected stack
+    file. If no stack file is selected, parameters of the scenario are kept: all for a stack of the same type, otherwise
+    only the parameters that all types of stacks have.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
@@ -77,7 +81,7 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return the `stack:` section of the choice, with what is kept of the section `own` of the scenario."""
+    """Return the section `stack` of the choice, with the values that are kept of the section `own` of the scenario."""
     scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
         return _with_goal_tolerances(
@@ -95,7 +99,7 @@ def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode:
-    """Return the section with the goal tolerances of the section `own`, so that all stacks have the same goals."""
+    """Return the section `stack` with the goal tolerances of the section `own` of the scenario."""
     checker, replaced = child(own, GOAL_CHECKER), child(section, GOAL_CHECKER)
     if not isinstance(checker, MappingNode) or not isinstance(replaced, MappingNode | None):
         return section
@@ -109,7 +113,7 @@ def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode
 
 
 def stack_type(section: Node) -> str | None:
-    """Return the type of a `stack:` section; None for an external stack or an invalid type."""
+    """Return the type of the stack in a section `stack`; None for an external stack or an invalid type."""
     if child(section, EXTERNAL) is not None:
         return None
     written = child(section, "type")
@@ -117,9 +121,9 @@ def stack_type(section: Node) -> str | None:
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
-    """Return the choice `--stack name=value` of the stack file `path`. Raises InvalidInput with all its problems.
+    """Return the choice `--stack name=value` of the stack file `path`, which may be outside `root`.
 
-    The file may be outside of `root`, because the command line names it.
+    Raises InvalidInput with all problems of the file.
     """
     library = Library(PathSandbox.around(root, [*world_path, path.parent]))
     found = read_stack_file(path, library)
@@ -132,10 +136,9 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """Return the `stack:` section of a stack file and warnings about it; or all problems of the file.
+    """Return the section `stack` of a stack file and warnings about the file; or all problems of the file.
 
-    A Nav2 parameter file is read like a stack file whose `nav2_params` names it. The section contains the Nav2
-    parameters instead of the path of their file, which may be outside the root of the scenarios.
+    `path` can also be a Nav2 parameter file. The section contains the parameters of Nav2 files instead of their paths.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -159,7 +162,7 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
 
 
 def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
-    """Return the tree and the problems of a stack file; for a Nav2 parameter file, a stack file that names it."""
+    """Return the YAML tree and problems of a stack file. For a Nav2 file, the tree is `stack: {nav2_params: FILE}`."""
     display_name = library.sandbox.display_name(file)
     text = read_text(file, display_name)
     if isinstance(text, Problem) or not is_nav2_parameter_file(text, display_name):
@@ -172,7 +175,7 @@ def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]
 
 
 def _misplaced_key_problems(section: MappingNode) -> list[Problem]:
-    """Return a problem for each zone or mask in a stack file: it describes a world, so it belongs to a scenario."""
+    """Return a problem for each zone or mask in a stack file, because they belong to a scenario."""
     hint = "write it under `stack:` of the scenario, where it applies to every stack"
     return [
         Problem(*key_position(section, (name,)), "SC016", f"`{name}` belongs to a scenario, not to a stack file", hint)
@@ -182,15 +185,15 @@ def _misplaced_key_problems(section: MappingNode) -> list[Problem]:
 
 
 STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
-"""Kinds of files with the parameters of a stack, as messages name them."""
+"""Kinds of files with the parameters of a stack, as in messages."""
 _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 """Top-level keys that a stack file can have."""
 
 
 def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Return STACK_FILE_KIND or NAV2_FILE_KIND if the content of a file shows that it is one of them; else "".
+    """Return STACK_FILE_KIND or NAV2_FILE_KIND for a file with such content; "" for other files.
 
-    `display_name` is the name of the file in problems.
+    `display_name` is the path of the file in messages.
     """
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
@@ -199,7 +202,7 @@ def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str
 
 
 def not_a_scenario(kind: str, display_name: str) -> Problem:
-    """Return the problem of a stack file that is used as a scenario; `kind` is what recognize_stack_file returns."""
+    """Return the problem that a stack file is used as a scenario. `kind` is STACK_FILE_KIND or NAV2_FILE_KIND."""
     alternative = f", or name it in a scenario: `stack: {{nav2_params: {display_name.rpartition('/')[2]}}}`"
     hint = f"run scenarios with `--stack NAME={display_name}`{alternative if kind == NAV2_FILE_KIND else ''}"
     return Problem(display_name, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

@@ -1,4 +1,4 @@
-"""Parse the command that starts an external stack, check that it can be run, and compute the digest of its files."""
+"""Commands that start external stacks: parsing, check of the program, and digest of its files."""
 
 import hashlib
 import itertools
@@ -16,43 +16,46 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
 CHUNK_BYTES = 1 << 20
-"""Amount of a file that is read at once for the digest."""
+"""Number of bytes of a file that are read at once for the digest."""
 EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
-"""Folders whose Python files are not part of a stack."""
-MAX_FOLDERS, MAX_SOURCES = 500, 1000
-"""Largest number of folders that are searched, and of Python files that are read, for each source folder of a stack."""
+"""Names of folders that are not part of a stack."""
+MAX_FOLDERS = 500
+"""Largest number of folders that are searched below a source folder of a stack."""
+MAX_PYTHON_FILES = 1000
+"""Largest number of Python files of a source folder in the digest."""
 SIMSCEN_PROGRAM = "simscen"
-"""Program that is started from the running installation if the PATH does not have it (environment not activated)."""
+"""Program that is started from the running installation if it is not in the PATH."""
 
 
 def parse_command(
     text: str,
     environment: Mapping[str, str],
     folder: Path,
-    own: Mapping[str, str] | None = None,
-    limits: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
+    own_variables: Mapping[str, str] | None = None,
+    timeouts_s: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
 ) -> ExternalCommand:
-    """Return the command in `text`, which is written as in a shell and starts in `folder`.
+    """Return the command in `text`, which has the syntax of a shell. It will be started in `folder`.
 
-    The variables `own` are added to `environment`. `limits` are the times in s for the start of the program and for
-    each answer. Raises ValueError if the command cannot be parsed or its program cannot be run.
+    `own_variables` are added to the environment variables `environment`. `timeouts_s` are the timeouts for the start of
+    the program and for each of its answers. Raises ValueError if the command cannot be parsed or its program cannot be
+    run.
     """
     program, *arguments = split_command(text)
     program = str(Path(program).expanduser()) if program.startswith("~") else program
-    env = {**environment, **(own or {})}
-    if program == SIMSCEN_PROGRAM and why_not_executable(program, env, folder):
+    env = {**environment, **(own_variables or {})}
+    if program == SIMSCEN_PROGRAM and _why_not_executable(program, env, folder):
         program = str(Path(sys.executable).parent / SIMSCEN_PROGRAM)
-    if reason := why_not_executable(program, env, folder):
+    if reason := _why_not_executable(program, env, folder):
         raise ValueError(reason)
     argv = (program, *arguments)
-    digest = _digest(argv, own or {}, env, folder)
-    return ExternalCommand(argv, env, str(folder), *limits, digest=digest)
+    digest = _digest(argv, own_variables or {}, env, folder)
+    return ExternalCommand(argv, env, str(folder), *timeouts_s, digest=digest)
 
 
-def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> str:
-    """Return why a program cannot be run from `folder` with the variables `env`; "" if it can."""
+def _why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> str:
+    """Return the reason why a program cannot be run in `folder` with the variables `env`; "" if it can."""
     if "/" not in program:
-        found = shutil.which(program, path=_path(env, folder))
+        found = shutil.which(program, path=_absolute_search_path(env, folder))
         return "" if found else f"no program {quoted(program)} in the PATH"
     file = folder / program
     try:
@@ -67,10 +70,7 @@ def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> st
 
 
 def _why_no_interpreter(program: str, file: Path) -> str:
-    """Return why the interpreter of the script `file` cannot be run; "" if it can, or if `file` is not a script.
-
-    Without this check, the kernel would report that the script itself is missing.
-    """
+    """Return the reason why the interpreter of the script `file` cannot be run; "" if it can, or for other files."""
     try:
         with file.open("rb") as stream:
             first = stream.read(256).partition(b"\n")[0]
@@ -87,19 +87,19 @@ def _why_no_interpreter(program: str, file: Path) -> str:
     return "" if exists(Path(words[0])) else f"{quoted(program)} starts with {written}, which does not exist"
 
 
-def _path(env: Mapping[str, str], folder: Path) -> str:
-    """Return the PATH in `env` with absolute folders; relative ones are resolved from `folder`."""
+def _absolute_search_path(env: Mapping[str, str], folder: Path) -> str:
+    """Return the variable PATH of `env` with absolute folders. Relative folders are relative to `folder`."""
     return os.pathsep.join(str(folder / part) for part in env.get("PATH", os.defpath).split(os.pathsep))
 
 
-def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
-    """Return the SHA-256 of the stack, by which changed stacks are recognized.
+def _digest(argv: Sequence[str], own_variables: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
+    """Return the SHA-256 digest of a stack.
 
-    It covers the arguments, the variables `own`, the content of the program and of files that arguments name, and the
-    Python files in the folders of scripts and modules that arguments name.
+    It covers the arguments, `own_variables`, the program, all files in the arguments, and the Python files next to
+    Python scripts and modules in the arguments.
     """
-    sha = hashlib.sha256(json.dumps([list(argv), sorted(own.items())]).encode())
-    found = shutil.which(argv[0], path=_path(env, folder)) if "/" not in argv[0] else None
+    sha = hashlib.sha256(json.dumps([list(argv), sorted(own_variables.items())]).encode())
+    found = shutil.which(argv[0], path=_absolute_search_path(env, folder)) if "/" not in argv[0] else None
     for word in (found or argv[0], *argv[1:]):
         file = folder / word
         if len(word) < 4096 and "\0" not in word and file.is_file() and os.access(file, os.R_OK):
@@ -107,29 +107,29 @@ def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str],
                 while data := stream.read(CHUNK_BYTES):
                     sha.update(data)
         sha.update(b"\0")
-    for working_folder in _source_folders(argv, folder):
-        for file in itertools.islice(_python_files(working_folder), MAX_SOURCES):
-            sha.update(f"{file.relative_to(working_folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
+    for source_folder in _source_folders(argv, folder):
+        for file in itertools.islice(_python_files(source_folder), MAX_PYTHON_FILES):
+            sha.update(f"{file.relative_to(source_folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return sha.hexdigest()
 
 
 def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
-    """Return the folders of the Python scripts and modules that arguments name, from which they import their code."""
-    homes: set[Path] = set()
+    """Return the folders of the Python scripts and modules (`-m`) in the arguments, relative to `folder`."""
+    source_folders: set[Path] = set()
     for before, word in itertools.pairwise(("", *argv)):
         if len(word) >= 4096 or "\0" in word:
             continue
         module = folder / word.replace(".", "/")
         if before == "-m" and (module.is_dir() or module.with_suffix(".py").is_file()):
-            homes.add(module if module.is_dir() else module.parent)
+            source_folders.add(module if module.is_dir() else module.parent)
         elif word.endswith(".py") and (folder / word).is_file():
-            homes.add((folder / word).parent)
-    return sorted(homes)
+            source_folders.add((folder / word).parent)
+    return sorted(source_folders)
 
 
-def _python_files(working_folder: Path) -> Iterator[Path]:
-    """Yield the readable Python files in and below a folder, except those in hidden and excluded folders."""
-    for folder, below, names in itertools.islice(os.walk(working_folder), MAX_FOLDERS):
+def _python_files(source_folder: Path) -> Iterator[Path]:
+    """Yield the readable Python files in a folder and its subfolders, except hidden and excluded folders."""
+    for folder, below, names in itertools.islice(os.walk(source_folder), MAX_FOLDERS):
         below[:] = sorted(name for name in below if not name.startswith(".") and name not in EXCLUDED_FOLDERS)
         for file in (Path(folder) / name for name in sorted(names) if name.endswith(".py")):
             if file.is_file() and os.access(file, os.R_OK):

@@ -1,4 +1,4 @@
-"""Replace `stack: {nav2_params: FILE}` in a scenario or stack file with the parameters of that Nav2 parameter file."""
+"""Expansion of `stack: {nav2_params: FILE}` to the parameters in the Nav2 parameter file."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,14 +25,14 @@ from simscen.loading.yaml.tree import (
 )
 
 NAV2_PARAMS, STACK, ROBOTS = "nav2_params", "stack", "robots"
-"""Keys of a scenario and of its section `stack`."""
+"""Keys of a scenario, and of its section `stack`."""
 
 
 @dataclass
 class ExpandedTree:
-    """Scenario or stack file with the parameters of its Nav2 files instead of their paths.
+    """YAML tree of a scenario or stack file with the parameters of its Nav2 files.
 
-    `problems` are errors in these files. `notes` are warnings about parameters that are ignored or changed.
+    `problems` are errors in the Nav2 files. `notes` are warnings about ignored and changed parameters.
     """
 
     tree: MappingNode
@@ -41,9 +41,9 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """Return a scenario or stack file in which each `stack` section has the parameters of its Nav2 file.
+    """Return a scenario or stack file with the parameters of its Nav2 files in all sections `stack`.
 
-    This includes the sections under `robots`. `library` finds the Nav2 files and records their texts.
+    The texts of the Nav2 files are added to `library`.
     """
     result = ExpandedTree(tree)
     robots = child(tree, ROBOTS)
@@ -60,7 +60,7 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
 
 
 def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> Any:
-    """Return a scenario, or the entry of a robot, with an expanded `stack`; adds problems and notes to `result`."""
+    """Return a scenario, or a mapping under `robots`, with an expanded `stack`. Add problems and notes to `result`."""
     stack = child(tree, STACK)
     if not isinstance(tree, MappingNode) or not isinstance(stack, MappingNode) or NAV2_PARAMS not in stack.entries:
         return tree
@@ -69,9 +69,9 @@ def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> 
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
-    """Return a `stack` section merged with the parameters of its Nav2 file and with `profile: nav2`.
+    """Return a section `stack` with the parameters of its Nav2 file and with `profile: nav2`, Nav2's defaults.
 
-    Values in the section have priority. The profile sets the defaults of Nav2. Adds problems and notes to `result`.
+    Values in the section have priority. Add problems and notes to `result`.
     """
     written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
@@ -88,17 +88,17 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     library.add({display_name: parameters.text}, {display_name: file})
     profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
-    translations = [_with_possible_frequency(one, clock) for one in translate(parameters.nodes, _known_parameters())]
-    below = profile
+    translations = [_with_valid_frequency(one, clock) for one in translate(parameters.nodes, _known_parameters())]
+    merged = profile
     for translation in translations:
         if translation.keys:
-            below = merge_mappings(below, _translated_tree(translation, parameters))
+            merged = merge_mappings(merged, _translated_tree(translation, parameters))
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
-    return merge_mappings(stack, below)
+    return merge_mappings(stack, merged)
 
 
 def _clock(scenario: MappingNode) -> Clock:
-    """Return a clock with the tick rate of a scenario; the default rate if the scenario is invalid."""
+    """Return a clock with the tick rate of a scenario, or with the default rate if its `physics` is invalid."""
     from simscen.model.scenario import Physics
 
     physics = child(scenario, "physics")
@@ -108,8 +108,8 @@ def _clock(scenario: MappingNode) -> Clock:
         return Clock()  # validation reports the error
 
 
-def _with_possible_frequency(one: Translation, clock: Clock) -> Translation:
-    """Return the translation, with the nearest possible controller frequency: its period must be whole ticks."""
+def _with_valid_frequency(one: Translation, clock: Clock) -> Translation:
+    """Return the translation. A controller frequency becomes the nearest one with a period of whole ticks."""
     if one.keys != ("controller_frequency",) or not isinstance(one.value, int | float) or one.value <= 0:
         return one
     try:
@@ -121,26 +121,26 @@ def _with_possible_frequency(one: Translation, clock: Clock) -> Translation:
 
 
 def _translated_tree(one: Translation, parameters: Nav2Parameters) -> MappingNode:
-    """Return the tree of a `stack` section with this parameter alone; all its nodes have the parameter's position."""
+    """Return the YAML tree of a section `stack` with one parameter. All nodes have the position of the parameter."""
     position = parameters.positions[one.node, one.parameter]
-    node: Node = _node(one.value, position)
+    node: Node = _parameter_node(one.value, position)
     for key in reversed(one.keys):
         node = MappingNode(position, {key: Entry(position, node)})
     assert isinstance(node, MappingNode)
     return node
 
 
-def _node(value: Any, position: Position) -> Node:
-    """Return a parameter as a tree; all its nodes have the same position."""
+def _parameter_node(value: Any, position: Position) -> Node:
+    """Return the YAML node of a value. All nodes have the same position."""
     if isinstance(value, list):
-        return SequenceNode(position, tuple(_node(item, position) for item in value))
+        return SequenceNode(position, tuple(_parameter_node(item, position) for item in value))
     return ScalarNode(position, value)
 
 
 def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
-    """Yield warnings about parameters that are ignored or changed.
+    """Yield warnings about ignored and changed parameters, and about unknown nodes.
 
-    A parameter with a note of its own has its own warning. The other ones share a warning per node.
+    Each parameter with a note has its own warning. Other ignored parameters share one warning for each node.
     """
     for translation in translations:
         if translation.note:
@@ -173,7 +173,7 @@ def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> I
 
 
 def _known_parameters() -> KnownParameters:
-    """Return the parameters of the reference stack."""
+    """Return the names of the parameters of the reference stack."""
     from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {
@@ -190,11 +190,11 @@ def _known_parameters() -> KnownParameters:
         "denoise_layer": costmaps.DenoiseLayer,
         "recovery": recovery.Recovery,
     }
-    return {name: tuple(_names(model)) for name, model in models.items()}
+    return {name: tuple(_field_names(model)) for name, model in models.items()}
 
 
-def _names(model: type[BaseModel]) -> Iterator[str]:
-    """Yield the names of the fields of a model; of nested models also `field.part`."""
+def _field_names(model: type[BaseModel]) -> Iterator[str]:
+    """Yield the names of the fields of a model, and `field.part` for the fields of nested models."""
     for name, model_field in model.model_fields.items():
         yield name
         if isinstance(model_field.annotation, type) and issubclass(model_field.annotation, BaseModel):

@@ -1,7 +1,7 @@
-"""Translate the parameters of Nav2's nodes to parameters of the reference stack.
+"""Translation of the parameters of Nav2's nodes to parameters of simscen's reference stack.
 
-There is one function for each kind of node. In all of them, `node` is the name of the node, `parameters` are its
-parameters, and `known` are the parameters of simscen. `section` is a key below `stack:`, such as "controller".
+There is one function for each kind of node. `node` is the name of the node, `parameters` are its parameters in the Nav2
+file, and `known` are the names of simscen's parameters. `section` is a key under `stack`, such as "controller".
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,7 +54,7 @@ def _translate_planner_server(node: str, parameters: Parameters, known: KnownPar
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
-    """Return the name of the first plugin of a kind such as "planner"; `default` if none is listed.
+    """Return the name of the first plugin of a kind such as "planner"; `default` if the file lists none.
 
     Before Iron, the progress checker is a single name instead of a list.
     """
@@ -63,7 +63,7 @@ def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
 
 
 def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
-    """Yield a note for each further plugin of a kind, of which only the plugin `chosen` is used."""
+    """Yield a note for each plugin of a kind after the first, `chosen`, which alone is used."""
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
         yield Translation(node, listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
@@ -72,9 +72,9 @@ def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: s
 def _translate_plugin(
     node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: KnownParameters
 ) -> Iterator[Translation]:
-    """Translate the type and the parameters of the plugin `name`; `types` has the type in simscen of each class.
+    """Translate the type and the parameters of the plugin `name`. `types` are the types in simscen by class.
 
-    Of a rotation shim controller, only its primary controller is translated.
+    For a rotation shim controller, only the primary controller is translated.
     """
     inner = f"{name}.primary_controller"
     shimmed = f"{inner}.plugin" in parameters
@@ -108,16 +108,15 @@ def _translate_plugin(
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:
-    """Return the motion model of MPPI, such as "DiffDrive"; in newer files, it is the class of a plugin."""
+    """Return the motion model of MPPI, such as "DiffDrive". `prefix` is the name of the controller."""
     written = parameters.get(f"{prefix}.motion_model", "DiffDrive")
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
 
 def _translate_critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """Translate a list of critics of a controller of the type `kind`.
+    """Translate the list of critics `written` of an "mppi" or "dwb" controller, and note unknown critics.
 
-    MPPI gets the list, and DWB the weight 0 for each critic that is not listed. Critics that simscen does not have are
-    noted.
+    MPPI gets the list. DWB gets the weight 0 for each critic that is not in the list.
     """
     listed = strings(written)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
@@ -140,13 +139,13 @@ DEFAULT_LAYERS = {
     "obstacle_layer": "ObstacleLayer",
     "inflation_layer": "InflationLayer",
 }
-"""Name → class of the layers of a costmap without `plugins`."""
+"""Classes of the layers of a costmap without `plugins`, by name of the layer."""
 OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
 """Classes of layers that mark and clear obstacles by sensor data."""
 
 
 def _translate_costmap(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
-    """Translate the parameters of the global or the local costmap."""
+    """Translate the parameters of the global or local costmap."""
     section = "local_costmap" if node == "local_costmap" else "costmap"
     layers = _layer_classes(parameters)
     handled = {*layers, *strings(parameters.get("filters"))}
@@ -167,7 +166,7 @@ def _translate_costmap(node: str, parameters: Parameters, known: KnownParameters
 
 
 def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
-    """Return the class of each layer of a costmap by name."""
+    """Return the classes of the layers of a costmap, by name of the layer."""
     if not isinstance(parameters.get("plugins"), list):
         return DEFAULT_LAYERS
     return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
@@ -187,7 +186,7 @@ def _translate_costmap_parameter(
 def _translate_layer_parameter(
     node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: KnownParameters
 ) -> Iterator[Translation]:
-    """Translate a parameter `layer.…` of an inflation or denoise layer; `layers` has the class of each layer."""
+    """Translate a parameter of an inflation or denoise layer. `layers` are the classes of all layers by name."""
     kind, last = layers[name.partition(".")[0]], name.rpartition(".")[2]
     if kind == "InflationLayer":
         yield from translate_same_name(node, name, value, (section,), known[section], last)
@@ -197,17 +196,17 @@ def _translate_layer_parameter(
 
 LASER_SCAN = "LaserScan"
 """Data type of laser scans, and of an observation source without `data_type`."""
-HEIGHTS = ("min_obstacle_height", "max_obstacle_height")
-"""Parameters of observation sources that simscen applies only to camera data; the others are ranges of the lidar."""
+HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
+"""Parameters of observation sources that simscen applies only to camera data. Other parameters are lidar ranges."""
 
 
 def _translate_observation_sources(
     node: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Sequence[str]
 ) -> Iterator[Translation]:
-    """Translate the parameters of all observation sources to those of simscen, which apply to all sensors.
+    """Translate the parameters of all observation sources. In simscen, they apply to all sensors together.
 
-    The ranges are those of the first source of laser scans. The heights are those of the first source of point clouds;
-    if there is none, of the first source of laser scans.
+    Ranges come from the first laser scan source. Heights come from the first point cloud source, or else from the first
+    laser scan source.
     """
     types = {
         source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
@@ -220,7 +219,7 @@ def _translate_observation_sources(
             name = f"{source}.{key}"
             if key not in known:
                 continue
-            if not is_scan and key not in HEIGHTS:
+            if not is_scan and key not in HEIGHT_PARAMETERS:
                 yield Translation(node, name, (), value, ignored, covers=f"{source}.")
                 ignored = ""  # one note for all ranges of a source
             elif first.setdefault(key, source) == source:
@@ -232,7 +231,7 @@ def _translate_observation_sources(
 
 
 def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> Iterator[str]:
-    """Yield the names of the observation sources of all layers, as `layer.source`."""
+    """Yield the names `layer.source` of the observation sources of all layers."""
     for layer, kind in layers.items():
         if kind in OBSERVATION_LAYERS:
             found = [name.partition(".")[0] for name, _ in parameters_below(parameters, layer) if "." in name]
@@ -243,7 +242,7 @@ def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> I
 def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
     """Translate the limits of velocity and acceleration.
 
-    In simscen, lateral and backward motion have the limits of forward motion. Other limits are noted.
+    In simscen, lateral and backward motion have the limits of forward motion. Different limits get a note.
     """
     for name, turning in (
         ("max_velocity", "max_angular_velocity"),
@@ -277,7 +276,7 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
-    """Translate the first enabled polygon with the action `approach`. Other actions are not supported and noted."""
+    """Translate the first enabled polygon with the action `approach`. Other polygons get a note."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
@@ -305,7 +304,7 @@ def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
-    """Translate the parameters of the polygon that is used."""
+    """Translate the parameters of a polygon with the action `approach`."""
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
         ("simulation_time_step", "simulation_time_step", 0),
@@ -319,16 +318,16 @@ def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iter
 
 
 def _xy_and_rotation(value: Any) -> list[float]:
-    """Return the values for x, y, and rotation; an empty list if `value` is not a list of three numbers."""
+    """Return a list of values for x, y, and rotation; [] if `value` is not a list of three numbers."""
     fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
     return value if fits else []
 
 
 def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterator[Translation]:
-    """Yield the translations of the parameters of all nodes.
+    """Yield the translations of the parameters of all nodes. `nodes` are the parameters by name of the node.
 
-    Parameters that need no translation are left out, and so are nodes that simscen does not have. A translation with
-    neither keys nor a note is for a parameter that simscen does not have.
+    Irrelevant parameters and unknown nodes are left out. A translation without keys and note stands for a parameter
+    that simscen does not have.
     """
     for node, parameters in nodes.items():
         translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
@@ -344,7 +343,7 @@ def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterat
 
 
 def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
-    """Return the names of the nodes that have relevant parameters, but no counterpart in simscen."""
+    """Return the names of the nodes with relevant parameters that simscen does not have."""
     return [
         node
         for node, parameters in nodes.items()
@@ -363,7 +362,7 @@ def _is_relevant(parameter: str, value: object) -> bool:
 
 
 def _translate_amcl(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
-    """Translate the parameters of the localizer."""
+    """Translate the parameters of AMCL."""
     for name, value in parameters.items():
         if name == "robot_model_type":
             model = MOTION_MODELS.get(class_of(value))
@@ -391,4 +390,4 @@ TRANSLATORS = {
     "velocity_smoother": _translate_velocity_smoother,
     "collision_monitor": _translate_collision_monitor,
 }
-"""Function that translates the parameters of a node, by name of the node."""
+"""Functions that translate the parameters of a node, by name of the node."""

@@ -1,4 +1,4 @@
-"""Read Nav2 parameter files, and check their parameters against what simscen publishes."""
+"""Nav2 parameter files: reading, and check of topics and frames against those that simscen publishes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -8,17 +8,13 @@ from typing import Any
 from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import (
-    MappingNode,
-    Node,
-    Position,
-)
+from simscen.loading.yaml.tree import MappingNode, Node, Position
 from simscen.ros2.nav2.parameter_rules import PublishedNames, check
 
-PARAMETERS = "ros__parameters"
-"""Key under which ROS 2 expects the parameters of a node."""
-EVERY_NODE = "**"
-"""Name in a parameter file that stands for all nodes."""
+PARAMETERS_KEY = "ros__parameters"
+"""Key with the parameters of a node in a ROS 2 parameter file."""
+ALL_NODES = "**"
+"""Name that stands for all nodes, without the `/` before it."""
 
 
 @dataclass(frozen=True)
@@ -26,18 +22,18 @@ class Nav2Parameters:
     """Content of a Nav2 parameter file."""
 
     display_name: str
-    """Name of the file in problems."""
+    """Path of the file in messages."""
     nodes: Mapping[str, Mapping[str, Any]]
-    """Parameters by name of the node and dotted name of the parameter. Those of `/**` are repeated for each node."""
+    """Parameters by name of the node and dotted name of the parameter. Each node includes the parameters of `/**`."""
     positions: Mapping[tuple[str, str], Position]
-    """Position of each value, by name of the node and dotted name of the parameter."""
+    """Positions of the values, by name of the node and dotted name of the parameter."""
     text: str
     """Text of the file."""
     notes: tuple[Problem, ...] = ()
     """Warnings about duplicate keys and nodes."""
 
     def problems(self, published: PublishedNames) -> list[Problem]:
-        """Return the parameters that do not match the `published` topics and frames, in the order of the file."""
+        """Return a problem for each parameter that does not match the `published` topics and frames."""
         found = [
             Problem(
                 *self.positions[problem.node, problem.parameter],
@@ -52,7 +48,7 @@ class Nav2Parameters:
 
 
 def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters | list[Problem]:
-    """Return the parameters in a file, or its problems. `display_name` is its name in problems; "" for its path."""
+    """Return the parameters in a file, or its problems. `display_name` is its path in messages; "" for `path`."""
     display_name = display_name or str(path)
     text = read_text(path, display_name)
     if isinstance(text, Problem):
@@ -61,7 +57,7 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
     notes = tuple(problem for problem in problems if problem.severity == "warning")
     if len(notes) < len(problems) or tree is None:
         return [problem for problem in problems if problem not in notes]
-    sections = list(_nodes(tree, ""))
+    sections = list(_ros_nodes(tree, ""))
     found = dict(sections)
     notes += tuple(
         ignored_note(section.position, f"only the last of the nodes called {name} is used")
@@ -69,11 +65,11 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
         if section is not found[name]
     )
     if not found:
-        return [Problem(display_name, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS}")]
+        return [Problem(display_name, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS_KEY}")]
     nodes: dict[str, dict[str, Any]] = {}
     positions: dict[tuple[str, str], Position] = {}
-    for_all_nodes = found.pop(EVERY_NODE, None)
-    for name, parameters in found.items() if found else ((EVERY_NODE, MappingNode(Position(display_name, 0, 0), {})),):
+    for_all_nodes = found.pop(ALL_NODES, None)
+    for name, parameters in found.items() if found else ((ALL_NODES, MappingNode(Position(display_name, 0, 0), {})),):
         nodes[name] = {}
         for source in (for_all_nodes, parameters):
             for key, value in _dotted_parameters(source, "") if source else ():
@@ -83,24 +79,27 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
 
 
 def is_nav2_parameter_file(text: str, display_name: str) -> bool:
-    """Return whether the text of a file consists of ROS 2 parameters of nodes, and is not in simscen's language."""
-    if PARAMETERS not in text:
+    """Return whether the text of a file contains ROS 2 parameters of nodes, and no key `simscen`."""
+    if PARAMETERS_KEY not in text:
         return False
     tree, _ = parse_yaml(text, display_name, allow_duplicates=True)
-    return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_nodes(tree, ""))
+    return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_ros_nodes(tree, ""))
 
 
-def _nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
-    """Yield the name (without namespace) and the parameters of each node; `name` is the key above `node`."""
+def _ros_nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
+    """Yield the name (without namespace) and the parameters of each ROS node in a YAML tree.
+
+    `name` is the key of the tree `node`.
+    """
     for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
-        if key == PARAMETERS and isinstance(entry.value, MappingNode):
+        if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
             yield name, entry.value
         else:
-            yield from _nodes(entry.value, key.rpartition("/")[2])
+            yield from _ros_nodes(entry.value, key.rpartition("/")[2])
 
 
 def _dotted_parameters(mapping: MappingNode, prefix: str) -> Iterator[tuple[str, Node]]:
-    """Yield the dotted name and the value of each parameter in nested mappings."""
+    """Yield the dotted name and the value of each parameter in nested mappings. `prefix` is put before the names."""
     for key, entry in mapping.entries.items():
         if isinstance(entry.value, MappingNode):
             yield from _dotted_parameters(entry.value, f"{prefix}{key}.")

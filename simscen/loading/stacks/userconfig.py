@@ -1,4 +1,4 @@
-"""Read the user configuration, which defines the commands of external stacks, and report stacks without a command."""
+"""User configuration with the commands of external stacks, and problems of stacks without a command."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -21,7 +21,7 @@ from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 @dataclass(frozen=True)
 class UserConfig:
-    """User configuration and its `file`. `tree` and `library`, which locate errors in it, are None if it is missing."""
+    """User configuration in `file`. `tree` (YAML tree) and `library` (reader) are None if the file does not exist."""
 
     file: Path
     spec: UserConfigSpec
@@ -31,8 +31,8 @@ class UserConfig:
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
         """Return the command of the external stack `name`; None if the configuration does not define it.
 
-        `environment` are the variables of the caller, and `folder` is the caller's working folder. Raises InvalidInput
-        if the command cannot be run.
+        `environment` and `folder` are the environment variables and the working folder of this process. Raises
+        InvalidInput if the command cannot be run.
         """
         if name not in self.spec.stacks:
             return None
@@ -49,7 +49,7 @@ class UserConfig:
             raise self._invalid((name, "command"), str(error), hint) from error
 
     def _invalid(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
-        """Return the error for a value of a stack, given by its keys below `stacks`."""
+        """Return the error for the value at `keys` under `stacks`."""
         assert self.tree is not None and self.library is not None, "only stacks from a file can be invalid"
         position = value_position(self.tree, ("stacks", *keys))
         problem = Problem(*position, code="SC061", message=message, hint=hint)
@@ -57,7 +57,7 @@ class UserConfig:
 
 
 def load_config(file: Path) -> UserConfig:
-    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput if it is invalid."""
+    """Return the configuration in `file`; an empty configuration if it does not exist. Raises InvalidInput."""
     if not exists(file):
         return UserConfig(file, UserConfigSpec())
     # No file is inside of this root, so problems show the absolute path of the file.
@@ -74,7 +74,7 @@ def undefined_stack(
 ) -> Problem | None:
     """Return a problem if the scenario has an external stack without a command; else None.
 
-    Its hint suggests one of the `defined_names` of stacks that have a command, or an entry in `config_file`.
+    `defined_names` are the names of the external stacks with a command. `config_file` is the user configuration.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
@@ -88,9 +88,9 @@ def undefined_stack(
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if several `--stack` give commands to robots of the same scenario; else an empty list.
+    """Return a problem if robots of a scenario need the commands of several `--stack` options; else [].
 
-    A run can use only one `--stack`. `given` are the names of the external stacks to which `--stack` gives commands.
+    `given` are the names of the external stacks with a command in `--stack`. `config_file` is the user configuration.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]
