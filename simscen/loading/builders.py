@@ -1,4 +1,4 @@
-"""Build the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
+"""Building of the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
 
 from __future__ import annotations
 
@@ -127,9 +127,9 @@ def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Seque
 
 
 KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
-"""Keys in a scenario of the path of the stack's keepout mask."""
+"""Keys that lead to the keepout mask of the stack in a scenario."""
 SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
-"""Keys in a scenario of the path of the stack's speed mask."""
+"""Keys that lead to the speed mask of the stack in a scenario."""
 MAX_RECTANGLES = 100_000
 """Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all rectangles."""
 AddSourceLine = Callable[[Problem], Problem]
@@ -148,7 +148,7 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
 def load_criterion_masks(
     masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSourceLine
 ) -> dict[str, MaskBlocks]:
-    """Load the filter masks of criteria, by their paths as written in the scenario.
+    """Load the filter masks of criteria, by file path as written in the scenario.
 
     `tree` is the YAML tree of the scenario. Raises InvalidInput at the line of an unusable mask.
     """

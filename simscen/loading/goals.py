@@ -33,7 +33,7 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the names of expected failures by goal name; goals without an expected failure are left out.
+    """Return the expected failures, such as "NO_VALID_PATH", by goal name. Goals without one are left out.
 
     `goals` are those of `scenario_goals`. With navigate_through_poses, the expectation of the last goal applies to all.
     """
@@ -47,12 +47,12 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 
 def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
-    """Return the via pose of a goal, which the robot passes within `radius` m, or its own tolerance, at any heading."""
+    """Return `goal` as a pose to pass at any heading, within `radius` m unless `entry` sets a tolerance."""
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
 def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
-    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
+    """Return the goals that events send, by the keys that lead to their `new_goal` actions in the scenario.
 
     `includes_robot` selects the actions by the name of their robot, which is None if an action names none.
     """

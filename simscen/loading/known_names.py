@@ -20,7 +20,7 @@ KIND_DESCRIPTIONS = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Text for messages by kind of reference. Actions can move a "movable"; a "mover" is a movable or another robot."""
+"""Descriptions of kinds of references. Actions can move a "movable". A "mover" is a movable or another robot."""
 
 Names = Mapping[str, list[str] | None]
 """Valid names by kind of reference; None for a kind whose names are not known.
@@ -67,7 +67,7 @@ def mark_names(loaded: LoadedScenario) -> list[str]:
 
 
 def _names_in_files(loaded: LoadedScenario) -> Names:
-    """Return the names of things in the world file."""
+    """Return the names of places, regions, doors, and objects, without a built world."""
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -83,7 +83,7 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
-    """Return the names of things in the built world."""
+    """Return the names of places, regions, doors, and objects, with a built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),

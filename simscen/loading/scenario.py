@@ -1,4 +1,4 @@
-"""Loading of a scenario, its variations, and all files that it refers to."""
+"""Loading of a scenario, its variations (sets of values), and all files that it refers to."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Base classes of specifications: pydantic models of the YAML that users write."""
+"""Base classes of specifications. A specification is a pydantic model of a part of a YAML file."""
 
 import ast
 import inspect
@@ -89,7 +89,7 @@ class Ranged(Spec):
 
 
 def by_default() -> Any:
-    """Return a pydantic field whose default is the specification that an empty mapping validates to."""
+    """Return a pydantic field with the default `{}`, which validation turns into the specification of the field."""
     # Creating the specification at import would cost every command 10 ms.
     return Field(default_factory=dict, validate_default=True)
 

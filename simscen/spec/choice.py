@@ -42,7 +42,7 @@ class Choice(Spec):
     def addresses(cls) -> dict[str, str]:
         """Return the addresses "module:Class" of the specifications of the choices, by their keys in YAML.
 
-        Lists and nested choices are left out.
+        Choices with a list or another Choice as value are left out.
         """
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
@@ -86,12 +86,12 @@ class Choice(Spec):
 
     @property
     def kind(self) -> str:
-        """The key in YAML of the choice in the mapping."""
+        """Key in YAML of the choice in the mapping, e.g. "spawn"."""
         return self._given_keys()[0]
 
     @property
     def chosen(self) -> BaseModel:
-        """The specification under this key."""
+        """Specification under the key `kind`."""
         spec = getattr(self, self.choices()[self.kind])
         assert isinstance(spec, BaseModel)
         return spec

@@ -1,4 +1,4 @@
-"""Fields that accept the types of a registry group: shipped types, and types that installed packages add."""
+"""Fields that accept all types of a registry group, such as planners, including types of installed packages."""
 
 import math
 from dataclasses import dataclass
@@ -106,7 +106,7 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """Return the specification of a value under a plugin type. Any error of the package becomes a validation error."""
+    """Return the specification of a value, validated by a plugin. Any error of its package becomes a validation error."""
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:

@@ -1,7 +1,7 @@
 """Registry of the types of components that YAML files can use by name, such as planners and criteria.
 
-simscen ships types. An installed package adds a type, called a plugin, by an entry point. Its value is the address of a
-specification class:
+simscen ships types. An installed package adds a type, called a plugin, by an entry point. The value of the entry point
+is the address of a specification class (a pydantic model of the YAML):
 
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"

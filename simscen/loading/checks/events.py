@@ -1,6 +1,6 @@
 """Checks for events and faults with triggers that never fire, or fire less often than specified.
 
-A step is an event, or a step of its sequence.
+A step is an event, or a later step of the sequence of an event.
 """
 
 from collections.abc import Iterator, Sequence

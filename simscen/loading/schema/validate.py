@@ -189,7 +189,7 @@ def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
 
 
 def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
-    """Return whether an empty value, which is reported separately, causes an error of pydantic."""
+    """Return whether an empty value causes an error of pydantic. Empty values are reported separately."""
     node = node_at(tree, error["loc"])
     if isinstance(node, ScalarNode):
         return node.value is None
@@ -215,7 +215,7 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
 
 
 def _spelling_hint(missing: Problem) -> str:
-    """Return the hint of the unknown key that is a misspelling of this missing key."""
+    """Return the hint for a misspelling of this missing key."""
     return f"did you mean {missing.message.split()[2]}?"
 
 

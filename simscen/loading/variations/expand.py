@@ -136,7 +136,7 @@ class VariationSpace:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
 
     def named_variations(self) -> list[Variation]:
-        """Return the variations with these numbers, named by the values that differ. Raises ConditionError."""
+        """Return the variations of `numbers()`, named by the values that differ. Raises ConditionError."""
         numbers = list(self.numbers())
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [

@@ -102,7 +102,7 @@ def _indented(text: str, columns: int) -> str:
 
 
 def _dumped(data: Any) -> str:
-    """Return the YAML text of a list or mapping. Only the innermost collections are in braces or brackets."""
+    """Return the YAML text of a list, or of a top-level mapping, which is never in braces."""
     if isinstance(data, dict):
         return "".join(_entry(key, value) for key, value in data.items())
     return _dump_innermost_flow(data)
@@ -116,7 +116,7 @@ def _entry(key: str, value: Any) -> str:
 
 
 def _dump_innermost_flow(data: Any) -> str:
-    """Return YAML text with only the innermost collections in braces or brackets."""
+    """Return YAML text in which only the innermost collections are in braces or brackets."""
     text: str = yaml.dump(
         data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=LINE_WIDTH_CHARS, default_flow_style=None
     )
