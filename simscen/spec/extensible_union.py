@@ -106,7 +106,7 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """Return the specification of a value, validated by a plugin. Any error of its package becomes a validation error."""
+    """Return the specification of a value, validated by a plugin. Any error of the plugin is a validation error."""
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
