@@ -10,6 +10,7 @@ from simscen.core.external_command import ExternalCommand
 from simscen.core.records.run_result import RunKey, scenario_title
 from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.yaml.textfile import with_source_line
 from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
@@ -195,5 +196,4 @@ class LoadedScenario:
 
     def with_source_line(self, problem: Problem) -> Problem:
         """Return a copy of a problem with the text of its line in any file of the scenario."""
-        lines = self.sources.get(problem.path, "").split("\n")
-        return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
+        return with_source_line(problem, self.sources)

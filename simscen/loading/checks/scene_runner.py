@@ -12,6 +12,7 @@ from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import TIMING, WORLD, Scene
+from simscen.loading.files.paths import path_in_messages
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.robot_size import blocking_world, robot_size
@@ -97,7 +98,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
 def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
     """Return the notes of a built world as warnings about its file `source`."""
-    display_name = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
+    display_name = path_in_messages(source.path, root)
     return [
         Problem(display_name, 0, 0, "SC311", note.removeprefix(f"{display_name}: "), severity="warning")
         for note in world.notes

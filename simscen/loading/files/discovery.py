@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
-from simscen.loading.files.paths import exists, is_folder
+from simscen.loading.files.paths import exists, is_folder, path_in_messages
 from simscen.loading.scenario import scenario_id
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
@@ -124,11 +124,7 @@ def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]
         for depth, part in enumerate(above[1:], start=1):
             if part.startswith("seed-") and (other := "/".join(above[:depth])) in ids:
                 message = f"its output folder would be the folder of a run of {quoted(other)}"
-                yield Problem(_display_name(file, root), 0, 0, "SC041", message, "rename one of them")
-
-
-def _display_name(file: Path, root: Path) -> str:
-    return str(file.relative_to(root)) if file.is_relative_to(root) else str(file)
+                yield Problem(path_in_messages(file, root), 0, 0, "SC041", message, "rename one of them")
 
 
 def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
@@ -137,5 +133,5 @@ def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)
         if other != file:
-            message = f"has the same id as {quoted(_display_name(other, root))}, except for case or suffix"
-            yield Problem(_display_name(file, root), 0, 0, "SC040", message, "rename one of them")
+            message = f"has the same id as {quoted(path_in_messages(other, root))}, except for case or suffix"
+            yield Problem(path_in_messages(file, root), 0, 0, "SC040", message, "rename one of them")

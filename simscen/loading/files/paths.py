@@ -70,7 +70,7 @@ class PathSandbox:
 
     def display_name(self, path: Path) -> str:
         """Return the path of a file for messages: relative to the root if it is inside, else absolute."""
-        return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
+        return path_in_messages(path, self.root)
 
     def _in_world_path(self, written: str) -> Path | None:
         """Return the first existing file or folder with this path relative to a folder of `--world-path`, or None."""
@@ -78,6 +78,11 @@ class PathSandbox:
             return None
         candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
         return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
+
+
+def path_in_messages(path: Path, root: Path) -> str:
+    """Return a path for messages: relative to `root` if it is inside, else absolute."""
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
 
 
 def exists(path: Path) -> bool:

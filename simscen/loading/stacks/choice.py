@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.external_command import ExternalCommand
-from simscen.loading.files.paths import PathSandbox
+from simscen.loading.files.paths import PathSandbox, path_in_messages
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.nav2_expansion import NAV2_PARAMS, with_nav2_parameters
 from simscen.loading.stacks.nav2_parameters import is_nav2_parameter_file
@@ -57,10 +57,7 @@ class StackChoice:
 
     def relative_to_folder(self, folder: Path) -> str:
         """Return NAME=VALUE with the path of a stack file relative to `folder`, or absolute if it is outside."""
-        if self.file is None:
-            return self.written
-        file = self.file.relative_to(folder).as_posix() if self.file.is_relative_to(folder) else str(self.file)
-        return f"{self.name}={file}"
+        return self.written if self.file is None else f"{self.name}={path_in_messages(self.file, folder)}"
 
 
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:

@@ -1,13 +1,13 @@
 """Nav2 parameter files: reading, and check of topics and frames against those that simscen publishes."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.textfile import read_text, with_source_line
 from simscen.loading.yaml.tree import MappingNode, Node, Position
 from simscen.ros2.nav2.parameter_rules import PublishedNames, check
 
@@ -43,8 +43,7 @@ class Nav2Parameters:
             )
             for problem in check(self.nodes, published)
         ]
-        lines = self.text.split("\n")
-        return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]
+        return [with_source_line(problem, {self.display_name: self.text}) for problem in sorted(found)]
 
 
 def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters | list[Problem]:

@@ -2,14 +2,14 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem, PathSandbox
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.textfile import read_text, with_source_line
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
 
 DEFAULTS_FILE = "defaults.yaml"
@@ -75,11 +75,7 @@ class Library:
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
         """Return the problems with the texts of their source lines. Existing texts are kept."""
-        return [problem if problem.source else self._with_source_line(problem) for problem in problems]
-
-    def _with_source_line(self, problem: Problem) -> Problem:
-        lines = self.texts.get(problem.path, "").split("\n")
-        return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
+        return [problem if problem.source else with_source_line(problem, self.texts) for problem in problems]
 
     def _read_with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
         """Return the tree of a file, merged with the files that it extends, and all problems.

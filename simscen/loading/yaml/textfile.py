@@ -4,6 +4,8 @@ import errno
 import os
 import re
 import stat
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import Problem
@@ -28,6 +30,12 @@ def read_text(path: Path, display_name: str) -> str | Problem:
     if isinstance(raw, str):
         return Problem(display_name, 0, 0, "SC001", raw)
     return _decode(raw, display_name)
+
+
+def with_source_line(problem: Problem, texts: Mapping[str, str]) -> Problem:
+    """Return a copy of a problem with the text of its line. `texts` are the texts of files, by path as in messages."""
+    lines = texts.get(problem.path, "").split("\n")
+    return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
 
 
 def os_error_reason(error: OSError) -> str:
