@@ -56,7 +56,7 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
     if keepout is not None:
         zones.append((KEEPOUT_MASK_KEYS, "in a cell that the keepout mask forbids", _mask_test(keepout)))
     for keys, where, forbids in zones:
-        for goal_keys, goal in scene.targets:
+        for goal_keys, goal in scene.expected_goals:
             if forbids(goal.pose, MIN_DEPTH_M):
                 message = f"goal `{goal.name}` cannot be reached: it is {where}, which the stack keeps out of"
                 hint = f"move one of them, or {expected_failure_hint(goal_keys, 'GOAL_OCCUPIED')}"
@@ -137,7 +137,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = _mask_test(mask.grid)
-        inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
+        inside = [goal.name for _, goal in scene.expected_goals if forbids(goal.pose, goal.xy_tolerance)]
         if inside:
             message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"
             yield CheckProblem(keys, message)

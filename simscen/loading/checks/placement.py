@@ -63,7 +63,7 @@ def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
     """Yield an error for each goal blocked by fixed solids, and a warning for each goal inside an unmoved body."""
-    for keys, goal in scene.targets:
+    for keys, goal in scene.expected_goals:
         code = "GOAL_OUTSIDE_MAP" if scene.area.why_outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))

@@ -49,7 +49,9 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
         inside = [
-            goal.name for _, goal in scene.targets if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
+            goal.name
+            for _, goal in scene.expected_goals
+            if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
         ]
         if inside:
             yield CheckProblem(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
@@ -60,7 +62,7 @@ def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
     """Find goals within whose tolerances the robot already is when the goal is sent."""
     if _start_is_blocked(scene):
         return
-    own = [(keys, goal) for keys, goal in scene.targets if keys[0] == "goals"]
+    own = [(keys, goal) for keys, goal in scene.expected_goals if keys[0] == "goals"]
     poses = [scene.start, *(goal.pose for _, goal in own)]
     for (before, _), (keys, goal) in zip(pairwise(poses), own, strict=True):
         turned = abs(wrap(before.yaw - goal.pose.yaw))

@@ -158,4 +158,4 @@ def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose
 def robot_routes(scene: Scene) -> RobotRoutes:
     """Return the routes between the start, all goals, and all trigger areas of a scene."""
     corners = [Pose2(x, y) for area in scene.cached(trigger_areas) for x, y in area.corners]
-    return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.targets), *corners))
+    return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.expected_goals), *corners))

@@ -41,7 +41,7 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
     routes, starts, world = scene.cached(robot_routes), scene.start_poses, scene.world.solids
     solids = (*world, *scene.immovable_bodies) if scene.immovable_bodies else world
     found = []
-    for keys, goal in scene.targets:
+    for keys, goal in scene.expected_goals:
         if keys in blocked or routes.is_reachable(starts, goal.pose, solids):
             continue
         gap = _widest_gap(scene, goal.pose, solids)

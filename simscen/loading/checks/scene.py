@@ -166,7 +166,7 @@ class Scene:
         return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
 
     @cached_property
-    def targets(self) -> list[tuple[Keys, Goal]]:
+    def expected_goals(self) -> list[tuple[Keys, Goal]]:
         """Keys of the pose, and the goal, of each goal without an expected failure, including goals of events."""
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses

@@ -82,7 +82,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
     low, high = scene.z_range
     height = (low + high) / 2
-    poses = [scene.start, *(goal.pose for _, goal in scene.targets)]
+    poses = [scene.start, *(goal.pose for _, goal in scene.expected_goals)]
     image = draw_world(
         build_world_and_map(scene.world, height), height, [place_polygon(scene.outline, pose) for pose in poses], gaps
     )

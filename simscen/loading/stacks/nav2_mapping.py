@@ -39,7 +39,7 @@ RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("dwb", "Oscillation.oscillation_reset_angle"): "oscillation_reset_angle",
     ("dwb", "Oscillation.x_only_threshold"): "x_only_threshold",
 }
-"""Names of parameters in simscen, by type in simscen and name in Nav2."""
+"""Names in simscen of parameters with another name in Nav2, by type in simscen and name in Nav2."""
 IGNORED_PARAMETERS = frozenset(
     {
         "tf_broadcast", "save_pose_rate", "random_seed", "map_subscribe_transient_local",
@@ -67,7 +67,7 @@ SCENARIO_PARAMETERS: Mapping[str, str] = {
 }
 """Messages for parameters that are ignored because the scenario or the robot file defines their values."""
 OLD_NODE_NAMES = {"recoveries_server": "behavior_server"}
-"""Present names of nodes, by name before Humble."""
+"""Present names of renamed nodes, by name before Humble."""
 IGNORED_NODES = frozenset(
     {
         "map_server", "map_saver", "lifecycle_manager", "lifecycle_manager_navigation",
@@ -80,7 +80,7 @@ IGNORED_NODES = frozenset(
 
 
 def class_of(plugin: object) -> str:
-    """Return the class of a plugin, e.g. "NavfnPlanner" for `nav2_navfn_planner::NavfnPlanner`, or with `/`."""
+    """Return the class of a plugin, e.g. "NavfnPlanner" for `package::NavfnPlanner` or `package/NavfnPlanner`."""
     return str(plugin).replace("/", "::").rpartition("::")[2]
 
 
@@ -97,7 +97,7 @@ KnownParameters = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class Translation:
-    """Result of the translation of a parameter of a Nav2 node: a value in simscen, a note for the user, or both."""
+    """Result of the translation of a parameter of a Nav2 node: a value in simscen, a note, both, or none."""
 
     node: str
     parameter: str
