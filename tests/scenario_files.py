@@ -6,8 +6,7 @@ from typing import Any
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
-from simscen.loading.schema.validate import check
-from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.scenario_text import _read, _validated
 from simscen.model.scenario import ScenarioSpec
 
 
@@ -19,8 +18,4 @@ def try_scenario(path: Path, root: Path, *args: Any) -> LoadedScenario | list[Pr
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:
     """Return the specification in the scenario text of a log; `name` is its name in problems."""
-    tree, problems = parse_yaml(text, name)
-    assert tree is not None and not problems
-    spec = check(ScenarioSpec, tree)
-    assert isinstance(spec, ScenarioSpec), spec
-    return spec
+    return _validated(ScenarioSpec, _read(text, name))
