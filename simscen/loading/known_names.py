@@ -8,7 +8,7 @@ from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
 
-KIND_DESCRIPTIONS = {
+KIND_NAMES = {
     "place": "place of the world",
     "region": "region of the world",
     "door": "door of the world",
@@ -20,7 +20,7 @@ KIND_DESCRIPTIONS = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Descriptions of kinds of references. Actions can move a "movable". A "mover" is a movable or another robot."""
+"""Names for messages of kinds of references. Actions can move a "movable"; a "mover" is a movable or another robot."""
 
 Names = Mapping[str, list[str] | None]
 """Valid names by kind of reference; None for a kind whose names are not known.

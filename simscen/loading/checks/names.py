@@ -7,13 +7,7 @@ from simscen.actions.base import Action, AnyAction
 from simscen.core.messages.navigation import LOOP_NAME
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
-from simscen.loading.known_names import (
-    KIND_DESCRIPTIONS,
-    event_names,
-    known_names,
-    listed_goal_names,
-    world_object_names,
-)
+from simscen.loading.known_names import KIND_NAMES, event_names, known_names, listed_goal_names, world_object_names
 from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
@@ -32,7 +26,7 @@ def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
         names = known.get(reference.target)
         if names is not None and reference.name not in names and not _is_immovable(scope, reference):
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
-            message = f"no {KIND_DESCRIPTIONS[reference.target]} is called {quoted(reference.name)}"
+            message = f"no {KIND_NAMES[reference.target]} is called {quoted(reference.name)}"
             yield CheckProblem(reference.keys, message, hint)
 
 

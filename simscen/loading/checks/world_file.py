@@ -58,24 +58,15 @@ def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
 def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckProblem]:
     """Find obstacles and objects with the same shape and pose as another obstacle or object."""
     spec = _spec(world)
-    things: list[tuple[Keys, WorldObject]] = [
-        (("obstacles", k), world_object) for k, world_object in enumerate(spec.obstacles)
-    ]
-    things += [(("objects", k), world_object) for k, world_object in enumerate(spec.objects)]
+    things: list[tuple[Keys, WorldObject]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
+    things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
-    for keys, world_object in things:
-        shape = (
-            world_object.box,
-            world_object.cylinder,
-            world_object.polygon,
-            world_object.height,
-            world_object.z,
-            world_object.pose.pose,
-        )
+    for keys, thing in things:
+        shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose.pose)
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
             yield CheckProblem(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
-        seen.append((shape, world_object.name))
+        seen.append((shape, thing.name))
 
 
 @WORLD_FILE.check("SC030")

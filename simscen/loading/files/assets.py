@@ -18,7 +18,7 @@ from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, key_position, node_at, value_position
+from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, node_at, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import RosMapSpec, WorldSpec
 
@@ -156,11 +156,8 @@ class Assets:
         if spec is None or tree is None:
             return None
         image = self._find_file(spec.image, value_position(tree, ("image",)))
-        return (
-            LoadedMap(path, spec, image, tuple(self.library.with_source(_ignored_key_warnings(tree))))
-            if image
-            else None
-        )
+        notes = tuple(self.library.with_source(_ignored_key_warnings(tree)))
+        return LoadedMap(path, spec, image, notes) if image else None
 
     def _read_tree(self, path: Path) -> Node | None:
         """Return the YAML tree of a file; None if it cannot be parsed."""
@@ -211,18 +208,13 @@ def is_ros_map(tree: Node | None) -> bool:
 
 def _ignored_key_warnings(tree: Node) -> list[Problem]:
     """Return warnings about keys of a ROS map that map_server ignores."""
-    if not isinstance(tree, MappingNode):
-        return []
-    ignored = [key for key in tree.entries if key not in RosMapSpec.model_fields]
+    entries = tree.entries if isinstance(tree, MappingNode) else {}
+    messages = {
+        key: f"{quoted(key)} has no meaning in a ROS map" for key in entries if key not in RosMapSpec.model_fields
+    }
     return [
-        Problem(
-            *key_position(tree, (key,)),
-            "SC311",
-            f"{quoted(key)} has no meaning in a ROS map",
-            _ignored_key_hint(key),
-            "warning",
-        )
-        for key in ignored
+        Problem(*entries[key].key, "SC311", message, _ignored_key_hint(key), "warning")
+        for key, message in messages.items()
     ]
 
 

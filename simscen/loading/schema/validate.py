@@ -15,7 +15,6 @@ from simscen.loading.yaml.tree import (
     Keys,
     MappingNode,
     Node,
-    Position,
     ScalarNode,
     child,
     dotted_path,
@@ -60,7 +59,7 @@ def _supported_mapping(tree: Node) -> MappingNode | Problem:
     """Return the tree; or a problem if it is not a mapping, or written for another version of the language."""
     if isinstance(tree, MappingNode):
         return _wrong_version(tree) or tree
-    return _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
+    return Problem(*tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
 
 def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list[dict[str, Any]]]:
@@ -94,7 +93,7 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
     if not isinstance(version.value, int):
         return None
     message = f"needs schema {version.value}; this version of simscen supports {LANGUAGE_VERSION}"
-    return _problem(version.position, "SC009", message)
+    return Problem(*version.position, "SC009", message)
 
 
 def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
@@ -109,8 +108,8 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
         return _wrong_type(model, tree, loc, error)
     if loc and loc[-1] == "[key]":
         name = ScalarNode(tree.position, str(loc[-2]))
-        return _problem(
-            key_position(tree, loc), *messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
+        return Problem(
+            *key_position(tree, loc), *messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
         )
     node = node_at(tree, loc)
     message = messages.translate_error(kind, error.get("ctx", {}), node, error["msg"])
@@ -121,7 +120,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     if kind == "value_error" and isinstance(node, MappingNode):
         named = (name for name in re.findall(r"`(\w+)`", message.text) if name in node.entries)
         loc = (*loc, *islice(named, 1))  # the first key that the message names
-    return _problem(value_position(tree, loc), *message)
+    return Problem(*value_position(tree, loc), *message)
 
 
 def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
@@ -145,29 +144,29 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
         hint = move_hint
     elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
         hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
-    return _problem(key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
+    return Problem(*key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 
 def _missing_key(tree: Node, loc: Keys) -> Problem:
     """Return the problem of the missing key, or the missing item of a list, at the end of `loc`."""
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
-        return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
+        return Problem(*key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
     where = f" in `{holder}`" if holder else ""
-    return _problem(key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
+    return Problem(*key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
 def _wrong_type(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, Any]) -> Problem:
     """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):
-        return _problem(value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
+        return Problem(*value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
     if error["type"] == "union_tag_not_found":
         message = f"missing key `type` in `{dotted_path(existing_keys(tree, loc))}`"
-        return _problem(key_position(tree, loc), "SC010", message, f"expected one of: {', '.join(types)}")
+        return Problem(*key_position(tree, loc), "SC010", message, f"expected one of: {', '.join(types)}")
     written = str(error["ctx"]["tag"])
     message = f"{messages.quoted(written)} is not one of the choices"
-    return _problem(value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
+    return Problem(*value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
 def _empty_values(tree: Node) -> Iterator[Keys]:
@@ -179,13 +178,13 @@ def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     """Return the problem of the empty value at `loc`."""
     *holder, key = loc
     if isinstance(key, int):
-        return _problem(
-            key_position(tree, loc), "SC018", f"item {key + 1} of `{dotted_path(holder)}` is empty", "remove it"
+        return Problem(
+            *key_position(tree, loc), "SC018", f"item {key + 1} of `{dotted_path(holder)}` is empty", "remove it"
         )
     models = models_at(model, loc)
     complete = models and all(has_no_required_keys(option) for option in models)
     hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"
-    return _problem(key_position(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
+    return Problem(*key_position(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
 
 
 def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
@@ -217,7 +216,3 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
 def _spelling_hint(missing: Problem) -> str:
     """Return the hint for a misspelling of this missing key."""
     return f"did you mean {missing.message.split()[2]}?"
-
-
-def _problem(position: Position, code: str, message: str, hint: str = "") -> Problem:
-    return Problem(position.path, position.line, position.col, code, message, hint)

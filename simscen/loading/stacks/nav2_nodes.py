@@ -244,31 +244,19 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
     In simscen, lateral and backward motion have the limits of forward motion. Different limits get a note.
     """
-    for name, turning in (
-        ("max_velocity", "max_angular_velocity"),
-        ("max_accel", "max_angular_accel"),
-        ("max_decel", ""),
-    ):
+    turning_names = {"max_velocity": "max_angular_velocity", "max_accel": "max_angular_accel", "max_decel": ""}
+    for name, turning in turning_names.items():
         limits = _xy_and_rotation(parameters.get(name))
         for simscen_name, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
             if simscen_name and limit:
                 yield Translation(node, name, ("velocity_smoother", simscen_name), abs(limit))
         if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
             yield Translation(node, name, (), limits, "lateral motion has the same limit as forward motion")
-    min_velocity, max_velocity = (
-        _xy_and_rotation(parameters.get("min_velocity")),
-        _xy_and_rotation(parameters.get("max_velocity")),
-    )
-    if (
-        min_velocity
-        and max_velocity
-        and all(low == -high or not low for low, high in zip(min_velocity, max_velocity, strict=True))
-    ):
-        yield Translation(node, "min_velocity", (), min_velocity)
-    elif min_velocity:
-        yield Translation(
-            node, "min_velocity", (), min_velocity, "backward motion has the same limit as forward motion"
-        )
+    lowest, highest = _xy_and_rotation(parameters.get("min_velocity")), _xy_and_rotation(parameters.get("max_velocity"))
+    if lowest:
+        is_same = bool(highest) and all(low in (-high, 0) for low, high in zip(lowest, highest, strict=True))
+        why = "" if is_same else "backward motion has the same limit as forward motion"
+        yield Translation(node, "min_velocity", (), lowest, why)
     faster, slower = _xy_and_rotation(parameters.get("max_accel")), _xy_and_rotation(parameters.get("max_decel"))
     if faster and slower and abs(slower[2]) != abs(faster[2]):
         why = "angular deceleration has the same limit as angular acceleration"

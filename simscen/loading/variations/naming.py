@@ -87,14 +87,12 @@ def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
 def _value_text(node: Node) -> str:
     """Return a value as text in a name; "" if it is too long or has nested values."""
     match node:
+        case ScalarNode(value=bool(value)):
+            text = str(value).lower()
+        case ScalarNode(value=float(value)):
+            text = f"{value:.6g}"
         case ScalarNode(value=value):
-            text = (
-                str(value).lower()
-                if isinstance(value, bool)
-                else f"{value:.6g}"
-                if isinstance(value, float)
-                else str(value)
-            )
+            text = str(value)
         case SequenceNode(items=items) if all(isinstance(item, ScalarNode) for item in items):
             text = "_".join(map(_value_text, items))
         case MappingNode(entries=entries) if all(isinstance(entry.value, ScalarNode) for entry in entries.values()):

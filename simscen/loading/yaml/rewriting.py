@@ -67,10 +67,8 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     if not isinstance(node, SequenceNode) or not value or not node.items:
         return _dumped({key: value})
     first_lines = [item.position.line - 1 for item in node.items]
-    on_own_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines) and len(set(first_lines)) == len(
-        first_lines
-    )
-    if not on_own_lines or first_lines[0] == start:
+    begin_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines)
+    if not begin_lines or len(set(first_lines)) < len(first_lines) or first_lines[0] == start:
         return _dumped({key: value})
     starts = [_with_comments(line, lines) for line in first_lines]
     end = _with_comments(start, lines) + len(segment)
