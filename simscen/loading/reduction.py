@@ -1,6 +1,6 @@
 """Reduction of a scenario for `simscen shrink`: remove parts, round numbers, and list the differences.
 
-A part is a value in the YAML tree of a scenario, given by its keys.
+A part is a value in the YAML tree of a scenario, given by its keys, e.g. ("goals", 0, "pose").
 """
 
 from collections.abc import Collection, Mapping, Sequence

@@ -34,7 +34,7 @@ class CheckProblem(NamedTuple):
     """Problem that a check found. It has the keys of a value instead of a position in a file."""
 
     keys: Keys
-    """Keys of the value that the message marks."""
+    """Keys that lead to the value that the message marks, e.g. ("goals", 0, "pose")."""
     message: str
     """Description of the problem."""
     hint: str = ""
