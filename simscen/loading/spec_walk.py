@@ -12,7 +12,7 @@ from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name in a specification that refers to something. `mark` is the annotation of its field, `keys` lead to the name."""
+    """Name in a specification that refers to something. `mark` is the annotation of its field, `keys` lead to it."""
 
     keys: Keys
     mark: ReferenceTo
