@@ -22,9 +22,9 @@ RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
 
 
 class ListedFault(NamedTuple):
-    """Fault with its index in `faults`, and its target; None if the robot does not have the target."""
+    """Fault with its number in `faults`, from 0, and its target; None if the robot does not have the target."""
 
-    index: int
+    number: int
     entry: FaultEntry
     target: FaultTarget | None
 
