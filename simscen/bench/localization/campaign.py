@@ -29,29 +29,36 @@ PARAMETER_SETS: Mapping[str, AmclParameters] = {
     "scan_matching_amcl, consistent": ScanMatchingAmcl(parameters="consistent"),
 }
 LOGS_PER_BUILDING: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
-"""Number of logs of each building by circumstance (a key of CIRCUMSTANCES)."""
+"""Number of logs of each building by circumstance, a key of CIRCUMSTANCES."""
 CONSISTENCY_CIRCUMSTANCES = ("clean", "slipping", "tracked", "outdated", "half")
-"""Circumstances in which errors are compared with covariances: all but an unknown start and kidnapping."""
+"""Circumstances for which `Consistency` is computed: all but an unknown start and kidnapping."""
 RELOCALIZATION_LIMIT_S = 60.0
-"""Time limit for localizing a robot with an unknown start, or a kidnapped robot."""
+"""Time limit for localizing the robot after an unknown start or a kidnapping."""
 LOST_M, FOUND_M = 1.0, 0.5
-"""Position error above which a robot is lost, and below which it is found again."""
+"""Position error above which the robot is lost, and below which the robot is found again."""
 CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
-"""Times in a log at which the error is compared with the covariance."""
+"""Times in a log at which the NEES is computed."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
-"""Robot of all logs. AMCL needs a robot model, but the logs are generated without it."""
+"""Robot model that AMCL requires. The logs do not depend on the robot model."""
 
 Interval = tuple[float, float] | None
-"""Lower and upper limit of a 95 % confidence interval; None if there are too few buildings for one."""
+"""Lower and upper limit of a 95 % confidence interval; None with too few buildings."""
 
 
 @dataclass(frozen=True)
 class Trial:
     """Result of one parameter set on one log. The names of the fields are keys of the JSON output.
 
-    `median` and `largest` are position errors in m. `tracked` means that the error never exceeded LOST_M. `found` is
-    the time in s, from the start or the kidnapping, until the robot was found and not lost again; None if never. `nees`
-    has the NEES at each of CHECK_TIMES_S. `ms` is CPU time per scan, and `slowest_ms` that of the slowest message.
+    building:     number of the building
+    number:       number of the drive in the building
+    circumstance: a key of CIRCUMSTANCES
+    tracked:      whether the position error never exceeded LOST_M
+    median:       median position error in m
+    largest:      largest position error in m
+    found:        seconds from start or kidnapping until the robot was found for the rest of the log; None if never
+    nees:         NEES at each of CHECK_TIMES_S
+    ms:           CPU time per scan in ms
+    slowest_ms:   CPU time of the slowest message in ms
     """
 
     building: int
@@ -67,7 +74,7 @@ class Trial:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot was never lost; with an unknown start or kidnapping, whether it was found in time."""
+        """Whether the robot was never lost; after an unknown start or kidnapping, whether it was found in time."""
         if self.circumstance in ("unknown", "kidnapped"):
             return self.found is not None and self.found <= RELOCALIZATION_LIMIT_S
         return self.tracked
@@ -75,7 +82,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class SuccessRate:
-    """Success on `count` of `of` logs, with the confidence interval of this rate by bootstrap over buildings."""
+    """Success on `count` of `of` logs. `interval` is for the rate `count / of`, by bootstrap over buildings."""
 
     count: int
     of: int
@@ -84,12 +91,13 @@ class SuccessRate:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Comparison of squared errors and covariances by the average NEES (ANEES), which is 3 for a consistent localizer.
+    """Average NEES (ANEES) of a localizer: 3 if its covariances match its errors.
 
-    `anees` is the average over all logs and CHECK_TIMES_S. It lies within `bounds` (95 %, see grouped_anees_bounds) if
-    the covariance is right on average. `inside` is the fraction of poses within their 95 % ellipsoid. `moments` are the
-    averages over logs at each of CHECK_TIMES_S; they lie within `moment_bounds` (95 %) if the localizer is consistent,
-    errors are normal, and logs are independent.
+    anees:         ANEES over all logs and CHECK_TIMES_S
+    bounds:        95 % bounds of `anees` if the covariance is right on average, from `grouped_anees_bounds`
+    inside:        fraction of the errors within the 95 % ellipsoid of the covariance
+    moments:       ANEES over all logs at each of CHECK_TIMES_S
+    moment_bounds: 95 % bounds of each of `moments` if the localizer is consistent, from `anees_bounds`
     """
 
     anees: float
@@ -101,11 +109,15 @@ class Consistency:
 
 @dataclass(frozen=True)
 class ParameterSetResults:
-    """Results of the parameter set `parameters` on all logs. The names of the fields are keys of the JSON output.
+    """Results of one parameter set on all logs. The names of the fields are keys of the JSON output.
 
-    `shares` has the success rates and `sure` the consistency, both by circumstance. `median` is the median over the
-    logs with circumstance "tracked" of their median error, in m. `ms` is the mean CPU time per scan, including the
-    odometry before it, and `slowest_ms` that of the slowest message.
+    parameters:      name of the parameter set
+    shares:          success rate by circumstance
+    median:          median of `Trial.median` over the logs with circumstance "tracked"
+    median_interval: interval of the mean of `Trial.median` over the same logs
+    sure:            consistency by circumstance
+    ms:              mean CPU time per scan in ms, including odometry
+    slowest_ms:      CPU time of the slowest message in ms
     """
 
     parameters: str
@@ -120,13 +132,16 @@ class ParameterSetResults:
 def run_buildings(
     buildings: Sequence[int], names: Sequence[str], workers: int
 ) -> Iterator[Mapping[str, Sequence[Trial]]]:
-    """Yield the trials of each building, by the `names` of parameter sets. Deterministic except for CPU times."""
+    """Yield the trials of one building after the other, by name of the parameter set.
+
+    `names` are keys of PARAMETER_SETS. Everything except CPU times is deterministic.
+    """
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(run_building, buildings, [tuple(names)] * len(buildings))
 
 
 def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[Trial]]:
-    """Generate all logs of a building, and run AMCL on each log with each of the parameter sets `names`."""
+    """Generate all logs of a building, run each parameter set on each log, and return the trials by parameter set."""
     trials: dict[str, list[Trial]] = {name: [] for name in names}
     for circumstance, count in LOGS_PER_BUILDING.items():
         for number in range(count):
@@ -137,7 +152,7 @@ def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[T
 
 
 def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
-    """Run a localizer on a log. The same arguments give the same result except for CPU times."""
+    """Run a localizer on a log. Everything except CPU times is deterministic."""
     spec = StackSpec(localizer=localizer)
     localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
     errors = compare_with_reference(localized, log.sensed, LOST_M)
@@ -156,13 +171,13 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
         largest=float(errors.distance.max()),
         found=_time_found(errors.times - lost_at, errors.distance),
         nees=tuple(nees(*each) for each in zip(pose_errors, localized.covariances[rows], strict=True)),
-        ms=localized.cpu * 1e3 / localized.scans,
-        slowest_ms=localized.slowest * 1e3,
+        ms=localized.cpu_s * 1e3 / localized.scan_count,
+        slowest_ms=localized.slowest_reading_s * 1e3,
     )
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
-    """Return the first of `times` from 0 s on with an error below FOUND_M and none above LOST_M later, or None."""
+    """Return the first of `times` >= 0 with an error below FOUND_M and no later error above LOST_M; None if none."""
     lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
     begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
     near = np.flatnonzero(distance[begin:] < FOUND_M)
@@ -170,7 +185,7 @@ def _time_found(times: Array, distance: Array) -> float | None:
 
 
 def summarize(name: str, trials: Sequence[Trial]) -> ParameterSetResults:
-    """Return the results of the parameter set `name` from all of its trials."""
+    """Return the results of the parameter set `name`. `trials` are the results of this set on all logs."""
     groups = {group: [trial for trial in trials if trial.circumstance == group] for group in CIRCUMSTANCES}
     tracked = groups["tracked"]
     return ParameterSetResults(
@@ -215,16 +230,19 @@ def _interval(values: Sequence[float]) -> Interval:
 
 
 MIN_GROUPS = 3
-"""Minimum number of buildings for `grouped_anees_bounds`. With two, Student's t would make the interval useless."""
+"""Minimum number of buildings for `grouped_anees_bounds`."""
 
 
 def nees(error: Array, covariance: Array) -> float:
-    """Return the NEES e' P^-1 e of an error e (3,) in m, m, rad with covariance P (3, 3); inf for a singular P."""
+    """Return the NEES e' P^-1 e of an error e (3,) in m, m, rad with the covariance P (3, 3); inf if P is singular."""
     return float(nees_of_errors(error[np.newaxis], covariance[np.triu_indices(3)][np.newaxis])[0])
 
 
 def nees_at(trace: Trace, seconds: float) -> float | None:
-    """Return the NEES of the belief at a time of a run in s; None before the first belief and after the end."""
+    """Return the NEES of the belief at this time of a run; None before the first belief and after the end.
+
+    `trace` has the recorded states of the run.
+    """
     samples, tick = nees_samples(trace), round(seconds * trace.tick_rate)
     if not len(samples) or tick < samples.ticks[0] or tick > trace.end:
         return None
@@ -232,22 +250,21 @@ def nees_at(trace: Trace, seconds: float) -> float | None:
 
 
 def fraction_in_ellipsoid(values: Sequence[float]) -> float:
-    """Return the fraction of NEES `values` within the ellipsoid that contains a normal error with 95 % probability."""
+    """Return the fraction of NEES `values` up to the 95 % quantile of the chi-square distribution."""
     return float(np.mean(np.asarray(values) <= chi2_quantile(0.95, DIMENSIONS)))
 
 
 def anees_bounds(runs: int) -> tuple[float, float]:
-    """Return bounds that contain the ANEES of a consistent localizer over independent `runs` with 95 % probability."""
+    """Return 95 % bounds of the ANEES of a consistent localizer over this number of independent runs."""
     return nees_mean_bounds(runs, DIMENSIONS, 0.95)
 
 
 def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
-    """Return bounds that contain the mean of `groups` with 95 % probability if the covariance is right on average.
+    """Return 95 % bounds of the mean of `groups` if the covariance is right on average.
 
-    Each of `groups` is the ANEES of one building, over equally many values. Values of one building may depend on each
-    other and have any distribution. So the uncertainty of the mean is estimated from the variation between buildings.
-    The bounds are Student's t interval of the logarithm of the mean (delta method), because ANEES is a ratio. None for
-    fewer than MIN_GROUPS buildings or an infinite value.
+    Each of `groups` is the ANEES of one building. The bounds are Student's t interval for the logarithm of the mean
+    (delta method). NEES values of one building may be correlated. None with fewer than MIN_GROUPS buildings, and if the
+    mean is infinite or not positive.
     """
     count, mean = len(groups), float(np.mean(groups))
     if count < MIN_GROUPS or not 0.0 < mean < math.inf:

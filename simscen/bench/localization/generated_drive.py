@@ -14,31 +14,31 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 STEP_S = 0.075
-"""Time between two true poses, and between two odometry messages."""
+"""Time between two true poses. There is one odometry message for each true pose."""
 CLEARANCE_M = 0.35
-"""Minimum distance of paths to all obstacles."""
+"""Minimum distance of paths to walls and furniture."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.6, 1.0
 SEARCH_CELL_M = 0.1
 """Cell size of the path search."""
 MAX_FAILED_GOALS = 30
-"""Maximum number of consecutive unreachable goals. After one more, the robot counts as enclosed."""
+"""Maximum number of consecutive goals without a path before EnclosedStart is raised."""
 
 
 class EnclosedStart(ValueError):
-    """No path leads out of the room in which the drive would start."""
+    """No path leads out of the room in which the robot is."""
 
 
 def drive_between_rooms(
-    floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternate: bool
+    floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternates_halves: bool
 ) -> Array:
-    """Return true poses (k, 3), STEP_S apart, of a drive of `seconds` along shortest paths between random rooms.
+    """Return true poses (k, 3), STEP_S apart, of a drive along shortest paths between random rooms.
 
-    With `alternate`, the drive starts in the left half of the floor, and each goal is in the other half. Raises
-    EnclosedStart.
+    With `alternates_halves`, the drive starts in the left half of the floor, and goals alternate between both halves.
+    `furniture` are boxes (n, 4). Raises EnclosedStart.
     """
     mesh = extruded_mesh(floor.walls, floor.glass, furniture)
     paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
-    waypoints = _waypoints(floor, paths, rng, alternate)
+    waypoints = _waypoints(floor, paths, rng, alternates_halves)
     start, goal = next(waypoints), next(waypoints)
     x, y = start.tolist()
     pose = Pose2(x, y, float(np.arctan2(*(goal - start)[::-1])))
@@ -56,13 +56,15 @@ def drive_between_rooms(
     return np.array(truth)
 
 
-def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
-    """Yield an endless sequence of corners (2,) of shortest paths between random points in rooms."""
+def _waypoints(
+    floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternates_halves: bool
+) -> Iterator[Array]:
+    """Yield endlessly the vertices (2,) of shortest paths between random points in rooms. Raises EnclosedStart."""
     position: Array | None = None
     right, failed = False, 0
     while True:
         side = (floor.rooms[:, 0] > floor.middle) == right
-        rooms = floor.rooms[side] if alternate else floor.rooms
+        rooms = floor.rooms[side] if alternates_halves else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if position is None else position
         path = paths.path(Pose2(*start), Pose2(*target))
@@ -75,7 +77,7 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
 
 
 def mapping_tour(floor: Building) -> Array:
-    """Return poses (k, 3) with yaw 0, 0.5 m apart, on paths through all reachable rooms of an unfurnished floor."""
+    """Return poses (k, 3), 0.5 m apart and with yaw 0, on a path through all reachable rooms, ignoring furniture."""
     mesh = extruded_mesh(floor.walls, floor.glass)
     paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
@@ -100,37 +102,39 @@ SLIP_DURATION_S = (0.3, 1.5)
 
 @dataclass(frozen=True)
 class OdometryErrors:
-    """Standard deviations of the systematic errors of wheel odometry, and whether the wheels slip.
+    """Standard deviations of systematic errors of wheel odometry, which are drawn once for each log.
 
-    Each error is drawn once for each log: the relative error of distances (`scale`, from the wheel radius), the
-    relative error of angles (`turn`, from the wheel separation), and the curvature error in rad/m (`bend`, from unequal
-    wheels). See Borenstein and Feng, Measurement and correction of systematic odometry errors in mobile robots,
-    T-RA 12 (1996).
+    scale:      relative error of distances, caused by a wrong wheel radius
+    turn:       relative error of rotations, caused by a wrong wheel separation
+    bend:       curvature error in rad/m, caused by unequal wheels
+    has_slip:   whether the wheels slip at random times
+
+    See Borenstein and Feng, Measurement and correction of systematic odometry errors in mobile robots, T-RA 12 (1996).
     """
 
     scale: float = 0.015
     turn: float = 0.03
     bend: float = 0.015
-    slips: bool = True
+    has_slip: bool = True
 
 
-RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, False)
-"""No systematic errors and no slip. The random errors of WheelOdometry remain."""
+RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, has_slip=False)
+"""Odometry with the random errors of WheelOdometry, but without systematic errors and slip."""
 
 
 def simulate_odometry(
     truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
 ) -> Array:
-    """Return poses (k, 3) in the odom frame as measured by wheels for true poses (k, 3) that are `seconds` apart."""
+    """Return measured poses (k, 3) in the odom frame for true poses `truth` (k, 3) that are `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     distance = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = 1 + rng.normal(0, errors.scale), 1 + rng.normal(0, errors.turn), rng.normal(0, errors.bend)
     translation_draws, rotation_draws = rng.standard_normal((2, len(steps)))
-    stretch = scale * _slip_factors(len(steps), seconds, errors.slips, rng)
+    stretch = scale * _slip_factors(len(steps), seconds, errors.has_slip, rng)
     moving = distance > 0
     stretch[moving] += spec.translation_noise * translation_draws[moving] / np.sqrt(distance[moving])
     heading_std = np.sqrt(spec.rotation_noise**2 * np.abs(steps[:, 2]) + spec.drift_noise**2 * distance)
-    turn_slip = _slip_factors(len(steps), seconds, errors.slips, rng)
+    turn_slip = _slip_factors(len(steps), seconds, errors.has_slip, rng)
     turned = steps[:, 2] * turn * turn_slip + bend * distance + heading_std * rotation_draws
     poses = [Pose2(0.0, 0.0, 0.0)]
     for x, y, yaw in np.column_stack((steps[:, 0] * stretch, steps[:, 1] * stretch, turned))[1:].tolist():
@@ -138,10 +142,13 @@ def simulate_odometry(
     return np.array(poses)
 
 
-def _slip_factors(count: int, seconds: float, slips: bool, rng: np.random.Generator) -> Array:
-    """Return the ratio of wheel motion to robot motion in each of `count` steps: 1, or 0.9 to 1.4 during a slip."""
+def _slip_factors(count: int, seconds: float, has_slip: bool, rng: np.random.Generator) -> Array:
+    """Return the ratio of wheel motion to robot motion for `count` steps of `seconds`.
+
+    The ratio is 1 without slip, and random between 0.9 and 1.4 during a slip.
+    """
     factor = np.ones(count)
-    if not slips:
+    if not has_slip:
         return factor
     row = int(rng.exponential(MEAN_SLIP_INTERVAL_S) / seconds)
     while row < count:
@@ -152,15 +159,16 @@ def _slip_factors(count: int, seconds: float, slips: bool, rng: np.random.Genera
 
 
 ROOM_WALK_M = 2.5
-"""Side of the square around the center of a room in which a person walks."""
+"""Side of the square in which a person in a room walks. Its center is the center of the room."""
 WALKING_SPEED_M_S = 1.1
+"""Walking speed. Each person has a random multiple of it, from 0.4 to 1.2."""
 
 
 def simulate_people(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
-    """Return poses (count, people, 3) of `people` at `count` times that are `seconds` apart.
+    """Return poses (count, people, 3) of `people` persons at `count` times that are `seconds` apart.
 
-    Half of the people walk in the corridor, half in rooms. Each person walks back and forth on a line, ignores the
-    robot, and walks through furniture.
+    Half of the people walk in the corridor, half in rooms. Each person walks back and forth on a random line, also
+    through the robot and furniture.
     """
     times = np.arange(count) * seconds
     corridor = float(np.median(floor.doors[:, 1]))
@@ -182,21 +190,22 @@ def simulate_people(floor: Building, count: int, seconds: float, people: int, rn
 
 
 LEG_RADIUS_M, LEG_OFFSET_M = 0.07, 0.14
-"""Radius of a leg, and its distance from the center of the person."""
+"""Radius of a leg, and distance of the leg from the center of the person."""
 LEG_RANGE_M = 15.0
 """Distance from the lidar beyond which legs are ignored."""
 GLASS_TRANSMISSION = 0.8
-"""Probability that a beam passes through the glass that it hits."""
+"""Probability that a beam passes through glass."""
 
 
 class PartlyTransparentScene:
-    """Ray caster for a building with glass. Most beams pass through the glass, which only `everything` contains."""
+    """Ray caster for a building with glass."""
 
     def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
+        """Take the mesh without glass, and the mesh with glass."""
         self._opaque, self._everything = RayScene(opaque), RayScene(everything)
 
     def distances(self, poses: Array, angles: Array, max_range: float, rng: np.random.Generator) -> Array:
-        """Return true ranges (n, b) from lidar `poses` (n, 3) along `angles` (b,) in rad; inf beyond `max_range`."""
+        """Return true ranges (n, b) for lidar `poses` (n, 3) and beam `angles` (b,); inf beyond `max_range`."""
         heading = (poses[:, 2:] + angles).ravel()
         origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT_M / 2)))
         directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
@@ -208,7 +217,7 @@ class PartlyTransparentScene:
 
 
 def beam_angles(spec: Lidar) -> Array:
-    """Return the directions (b,) of the beams in the lidar frame, in rad."""
+    """Return the angles (b,) in rad of the beams in the lidar frame."""
     full = spec.field_of_view >= 2 * np.pi - 1e-9
     increment = spec.field_of_view / (spec.beams if full else spec.beams - 1)
     angles: Array = -spec.field_of_view / 2 + increment * np.arange(spec.beams, dtype=np.float64)
@@ -216,7 +225,10 @@ def beam_angles(spec: Lidar) -> Array:
 
 
 def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ranges (n, b) shortened where the legs of `people` (n, p, 3) block beams from `poses` (n, 3)."""
+    """Return the ranges (n, b) of scans among people. Beams that hit a leg end there.
+
+    `people` are poses (n, p, 3). `poses` (n, 3) are those of the lidar. `angles` (b,) are those of the beams in rad.
+    """
     offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
     legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]
     heading = poses[:, 2:] + angles
@@ -234,7 +246,7 @@ def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array)
 
 
 def add_lidar_noise(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
-    """Return measured ranges for true `distances` in m: inf above and -inf below the range limits of the lidar."""
+    """Return noisy, rounded ranges for true `distances` in m; inf above `max_range`, -inf below `min_range`."""
     noisy = distances + rng.normal(0, spec.noise, distances.shape)
     ranges: Array = np.round(noisy / spec.resolution) * spec.resolution
     ranges[ranges > spec.max_range] = np.inf

@@ -33,18 +33,18 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 CELL_M = 0.05
 MAP_MARGIN_M = 1.0
-"""Width of the margin that the map has around the floor."""
+"""Width of the map's margin around the floor."""
 MAP_RANGE_M = 12.0
-"""Length to which longer beams are cut when the map is drawn."""
+"""Maximum range of beams for drawing the map. Only this part of a longer beam is used, as free space."""
 OCCUPIED_FRACTION = 0.25
-"""Fraction of the beams into a cell that must end in the cell so that it is occupied."""
+"""Minimum fraction of the beams through a cell that end in an occupied cell."""
 
 
 def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, float]) -> OccupancyGrid:
-    """Return the map that SLAM would draw from scans with `ranges` (n, b) in m along `angles` (b,) in rad.
+    """Draw a map like that of SLAM from scans with `ranges` (n, b) in m and beam `angles` (b,) in rad.
 
-    `poses` (n, 3) are those of the lidar. `size` is the length and depth of the floor in m. Cells that no beam passed
-    or hit are unknown.
+    `poses` (n, 3) are those of the lidar. `size` is the length and depth of the floor in m. Cells without a beam are
+    unknown.
     """
     width, height = (int(np.ceil((edge + 2 * MAP_MARGIN_M) / CELL_M)) for edge in size)
     heading = poses[:, 2:] + angles
@@ -70,39 +70,44 @@ def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, floa
 
 
 def left_half(grid: OccupancyGrid, middle: float) -> OccupancyGrid:
-    """Return the map with all cells right of x = `middle` unknown."""
+    """Return the map with unknown cells beyond x = `middle`, in m."""
     cells = grid.cells.copy()
     cells[:, int((middle - grid.origin.x) / grid.resolution) :] = UNKNOWN
     return OccupancyGrid(cells, grid.resolution, grid.origin)
 
 
 LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
-"""Number of beams over 180° and scans per second, as in public logs with a SICK LMS. Drives use them in turn."""
+"""Number of beams over 180°, and scans per second, as in public logs with a SICK LMS. Drives use them in turn."""
 LIDAR_MOUNT = Pose2(0.1, 0.0, 0.0)
 """Pose of the lidar in the base frame."""
 PEOPLE_COUNT = 8
 LOG_DURATION_S, KIDNAPPED_AT_S = 90.0, 30.0
 MAPPING_POSE_STD = (0.02, 0.02, 0.004)
-"""Standard deviations (m, m, rad) of the pose errors with which the map is drawn."""
+"""Standard deviations (x in m, y in m, yaw in rad) of the errors of poses from which the map is drawn."""
 CIRCUMSTANCES = {
     "tracked": "known start",
     "clean": "known start, odometry with random errors only, no people, furniture as on the map",
-    "slipping": "as clean, but with slipping wheels",
+    "slipping": "as clean, but with systematic odometry errors and slipping wheels",
     "unknown": "unknown start",
     "outdated": "known start; the right half of the floor was rebuilt after the map was made",
     "half": "known start; the map ends at the middle of the floor",
     "kidnapped": "known start; after 30 s the robot is placed elsewhere",
 }
-"""Name and description of the conditions under which logs are generated."""
+"""Names and descriptions of the circumstances in which logs are generated."""
 UNCHANGED_WORLD = ("clean", "slipping")
 """Circumstances without people and with the furniture of the map."""
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Generated log with the map and the initial estimate for a localizer.
+    """Generated log of a drive, and what a localizer gets before the drive.
 
-    `sensed` has the sensor readings and the true poses. `number` is the number of the drive in the building.
+    building:     number of the building
+    number:       number of the drive in the building
+    circumstance: a key of CIRCUMSTANCES
+    sensed:       sensor readings and true poses
+    map:          map for the localizer
+    estimate:     initial pose estimate for the localizer
     """
 
     building: int
@@ -114,18 +119,21 @@ class Log:
 
 
 def generate_log(building: int, number: int, circumstance: str, seconds: float = LOG_DURATION_S) -> Log:
-    """Return the log of drive `number` under one of CIRCUMSTANCES. The result depends on the arguments only."""
+    """Generate the log of a drive in a building. The result depends on the arguments only.
+
+    `circumstance` is a key of CIRCUMSTANCES.
+    """
     rng = Streams(building).generator(f"{circumstance} {number}")
     beams, rate = LIDARS[number % len(LIDARS)]
     lidar = Lidar(
         rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01
     )
     floor = generate_building(building, int(circumstance == "outdated"))
-    truth, furniture = _drive(floor, circumstance, seconds, rng)
+    truth, furniture = _drive_in_furniture(floor, circumstance, seconds, rng)
     errors = RANDOM_ERRORS_ONLY if circumstance == "clean" else OdometryErrors()
     odometry = simulate_odometry(truth, STEP_S, errors, WheelOdometry(), rng)
     if circumstance == "kidnapped":
-        after, _ = _drive(floor, circumstance, seconds, rng, furniture)
+        after, _ = _drive_in_furniture(floor, circumstance, seconds, rng, furniture)
         row = int(KIDNAPPED_AT_S / STEP_S)
         odometry_after = simulate_odometry(after, STEP_S, OdometryErrors(), WheelOdometry(), rng)
         last = Pose2(*odometry[row])
@@ -157,10 +165,14 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
     )
 
 
-def _drive(
+def _drive_in_furniture(
     floor: Building, circumstance: str, seconds: float, rng: np.random.Generator, furniture: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return true poses (k, 3) and furniture (n, 4), which is rearranged, if not given, until the robot can leave."""
+    """Return the true poses (k, 3) of a drive, and boxes (n, 4) of the furniture.
+
+    If no furniture is given, the furniture is chosen for the circumstance. The choice is repeated while furniture
+    blocks the door of the robot's room.
+    """
     while True:
         current = furniture
         if current is None:
@@ -173,7 +185,7 @@ def _drive(
 
 @lru_cache(maxsize=2)
 def building_map(building: int) -> OccupancyGrid:
-    """Return the map of a building, drawn from a drive through all rooms, before anything was moved or rebuilt."""
+    """Return the map of a building with its original rooms and furniture."""
     floor, rng = generate_building(building), Streams(building).generator("map")
     poses = mapping_tour(floor)
     angles = np.linspace(-np.pi, np.pi, 480, endpoint=False)
@@ -185,7 +197,7 @@ def building_map(building: int) -> OccupancyGrid:
 
 
 def _readings(odometry: Array, ranges: Array, scan_every: int, lidar: Lidar) -> list[Odometry | Scan]:
-    """Return odometry messages, with a scan after every `scan_every`-th of them."""
+    """Return an odometry message for each pose; the first and then every `scan_every`-th is followed by a scan."""
     readings: list[Odometry | Scan] = []
     increment = lidar.field_of_view / (lidar.beams - 1)
     for row, pose in enumerate(odometry.tolist()):

@@ -1,4 +1,4 @@
-"""Evaluate a localizer on a log: pass it the recorded readings, and compare its beliefs with reference poses."""
+"""Run a localizer on the readings of a log, and compare its beliefs (pose estimates) with reference poses."""
 
 from __future__ import annotations
 
@@ -20,41 +20,48 @@ from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
 MAX_GAP_S = 1.0
-"""Maximum time between two reference poses for interpolation between them."""
+"""Maximum time between two consecutive reference poses for interpolation."""
 MAX_TIME_DIFFERENCE_S = 0.05
-"""In a longer gap, only beliefs within this time of a reference pose are compared."""
+"""Maximum time from a belief to the nearest reference pose, if the belief is in a gap longer than MAX_GAP_S."""
 
 
 @dataclass(frozen=True, eq=False)
-class Localized:
-    """Beliefs of a localizer on a log: `times` (n,) in s, `poses` (n, 3) in the map frame, and `covariances` (n, 3, 3).
+class LocalizationResult:
+    """Beliefs of a localizer on a log, one after each odometry message. CPU times are not deterministic.
 
-    `scans` is the number of processed scans. `cpu` is the CPU time in s for all readings, and `slowest` that for the
-    slowest reading. CPU times differ each time; everything else is deterministic.
+    times:             times (n,) of the beliefs in s
+    poses:             estimated poses (n, 3) in the map frame
+    covariances:       covariances (n, 3, 3) of the poses
+    scan_count:        number of processed scans
+    cpu_s:             CPU time for all readings
+    slowest_reading_s: CPU time for the slowest reading
     """
 
     times: Array
     poses: Array
     covariances: Array
-    scans: int
-    cpu: float
-    slowest: float
+    scan_count: int
+    cpu_s: float
+    slowest_reading_s: float
 
 
 @dataclass(frozen=True)
 class LostInterval:
-    """Interval in s in which the error exceeded the limit; `until` is None if it lasts to the end."""
+    """Interval in s in which the robot was lost; `until` is None if the robot was lost to the end."""
 
     since: float
     until: float | None
 
 
 @dataclass(frozen=True, eq=False)
-class Errors:
-    """Errors of a localizer at `times` (n,) in s: `distance` (n,) in m and signed `yaw` (n,) in rad.
+class PoseErrors:
+    """Errors of a localizer's beliefs.
 
-    `lost` are the intervals in which the robot was lost. `compared` is the fraction of the localizer's beliefs that
-    could be compared with the reference.
+    times:    times (n,) in s
+    distance: position errors (n,) in m
+    yaw:      signed yaw errors (n,) in rad
+    lost:     intervals in which the robot was lost
+    compared: fraction of all beliefs that could be compared with a reference pose
     """
 
     times: Array
@@ -64,7 +71,7 @@ class Errors:
     compared: float
 
     def figures(self) -> dict[str, float]:
-        """Return median, RMSE, largest and last position error in m, and the RMSE of the yaw in rad, by name."""
+        """Return by name: median, RMSE, largest, and last position error in m, and RMSE of the yaw in rad."""
         return {
             "median": float(np.median(self.distance)),
             "rmse": float(np.sqrt(np.mean(self.distance**2))),
@@ -76,35 +83,34 @@ class Errors:
 
 def localize(
     log: LocalizationLog, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int
-) -> Localized:
-    """Pass all readings of a log to the localizer of a stack, and return its belief after each odometry message.
-
-    `estimate` is the initial pose estimate. The beliefs are the same as in a run with the same readings and seed.
-    """
+) -> LocalizationResult:
+    """Pass all readings of a log to the localizer of a stack. `estimate` is the initial pose estimate."""
     localizer = CheckedLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
-    times, poses, covariances, scans, cpu, slowest = [], [], [], 0, 0.0, 0.0
+    times, poses, covariances, scan_count, cpu_s, slowest_s = [], [], [], 0, 0.0, 0.0
     for reading in log.readings:
         start = time.process_time()
         match reading:
             case Scan():
                 localizer.on_scan(reading)
-                scans += 1
+                scan_count += 1
             case Odometry():
                 localizer.on_odometry(reading)
                 times.append(reading.tick / TICK_RATE_HZ)
                 poses.append(tuple(localizer.belief.pose))
                 covariances.append(localizer.belief.covariance)
         elapsed = time.process_time() - start
-        cpu, slowest = cpu + elapsed, max(slowest, elapsed)
-    return Localized(np.array(times), np.array(poses), np.array(covariances), scans, cpu, slowest)
+        cpu_s, slowest_s = cpu_s + elapsed, max(slowest_s, elapsed)
+    return LocalizationResult(np.array(times), np.array(poses), np.array(covariances), scan_count, cpu_s, slowest_s)
 
 
-def compare_with_reference(localized: Localized, log: LocalizationLog, lost_distance: float) -> Errors | None:
-    """Return the errors of the beliefs that can be compared with the true poses of the log; None if there are none.
+def compare_with_reference(
+    localized: LocalizationResult, log: LocalizationLog, lost_distance: float
+) -> PoseErrors | None:
+    """Return the errors of beliefs against interpolated reference poses of the log; None if no belief can be compared.
 
-    The true poses are interpolated, except over gaps longer than MAX_GAP_S. The robot is lost while the position error
-    exceeds `lost_distance` in m.
+    A belief in a gap longer than MAX_GAP_S is compared only within MAX_TIME_DIFFERENCE_S of a reference pose. The robot
+    is lost while its position error exceeds `lost_distance` in m.
     """
     if len(log.ticks) < 2:
         return None
@@ -124,11 +130,11 @@ def compare_with_reference(localized: Localized, log: LocalizationLog, lost_dist
     poses = localized.poses[inside]
     distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
     lost = lost_intervals(times, distance > lost_distance)
-    return Errors(times, distance, wrap_array(poses[:, 2] - heading), lost, len(times) / len(localized.times))
+    return PoseErrors(times, distance, wrap_array(poses[:, 2] - heading), lost, len(times) / len(localized.times))
 
 
 def lost_intervals(times: Array, lost: Array) -> list[LostInterval]:
-    """Return the intervals of `times` (n,) in which `lost` (n,) is true."""
+    """Return the intervals of `times` (n,) in which the array `lost` (n,) is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(np.int8), [0]))))
     return [
         LostInterval(float(times[begin]), float(times[end]) if end < len(times) else None)

@@ -1,4 +1,4 @@
-"""Compare localizers on sparse logs, with scans 1 m or 0.5 rad apart, as in many public data sets."""
+"""Compare localizers on sparse logs: generated logs with only one scan every 1 m or 0.5 rad, as in public data sets."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -21,27 +21,27 @@ from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import Surroundings
 
-RECOVERY = {"recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
-"""Parameters with which AMCL adds random particles, with the values of nav2_amcl's documentation."""
+RECOVERY_PARAMETERS = {"recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
+"""Parameters that let AMCL add random particles. The values are those of nav2_amcl's documentation."""
 LOCALIZERS: Mapping[str, AmclParameters] = {
     "likelihood_field": Amcl(laser_model_type="likelihood_field"),
-    "likelihood_field, recovery": Amcl.model_validate({"laser_model_type": "likelihood_field", **RECOVERY}),
+    "likelihood_field, recovery": Amcl.model_validate({"laser_model_type": "likelihood_field", **RECOVERY_PARAMETERS}),
     "amcl": Amcl(),
-    "amcl, recovery": Amcl.model_validate(RECOVERY),
+    "amcl, recovery": Amcl.model_validate(RECOVERY_PARAMETERS),
     "scan_matching_amcl": ScanMatchingAmcl(),
 }
 SEED_COUNT = 5
-"""Number of trials of each localizer on each log."""
-SPACING_M, SPACING_RAD = 1.0, 0.5
-"""Translation or rotation after which the next scan is kept."""
+"""Number of seeds with which each localizer runs on each log."""
+SCAN_SPACING_M, SCAN_SPACING_RAD = 1.0, 0.5
+"""Minimum translation or rotation between two scans of a sparse log."""
 DURATION_S = 180.0
-"""Duration of a log before it is thinned."""
+"""Duration of a log before it is shortened to end after a turn."""
 END_TURN_RAD = 1.0
-"""Minimum rotation from the third-last to the last scan of a log that ends after a turn."""
+"""Minimum rotation over the last three scans of a log that ends after a turn."""
 MISSED_TURN_FRACTION, MISSED_TURN_STD_RAD = 0.05, 0.6
-"""Fraction of the scans after which odometry misreports one rotation, and standard deviation of this error.
+"""Fraction of the scans with a yaw error of odometry after the scan, and standard deviation of this error.
 
-The odometry of the public log MIT CSAIL has a few such errors.
+The odometry of the public log MIT CSAIL has such errors.
 """
 MISSED_TURNS = "as mapped, turns that odometry misses"
 KINDS: Mapping[str, tuple[str, bool]] = {
@@ -52,12 +52,16 @@ KINDS: Mapping[str, tuple[str, bool]] = {
     "half rebuilt": ("outdated", False),
     "half a map": ("half", False),
 }
-"""Kinds of sparse logs: the circumstance (a key of CIRCUMSTANCES), and whether the log ends after a turn."""
+"""Kinds of sparse logs: name, circumstance (a key of CIRCUMSTANCES), and whether the log ends after a turn."""
 
 
 @dataclass(frozen=True)
 class SparseTrial:
-    """Result of one localizer and seed on one log: median and last error in m; `lost` if any error exceeded LOST_M."""
+    """Result of one localizer with one seed on one log. The names of the fields are keys of the JSON output.
+
+    `kind` is a key of KINDS, `localizer` a key of LOCALIZERS. `median` is the median position error in m, and `end` is
+    the last position error in m. `lost` is true if any position error exceeded LOST_M.
+    """
 
     kind: str
     localizer: str
@@ -69,9 +73,9 @@ class SparseTrial:
 
 
 def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
-    """Return the log with all odometry, but only with scans that are SPACING_M or SPACING_RAD apart by odometry.
+    """Return the log with all odometry messages, but only with scans SCAN_SPACING_M or SCAN_SPACING_RAD apart.
 
-    With `ends_after_turn`, the log ends at the last scan after a turn of END_TURN_RAD, if there is one.
+    With `ends_after_turn`, the log ends at the last scan after a turn of END_TURN_RAD, if there is such a turn.
     """
     readings: list[Odometry | Scan] = []
     selected: list[tuple[int, Pose2]] = []  # tick and odometry of each selected scan
@@ -80,7 +84,7 @@ def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
         if isinstance(reading, Odometry):
             odometry = reading.pose
         elif isinstance(reading, Scan):
-            if selected and not _is_far_enough(selected[-1][1], odometry):
+            if selected and not _is_spaced(selected[-1][1], odometry):
                 continue
             selected.append((reading.tick, odometry))
             if len(selected) > 2 and abs(wrap(odometry.yaw - selected[-3][1].yaw)) > END_TURN_RAD:
@@ -95,7 +99,7 @@ def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
 
 
 def with_missed_turns(log: Log) -> Log:
-    """Return the log with odometry that misses some turns, so that its heading is wrong afterwards."""
+    """Return the log with a random yaw error of the odometry after some scans (see MISSED_TURN_FRACTION)."""
     rng = Streams(log.building).generator("missed turns")
     readings: list[Odometry | Scan] = []
     previous, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
@@ -110,33 +114,33 @@ def with_missed_turns(log: Log) -> Log:
     return replace(log, sensed=replace(log.sensed, readings=readings))
 
 
-def _is_far_enough(last: Pose2, now: Pose2) -> bool:
-    return last.distance(now) >= SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SPACING_RAD
+def _is_spaced(last: Pose2, now: Pose2) -> bool:
+    return last.distance(now) >= SCAN_SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SCAN_SPACING_RAD
 
 
 @lru_cache(maxsize=1)
-def sparse_log(kind: str, building: int) -> Log:
-    """Return the sparse log of one of KINDS in a building. The result depends on the arguments only."""
+def generate_sparse_log(kind: str, building: int) -> Log:
+    """Generate the sparse log of a kind (a key of KINDS) in a building. The result depends on the arguments only."""
     circumstance, ends_after_turn = KINDS[kind]
     log = thin_scans(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
     return with_missed_turns(log) if kind == MISSED_TURNS else log
 
 
-def run_sparse(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:
-    """Yield the trials of all localizers and seeds on one log after the other, with all KINDS in all buildings."""
+def run_sparse_logs(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:
+    """Run all localizers on sparse logs of all KINDS in all buildings. Yield the trials of one log after the other."""
     logs = [(kind, building) for kind in KINDS for building in buildings]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(run_sparse_log, *zip(*logs, strict=True))
 
 
 def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
-    """Run all localizers with each seed on the log of a kind in a building."""
+    """Run all LOCALIZERS with all seeds on one sparse log."""
     return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEED_COUNT + 1)]
 
 
 def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTrial:
-    """Run the localizer `name` on the log of a kind in a building."""
-    log, spec = sparse_log(kind, building), StackSpec.model_validate({"localizer": LOCALIZERS[name]})
+    """Run the localizer `name` (a key of LOCALIZERS) with one seed on one sparse log."""
+    log, spec = generate_sparse_log(kind, building), StackSpec.model_validate({"localizer": LOCALIZERS[name]})
     localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
     errors = compare_with_reference(localized, log.sensed, LOST_M)
     assert errors is not None  # a generated log has a reference from its first reading to its last
@@ -145,9 +149,9 @@ def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTr
 
 
 def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:
-    """Return a table with a header, a row for each kind of log, and a column for each localizer.
+    """Return a table with a header row, a row for each kind of log, and a column for each localizer.
 
-    A cell has the number of lost trials, and the medians over trials of the median error and of the last error.
+    A cell has the number of lost trials, the median of their median errors, and the median of their final errors.
     """
     rows = [("log", *LOCALIZERS)]
     for kind in KINDS:

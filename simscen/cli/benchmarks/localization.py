@@ -75,12 +75,12 @@ def command(
 
 
 def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, format_: Format) -> None:
-    from simscen.bench.localization.sparse_logs import run_sparse, sparse_table
+    from simscen.bench.localization.sparse_logs import run_sparse_logs, sparse_table
 
     if only:
         raise UsageError("--sparse compares all localizers; remove --only")
     trials: list[SparseTrial] = []
-    for new in run_sparse(numbers, workers):
+    for new in run_sparse_logs(numbers, workers):
         trials += new
         print_progress(f"{new[0].kind}, building {new[0].building}")
     print_progress("")

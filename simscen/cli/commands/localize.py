@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.bench.localization.recorded_drive import Errors, Localized, compare_with_reference, localize
+from simscen.bench.localization.recorded_drive import PoseErrors, LocalizationResult, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
@@ -75,7 +75,7 @@ def command(
         print_text(f"note: {escaped(note)}", sys.stderr)
     if picture is not None:
         _draw(grid, localized, log_data, picture, [log, map_])
-    cpu_ms = localized.cpu * 1e3 / max(1, localized.scans)
+    cpu_ms = localized.cpu_s * 1e3 / max(1, localized.scan_count)
     print_text(f"{cpu_ms:.2f} ms of CPU time per scan", sys.stderr)
     if json_:
         print(json.dumps(_document(localized, errors, seed), sort_keys=True, indent=2, allow_nan=False))
@@ -146,7 +146,7 @@ def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
 
 
 def _draw(
-    grid: OccupancyGrid, localized: Localized, log_data: LocalizationLog, picture: Path, inputs: list[Path]
+    grid: OccupancyGrid, localized: LocalizationResult, log_data: LocalizationLog, picture: Path, inputs: list[Path]
 ) -> None:
     from simscen.report.picture.drive_plots import write_localization_picture
 
@@ -157,11 +157,11 @@ def _draw(
     )
 
 
-def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:
+def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float) -> list[str]:
     """Return the printed lines. `lost` is the error in m above which the robot counts as lost."""
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
-    lines = [f"{localized.scans} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
+    lines = [f"{localized.scan_count} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
     if errors is None:
         return [*lines, "no reference to compare with"]
     figures = errors.figures()
@@ -176,9 +176,9 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
     return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
 
 
-def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
+def _document(localized: LocalizationResult, errors: PoseErrors | None, seed: int) -> dict[str, object]:
     """Return the JSON output of --json."""
-    document: dict[str, object] = {"scans": localized.scans, "seed": seed, "end": localized.poses[-1].tolist()}
+    document: dict[str, object] = {"scans": localized.scan_count, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}
     over_time = [

@@ -1,18 +1,18 @@
-"""Errors of a recorded drive against references that are dense, sparse, or have gaps."""
+"""PoseErrors of a recorded drive against references that are dense, sparse, or have gaps."""
 
 import numpy as np
 import pytest
 
-from simscen.bench.localization.recorded_drive import Localized, compare_with_reference
+from simscen.bench.localization.recorded_drive import LocalizationResult, compare_with_reference
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 
 def errors(reference_times, offset=0.2):
-    """Errors of a belief that is `offset` to the left of a robot at 1 m/s for 60 s, against poses at some times."""
+    """PoseErrors of a belief that is `offset` to the left of a robot at 1 m/s for 60 s, against poses at some times."""
     times = np.arange(0.0, 60.0, 0.05)
     poses = np.column_stack([times, np.full(len(times), offset), np.zeros(len(times))])
-    localized = Localized(times, poses, np.zeros((len(times), 3, 3)), 0, 0.0, 0.0)
+    localized = LocalizationResult(times, poses, np.zeros((len(times), 3, 3)), 0, 0.0, 0.0)
     known = np.asarray(reference_times, dtype=float)
     truth = np.column_stack([known, np.zeros(len(known)), np.zeros(len(known))])
     sensed = LocalizationLog((), np.round(known * TICK_RATE_HZ).astype(int), truth)
