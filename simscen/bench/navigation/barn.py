@@ -1,7 +1,7 @@
-"""Read the worlds of the BARN navigation challenge, and generate obstacle fields like those of BARN and DynaBARN.
+"""Reader for the worlds of the BARN challenge, and generator of obstacle fields like those of BARN and DynaBARN.
 
-In BARN (Perille et al., SSRR 2020; the-barn-challenge, run.py), a robot with the size of a Jackal drives 10 m through a
-field of cylinders without a map. In DynaBARN, the cylinders move. Any contact ends the run.
+In BARN (Perille et al., SSRR 2020), a Jackal drives 10 m through a field of cylinders without a map. In DynaBARN, the
+cylinders move. Any contact ends the run.
 """
 
 import csv
@@ -19,15 +19,15 @@ from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
 
 PUBLISHED_DWA_RESULTS = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
-"""Published rates and mean score of the dynamic window approach (DWA) at 0.5 m/s, in 50 worlds with 10 runs each."""
+"""Published results of the dynamic window approach (DWA) in BARN at 0.5 m/s, from 50 worlds with 10 runs each."""
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 """Start and goal of the robot in BARN."""
 
 ODOMETRY_LOCALIZER = "type: slip_ekf, rotation_noise: 0.5"
-"""YAML keys of a localizer that takes distance from the wheels and rotation from the gyroscope, as on the Jackal."""
+"""YAML keys of a localizer that takes distances from the wheels and rotations from the gyroscope."""
 SCAN_MATCHING_LOCALIZER = f"{{{ODOMETRY_LOCALIZER}, match_scans: true}}"
-"""YAML of the same localizer with a laser scan matcher, which corrects the distance when the wheels slip."""
+"""YAML of the same localizer with laser scan matching."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
 TUNED_STACK = f"""\
   localizer: {SCAN_MATCHING_LOCALIZER}
@@ -40,7 +40,7 @@ TUNED_STACK = f"""\
 """
 """YAML lines of `stack:` for 2 m/s, the speed of the challenge."""
 TUNED_STACK_FOR_MOVING_WORLDS = TUNED_STACK.replace(SCAN_MATCHING_LOCALIZER, f"{{{ODOMETRY_LOCALIZER}}}")
-"""TUNED_STACK without scan matching, which needs stationary objects."""
+"""TUNED_STACK without scan matching, because moving objects disturb it."""
 DEFAULT_STACK = f"  localizer: {SCAN_MATCHING_LOCALIZER}\n"
 """YAML lines of `stack:` with the default controller at its default speed of 0.5 m/s."""
 CONTROLLERS = {
@@ -67,19 +67,19 @@ pass:
   - goals_reached: {tolerance: 1 m}
   - collisions: {max: 0}
 """
-"""Scenario without name and world. `<start>`, `<stack>` and `<goal>` are placeholders."""
+"""YAML of a scenario without name and world. `<start>`, `<stack>`, and `<goal>` are placeholders."""
 
 
 @dataclass(frozen=True)
 class BarnWorld:
-    """World file of the challenge, and the length in m of the reference path in the BARN score."""
+    """World file of the challenge, and the length in m of the reference path for the BARN score."""
 
     file: Path
     reference_length: float
 
 
 def read_barn_worlds(folder: Path) -> list[BarnWorld]:
-    """Return the worlds that `folder`/scenarios.csv lists. Raises UsageError if the file is missing or invalid."""
+    """Return the worlds listed in the file scenarios.csv in `folder`. Raises UsageError if it is missing or invalid."""
     file = folder / "scenarios.csv"
     try:
         with file.open(newline="", encoding="utf-8") as lines:
@@ -92,6 +92,7 @@ def read_barn_worlds(folder: Path) -> list[BarnWorld]:
 
 
 def _parse_rows(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]:
+    """Yield the world of each row of the CSV `file`. Raises UsageError for an invalid row."""
     for number, row in enumerate(rows, start=2):
         try:
             world, length = int(row["world"]), float(row["ref_path_len"])
@@ -106,34 +107,31 @@ def _parse_rows(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorl
 
 def scenario_text(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED_STACK) -> str:
     """Return the YAML of a scenario. `world` is the value of `world:`, and `stack` the lines below `stack:`."""
-    text = SCENARIO_TEMPLATE.replace("<stack>", stack).replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
-    return f"simscen: 1\nname: {name}\nworld: {world}\n{text}"
+    text = SCENARIO_TEMPLATE.replace("<stack>", stack).replace("<start>", _pose_yaml(start))
+    return f"simscen: 1\nname: {name}\nworld: {world}\n{text.replace('<goal>', _pose_yaml(goal))}"
 
 
-def _pose(pose: Pose2) -> str:
+def _pose_yaml(pose: Pose2) -> str:
     return f"{{x: {pose.x}, y: {pose.y}, yaw: {pose.yaw}}}"
 
 
 CELL_SIZE_M = 0.15
 """Side of a grid cell. A filled cell contains a cylinder with this diameter."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
-"""Number of cells: the robot drives along a lane of ROWS x COLUMNS.
+"""Numbers of grid cells. The robot drives along a lane of ROWS x COLUMNS cells, from small to large y.
 
-The obstacle field is the last FIELD_ROWS of the lane (largest y). The first and last columns are walls of cylinders.
+The last FIELD_ROWS rows of the lane are the obstacle field. The first and the last column are walls of cylinders.
 """
 HEIGHT_M = 1.0
 """Height of all cylinders."""
 FILL_RANGE = (0.20, 0.35)
-"""Range of the fraction of cells that are filled at random, before smoothing.
-
-After smoothing, 5 to 22 % of the cells between the walls are filled, as in six worlds of BARN.
-"""
+"""Range of the fraction of cells that are filled before smoothing."""
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
 """Smoothing fills a cell with at least 5 filled neighbors (of 8), and clears a cell with at most 1."""
 CROSSING_RADIUS_M = 0.37
-"""Radius of a disc that can cross every field, as it can cross every world of BARN."""
+"""Radius of a disc that can cross every generated field, and every world of BARN."""
 MAX_ATTEMPTS = 1000
-"""Maximum number of random fields or paths that are drawn until one meets the requirements."""
+"""Maximum number of random draws for a field or a path."""
 
 Cells = npt.NDArray[np.bool_]
 """Array (rows, columns) that is true for filled cells."""
@@ -141,7 +139,7 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """Centers (n, 2) of the cylinders, and the length in m of the `shortest` path of a disc from START to GOAL."""
+    """Lane with the `centers` (n, 2) of its cylinders. `shortest` is the length in m of the shortest path to GOAL."""
 
     number: int
     centers: Array
@@ -149,7 +147,7 @@ class ObstacleField:
 
     @property
     def density(self) -> float:
-        """Fraction of the cells of the field that are filled, without the walls."""
+        """Fraction of filled cells of the obstacle field, without the walls."""
         inside = (np.abs(self.centers[:, 0] + COLUMNS * CELL_SIZE_M / 2) < (COLUMNS / 2 - 1) * CELL_SIZE_M) & (
             self.centers[:, 1] > (ROWS - FIELD_ROWS) * CELL_SIZE_M
         )
@@ -161,8 +159,8 @@ def generate_obstacle_field(
 ) -> ObstacleField:
     """Generate the field with this number (from 1). The result depends on the arguments only.
 
-    Fields are drawn until a disc of radius `crossing_radius` (m) can cross one, and a disc of radius `blocked_radius`,
-    if given, cannot. Raises RuntimeError after MAX_ATTEMPTS, which did not happen for any field so far.
+    A disc with `crossing_radius` in m can cross the field. A disc with `blocked_radius`, if given, cannot. Raises
+    RuntimeError if no such field is found.
     """
     is_default = crossing_radius == CROSSING_RADIUS_M
     rng = Streams(number).generator("obstacle field" if is_default else f"obstacle field {crossing_radius:g}")
@@ -176,7 +174,7 @@ def generate_obstacle_field(
 
 
 def _smoothed_field(rng: np.random.Generator) -> Cells:
-    """Return a field of random density, smoothed two to four times as in BARN, with walls on both sides."""
+    """Return a field of random density with walls on both sides, smoothed two to four times as in BARN."""
     cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL_RANGE)
     for _ in range(int(rng.integers(2, 5))):
         cells[:, [0, -1]] = True
@@ -195,7 +193,7 @@ def _count_neighbors(cells: Cells) -> npt.NDArray[np.int64]:
 
 
 def _cylinder_centers(field: Cells) -> Array:
-    """Return the cylinders (n, 2) of the lane: the field, the walls on both sides, and a wall behind the start."""
+    """Return the centers (n, 2) of cylinders: those of the field, and walls around the lane behind and beside the robot."""
     lane = np.zeros((ROWS, COLUMNS), np.bool_)
     lane[:, [0, -1]], lane[0] = True, True
     lane[ROWS - FIELD_ROWS :] = field
@@ -204,10 +202,7 @@ def _cylinder_centers(field: Cells) -> Array:
 
 
 def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float | None) -> bool:
-    """Return whether a disc of `crossing_radius` can get from start to goal, and one of `blocked_radius` cannot.
-
-    This is faster than a path search. Most fields cannot be crossed.
-    """
+    """Return whether a disc of `crossing_radius` fits from START to GOAL, and a disc of `blocked_radius` does not."""
     from scipy import ndimage, spatial
 
     step = CELL_SIZE_M / 3
@@ -225,6 +220,7 @@ def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float 
 
 
 def _shortest_path_length(centers: Array, radius: float) -> float:
+    """Return the length in m of the shortest path of a disc from START to GOAL; inf without a path."""
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
@@ -236,7 +232,7 @@ def _shortest_path_length(centers: Array, radius: float) -> float:
 
 
 ARENA_HALF_WIDTH_M = 10.0
-"""Half of the side of the square arena of DynaBARN, which has its center at the origin."""
+"""Half of the side of DynaBARN's square arena. The center of the arena is the origin."""
 MOVER_RADIUS_M = 0.5
 """Radius of a moving cylinder."""
 MOVER_COUNT_RANGE = (5, 24)
@@ -244,24 +240,24 @@ MOVER_COUNT_RANGE = (5, 24)
 SPEEDS_M_S = (0.74, 1.23, 1.72)
 """Mean speeds of the easy, medium and hard worlds of DynaBARN."""
 MAX_SPEED_DEVIATION_M_S = 0.25
-"""Maximum deviation of a cylinder's mean speed from that of the field, and of its speeds from its mean speed."""
+"""Maximum difference between the mean speeds of cylinder and field, and between a cylinder's speed and mean speed."""
 SPEED_STD_RANGE_M_S = (0.05, 0.25)
 """Range of the standard deviation of a cylinder's speeds."""
 DEGREE_RANGE = (1, 5)
-"""Range of the degree of the polynomials that the cylinders follow."""
+"""Range of the degree of the polynomial that a cylinder follows."""
 KEYFRAME_DISTANCE_M = 2.0
 """Approximate distance between two keyframes of a cylinder's motion."""
 MIN_PATH_LENGTH_M = 8.0
-"""Minimum length of a cylinder's path in the arena. Shorter paths are drawn again."""
+"""Minimum length of a cylinder's path."""
 DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
-"""Start of the robot in DynaBARN, 1 m outside of the arena, and its goal in the arena."""
+"""Start of the robot in DynaBARN, 1 m outside of the arena, and goal of the robot inside."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """A cylinder that moves back and forth along `points` (n, 2), which it passes at `times` (n,) in s.
+    """Cylinder that moves back and forth along `points` (n, 2) and passes them at `times` (n,) in s.
 
-    At the start of the run, it is `phase` seconds into this motion.
+    The cylinder starts with the position that it has after `phase` seconds of this motion.
     """
 
     times: Array
@@ -271,7 +267,7 @@ class Mover:
 
 @dataclass(frozen=True, eq=False)
 class DynamicField:
-    """Field of moving cylinders whose mean speeds are `speed` (m/s) with random deviations."""
+    """Field of moving cylinders. `speed` is the mean of their mean speeds in m/s, before random deviations."""
 
     number: int
     speed: float
@@ -282,11 +278,11 @@ def generate_dynamic_field(number: int, speed: float) -> DynamicField:
     """Generate the field with this number (from 1) and mean speed in m/s. The result depends on the arguments only."""
     rng = Streams(number).generator(f"dynamic field {speed:g}")
     count = int(rng.integers(MOVER_COUNT_RANGE[0], MOVER_COUNT_RANGE[1] + 1))
-    return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
+    return DynamicField(number, speed, tuple(_random_mover(rng, speed) for _ in range(count)))
 
 
-def _mover(rng: np.random.Generator, speed: float) -> Mover:
-    points = _path(rng)
+def _random_mover(rng: np.random.Generator, speed: float) -> Mover:
+    points = _random_path(rng)
     mean = speed + float(rng.uniform(-MAX_SPEED_DEVIATION_M_S, MAX_SPEED_DEVIATION_M_S))
     deviation = float(rng.uniform(*SPEED_STD_RANGE_M_S))
     steps = np.hypot(*np.diff(points, axis=0).T)
@@ -297,10 +293,10 @@ def _mover(rng: np.random.Generator, speed: float) -> Mover:
     return Mover(times, points, float(rng.uniform(0.0, 1.99 * times[-1])))
 
 
-def _path(rng: np.random.Generator) -> Array:
+def _random_path(rng: np.random.Generator) -> Array:
     """Return points (n, 2) along a random polynomial y(x) or x(y), about KEYFRAME_DISTANCE_M apart.
 
-    Raises RuntimeError after MAX_ATTEMPTS, which did not happen for any field so far.
+    Raises RuntimeError if no path with MIN_PATH_LENGTH_M is found.
     """
     for _ in range(MAX_ATTEMPTS):
         curve = _polynomial_in_arena(rng)
@@ -315,7 +311,7 @@ def _path(rng: np.random.Generator) -> Array:
 
 
 def _polynomial_in_arena(rng: np.random.Generator) -> Array:
-    """Return the longest piece within the arena of a polynomial y(x) through random points, as points (n, 2)."""
+    """Return points (n, 2) along a random polynomial y(x): the longest piece within the arena."""
     order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
     # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
     edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)

@@ -1,7 +1,7 @@
-"""Experiments of `simscen bench nav`, each a list of scenario files with seeds.
+"""Experiments of `simscen bench nav`. An experiment is a list of scenario files with seeds.
 
-The functions `write_…` generate scenarios as files in `folder`, so that each run can be repeated with `simscen run`.
-All random values of a generated field or drive are derived from its number.
+The functions `write_…` write scenario files to `folder` and return the experiments. All random values of a generated
+field or drive are derived from its number.
 """
 
 import json
@@ -21,10 +21,9 @@ from simscen.core.random_streams import Streams
 
 @dataclass(frozen=True)
 class Drive:
-    """Scenario file, the seeds to run it with, and the length in m of the reference path for the BARN score, if any.
+    """Scenario file with the seeds of its runs. All drives in the same world have the same `world` name.
 
-    `world` is a name that drives in the same world share. Confidence intervals need it, because such drives are not
-    independent.
+    `reference_length` is the length in m of the reference path for the BARN score; None without a score.
     """
 
     file: Path
@@ -35,23 +34,24 @@ class Drive:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Drives whose results form one row of the table.
+    """Drives that form one row of the result table.
 
-    `root` is the folder that all scenario files lie in, and `world_path` the folders for `--world-path`.
-    `localization`: the error and consistency of the pose estimates are measured as well. `mapless`: the robot has no
-    map, so that only some localizers work.
+    root:                  folder of all scenario files
+    world_path:            folders for `--world-path`
+    measures_localization: whether the errors of the pose estimates are measured as well
+    is_mapless:            whether the robot has no map
     """
 
     name: str
     drives: tuple[Drive, ...]
     root: Path
     world_path: tuple[Path, ...] = ()
-    localization: bool = False
-    mapless: bool = False
+    measures_localization: bool = False
+    is_mapless: bool = False
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Widths of the widest path through a narrow field, minus the width of the robot. Fields are up to 0.1 m wider."""
+"""Width of the widest passage through a narrow field minus ROBOT_WIDTH_M. The true width is up to 0.1 m larger."""
 ROBOT_WIDTH_M = 0.42
 """Width of the Jackal across its wheels."""
 LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
@@ -61,9 +61,9 @@ LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped
 def write_barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED_STACK
 ) -> Experiment:
-    """Write the drives in the worlds of BARN, with `stack` as the YAML lines below `stack:`.
+    """Write a drive in each world of BARN, which are in the folder `dataset`. Raises UsageError if it is invalid.
 
-    `variant` is the name of this stack; empty for TUNED_STACK. Raises UsageError if the `dataset` is invalid.
+    `stack` are the YAML lines below `stack:`, and `variant` the name of this stack (empty for TUNED_STACK).
     """
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []
@@ -71,17 +71,17 @@ def write_barn_challenge(
         text = barn.scenario_text(world.file.stem, world.file.name, stack=stack)
         file = folder / "barn" / (variant.replace("/", " per ") or "tuned") / f"{world.file.stem}.scenario.yaml"
         drives.append(Drive(write_text(file, text), seeds, world.reference_length))
-    return Experiment(name, tuple(drives), folder, (dataset,), mapless=True)
+    return Experiment(name, tuple(drives), folder, (dataset,), is_mapless=True)
 
 
 def write_generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write a drive through each of the generated fields with these numbers, which are also the seeds."""
+    """Write a drive through the generated field of each number. The seed of a run is the number of its field."""
     drives = [_field_drive(folder / "fields", generate_obstacle_field(number)) for number in numbers]
-    return Experiment("generated fields", tuple(drives), folder, mapless=True)
+    return Experiment("generated fields", tuple(drives), folder, is_mapless=True)
 
 
 def write_narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Write one experiment for each of NARROW_MARGINS_M, with generated fields whose widest path has this margin."""
+    """Write one experiment with narrow generated fields for each of NARROW_MARGINS_M."""
     experiments = []
     for margin in NARROW_MARGINS_M:
         crossing_radius, blocked_radius = (ROBOT_WIDTH_M + margin) / 2, (ROBOT_WIDTH_M + margin + 0.1) / 2
@@ -89,12 +89,12 @@ def write_narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment
         drives = [
             _field_drive(target, generate_obstacle_field(number, crossing_radius, blocked_radius)) for number in numbers
         ]
-        experiments.append(Experiment(narrow_fields_name(margin), tuple(drives), folder, mapless=True))
+        experiments.append(Experiment(narrow_fields_name(margin), tuple(drives), folder, is_mapless=True))
     return experiments
 
 
 def narrow_fields_name(margin: float) -> str:
-    """Return the name of the experiment with a margin in m."""
+    """Return the name of the experiment for one of NARROW_MARGINS_M."""
     return f"narrow fields, robot + {100 * margin:.0f} cm"
 
 
@@ -119,17 +119,20 @@ def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experimen
             text = barn.scenario_text(f"dynamic field {number}", world.name, start, goal, stack)
             file = write_text(folder / f"{stem}.scenario.yaml", text)
             drives.append(Drive(file, [number], start.distance(goal)))
-        experiments.append(Experiment(dynamic_fields_name(speed), tuple(drives), folder, mapless=True))
+        experiments.append(Experiment(dynamic_fields_name(speed), tuple(drives), folder, is_mapless=True))
     return experiments
 
 
 def dynamic_fields_name(speed: float) -> str:
-    """Return the name of the experiment with a mean speed in m/s."""
+    """Return the name of the experiment for one of barn.SPEEDS_M_S."""
     return f"dynamic fields, {speed:.2f} m/s"
 
 
 def write_sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """Write the drive of Nav2's system test, whose data is in `nav2`, without and with a box that is not on the map."""
+    """Write the drive of Nav2's system test, once without and once with a box that is not on the map.
+
+    `nav2` is the folder with the world and map of this test.
+    """
     experiments = []
     for name, stem, has_box in (("tb3_sandbox", "plain", False), ("tb3_sandbox, unmapped box", "with_box", True)):
         file = write_text(folder / f"nav2/{stem}.scenario.yaml", sandbox_scenario(name, has_box))
@@ -139,15 +142,15 @@ def write_sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experi
 
 def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:
     """Return one experiment for each corner case in the folder `scenarios`."""
-    return [Experiment(case_name(file), (Drive(file, seeds),), root) for file in case_files(scenarios)]
+    return [Experiment(corner_case_name(file), (Drive(file, seeds),), root) for file in corner_case_files(scenarios)]
 
 
-def case_files(scenarios: Path) -> list[Path]:
+def corner_case_files(scenarios: Path) -> list[Path]:
     """Return the scenario files of the corner cases in the folder `scenarios`."""
     return sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
 
 
-def case_name(file: Path) -> str:
+def corner_case_name(file: Path) -> str:
     """Return the name of the experiment with a corner case."""
     return file.name.split(".")[0].replace("_", " ")
 
@@ -155,25 +158,26 @@ def case_name(file: Path) -> str:
 def write_localization_experiments(
     folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]
 ) -> list[Experiment]:
-    """Write the experiments LOCALIZATIONS in the shipped house, which is in the folder `worlds`.
+    """Write the experiments LOCALIZATIONS in the house of the folder `worlds`.
 
-    The tour with a known start is driven with each of `seeds`, all others with each seed in `lost`.
+    The experiment "tour" has the seeds `seeds`. The other experiments have the seeds `lost`, and are omitted without
+    any.
     """
 
-    def experiment(name: str, *drives: Drive, has_estimate: bool = False) -> Experiment:
-        return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=has_estimate)
+    def experiment(name: str, *drives: Drive, is_measured: bool = False) -> Experiment:
+        return Experiment(f"localization, {name}", drives, folder, (worlds,), measures_localization=is_measured)
 
     def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:
         return Drive(write_text(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
     wrong_start = [drive(f"wrong_start_{n}", wrong_start_scenario(directions[n], n % 2 == 0), [n]) for n in lost]
-    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), has_estimate=True)
+    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), is_measured=True)
     if not lost:
         return [tour]
     return [
         tour,
-        experiment(LOCALIZATIONS[1], *wrong_start, has_estimate=True),
+        experiment(LOCALIZATIONS[1], *wrong_start, is_measured=True),
         experiment(LOCALIZATIONS[2], drive("start_unknown", start_unknown_scenario(), lost)),
         experiment(LOCALIZATIONS[3], drive("kidnapped", kidnapped_scenario(), lost)),
     ]
@@ -211,13 +215,12 @@ def write_text(file: Path, text: str) -> Path:
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Write the same drives with additional stack parameters, as scenarios in `folder` that extend the original ones.
+    """Write an experiment `name` with the same drives and other stack parameters: the value `stack` of `stack:`.
 
-    `stack` is the value of `stack:`. Its key `localizer` is ignored if the drives have no map. `name` is the name of
-    the new experiment.
+    The scenarios in `folder` extend the original scenarios. The key `localizer` is ignored for mapless drives.
     """
     drives = []
-    stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
+    stack = {key: value for key, value in stack.items() if not (experiment.is_mapless and key == "localizer")}
     for number, drive in enumerate(experiment.drives, start=1):
         stem = drive.file.name.split(".")[0]
         file = folder / f"{number}_{stem}.scenario.yaml"
@@ -233,11 +236,11 @@ def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str,
 
 
 SANDBOX_BOX = "obstacles:\n    - {name: cardboard box, box: [0.5, 0.4, 0.3], pose: {x: -1.0, y: 0.6}}\n"
-"""Gazebo's `cardboard_box`, where Nav2's system test places an obstacle that is not on the map."""
+"""YAML of a box like Gazebo's `cardboard_box`, at the position of the unmapped obstacle in Nav2's system test."""
 
 
 def sandbox_scenario(name: str, has_box: bool) -> str:
-    """Return the YAML of the drive of Nav2's system test. Its world and map are found in `--world-path`."""
+    """Return the scenario YAML of the drive of Nav2's system test."""
     return f"""\
 simscen: 1
 name: "{name}"
@@ -258,7 +261,7 @@ pass:
 
 
 START = (0.8, 4.95, 0.0)
-"""Pose of the dock in the house, where all drives start: x, y in m, yaw in rad."""
+"""Start of all drives in the house, at its place `dock`: x and y in m, yaw in rad."""
 ESTIMATE_OFFSET_M, ESTIMATE_ROTATION_RAD = 0.5, math.radians(20.0)
 """Error of a wrong initial estimate."""
 
@@ -271,7 +274,7 @@ goals:
 
 
 def tour_scenario() -> str:
-    """Return the YAML of a tour through three rooms with a known start and default noise."""
+    """Return the scenario YAML of a drive through three rooms with a known start."""
     return f"""\
 simscen: 1
 name: tour of the house
@@ -285,10 +288,10 @@ robot: {{pose: dock}}
 
 
 def wrong_start_scenario(direction: float, turns_left: bool) -> str:
-    """Return the YAML of a drive with a wrong initial estimate. The estimate must be correct at the goal.
+    """Return the scenario YAML of a drive with a wrong initial estimate.
 
-    The initial estimate is moved by ESTIMATE_OFFSET_M in `direction` (rad), and rotated by ESTIMATE_ROTATION_RAD to the
-    left or right.
+    The estimate is shifted by ESTIMATE_OFFSET_M in `direction` (rad). It is rotated by ESTIMATE_ROTATION_RAD, to the
+    left if `turns_left`, otherwise to the right.
     """
     x, y = START[0] + ESTIMATE_OFFSET_M * math.cos(direction), START[1] + ESTIMATE_OFFSET_M * math.sin(direction)
     yaw = START[2] + (ESTIMATE_ROTATION_RAD if turns_left else -ESTIMATE_ROTATION_RAD)
@@ -317,11 +320,11 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""End of the scenarios in which the robot must find its own pose. Recoveries turn the robot until it has."""
+"""Last YAML lines of the scenarios in which the robot must localize itself."""
 
 
 def start_unknown_scenario() -> str:
-    """Return the YAML of a drive without an initial estimate."""
+    """Return the scenario YAML of a drive without an initial estimate."""
     return f"""\
 simscen: 1
 name: start unknown
@@ -331,7 +334,7 @@ robot: {{pose: dock, initial_estimate: unknown}}
 
 
 def kidnapped_scenario() -> str:
-    """Return the YAML of a drive in which the robot is kidnapped after 3 m, from the corridor to the study."""
+    """Return the scenario YAML of a drive in which the robot is kidnapped to the study after 3 m."""
     return f"""\
 simscen: 1
 name: kidnapped

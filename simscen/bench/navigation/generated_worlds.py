@@ -1,6 +1,6 @@
-"""Generate worlds for the navigation benchmark: office maps, corridors in which two robots meet, and halls with ramps.
+"""Generator of worlds for the navigation benchmark: office maps, corridors for two robots, and halls with ramps.
 
-Office maps are ROS maps like those of SLAM, with cells of 5 to 25 cm, thin walls, and unknown cells.
+Office maps are ROS maps with cells of 5 to 25 cm, thin walls, and some unknown cells, like maps made by SLAM.
 """
 
 from collections.abc import Callable, Iterable
@@ -14,12 +14,11 @@ from simscen.bench.navigation.experiments import Drive, Experiment, write_text
 from simscen.core.random_streams import Streams
 
 FINE_CELL_M = 0.05
-"""Cell size with which a floor is drawn, before it is reduced to the resolution of its map."""
+"""Cell size of the image on which a floor is drawn. The image is then reduced to the resolution of the map."""
 RESOLUTIONS_M = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
-"""Resolutions of maps, which consecutive floor numbers use in turn."""
-FLOOR_WIDTHS_M, FLOOR_DEPTHS_M = (20.0, 45.0), (12.0, 28.0)
-"""Ranges of width and depth of a floor in m."""
-CORRIDOR_WIDTHS_M, DOOR_WIDTHS_M = (1.7, 2.6), (0.9, 1.3)
+"""Resolutions of maps. Consecutive floor numbers use them in turn."""
+FLOOR_WIDTH_RANGE_M, FLOOR_DEPTH_RANGE_M = (20.0, 45.0), (12.0, 28.0)
+CORRIDOR_WIDTH_RANGE_M, DOOR_WIDTH_RANGE_M = (1.7, 2.6), (0.9, 1.3)
 FREE, WALL, UNKNOWN = 254, 0, 205
 """Pixel values of a ROS map image."""
 Image = npt.NDArray[np.uint8]
@@ -28,13 +27,13 @@ Image = npt.NDArray[np.uint8]
 
 @dataclass
 class _Floor:
-    """Image of a floor with cells of FINE_CELL_M, on which walls are drawn with `wall_thickness` (m) by default."""
+    """Image of a floor with cells of FINE_CELL_M. `wall_thickness` in m is the default for `draw_wall`."""
 
     image: Image
     wall_thickness: float
 
     def draw_wall(self, x0: float, y0: float, x1: float, y1: float, thickness: float | None = None) -> None:
-        """Draw a wall between two points with the same x or y; between other points, draw a box. Units are m."""
+        """Draw an axis-aligned wall between two points in m. If they differ in x and y, draw a filled box."""
         half = (self.wall_thickness if thickness is None else thickness) / 2
         rows = slice(max(0, int((min(y0, y1) - half) / FINE_CELL_M)), int((max(y0, y1) + half) / FINE_CELL_M) + 1)
         columns = slice(max(0, int((min(x0, x1) - half) / FINE_CELL_M)), int((max(x0, x1) + half) / FINE_CELL_M) + 1)
@@ -42,15 +41,15 @@ class _Floor:
 
 
 def generate_office_map(number: int) -> tuple[Image, float]:
-    """Generate the map of the office floor with this number (from 1). Return the image and its resolution in m."""
+    """Return the map image of the office floor with this number (from 1), and the resolution in m per pixel."""
     rng = Streams(number).generator("building")
     resolution = RESOLUTIONS_M[number % len(RESOLUTIONS_M)]
-    width, depth = float(rng.uniform(*FLOOR_WIDTHS_M)), float(rng.uniform(*FLOOR_DEPTHS_M))
+    width, depth = float(rng.uniform(*FLOOR_WIDTH_RANGE_M)), float(rng.uniform(*FLOOR_DEPTH_RANGE_M))
     image = np.full((int(depth / FINE_CELL_M), int(width / FINE_CELL_M)), FREE, np.uint8)
     floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))
     for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
         floor.draw_wall(*wall)
-    corridor_width = float(rng.uniform(*CORRIDOR_WIDTHS_M))
+    corridor_width = float(rng.uniform(*CORRIDOR_WIDTH_RANGE_M))
     for y in np.arange(rng.uniform(4, 6), depth - 4, rng.uniform(9, 13)).tolist():
         for side in (-1, 1):
             _draw_rooms(floor, rng, y + side * corridor_width / 2, side)
@@ -60,11 +59,11 @@ def generate_office_map(number: int) -> tuple[Image, float]:
 
 
 def _draw_rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
-    """Draw rooms with doors and furniture along a corridor wall at `y`, above it (`side` 1) or below it (-1)."""
+    """Draw rooms with doors and furniture along a corridor wall at `y`; above the wall for `side` 1, below for -1."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     x = 0.0
     while x < width:
-        room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR_WIDTHS_M))
+        room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR_WIDTH_RANGE_M))
         door_start = float(rng.uniform(0.3, room - door - 0.3))
         floor.draw_wall(x, y, min(width, x + door_start), y)
         floor.draw_wall(min(width, x + door_start + door), y, min(width, x + room), y)
@@ -78,7 +77,7 @@ def _draw_rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) ->
 
 
 def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_width: float) -> None:
-    """Draw corridors along y that cut through the rooms, and walls with gaps on both sides."""
+    """Draw corridors along y through the rooms. Their walls have random gaps."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     for x in np.arange(rng.uniform(5, 9), width - 3, rng.uniform(12, 20)).tolist():
         floor.image[
@@ -97,7 +96,7 @@ def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_w
 
 
 def _reduce_to_map(image: Image, resolution: float, rng: np.random.Generator) -> Image:
-    """Reduce the image to the resolution of the map. Some cells become unknown, as if no scan had reached them."""
+    """Return the image with the resolution of the map in m. A few random free cells become unknown."""
     step = round(resolution / FINE_CELL_M)
     rows, columns = (size // step * step for size in image.shape)
     blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
@@ -108,7 +107,7 @@ def _reduce_to_map(image: Image, resolution: float, rng: np.random.Generator) ->
 
 
 def write_office_map(number: int, folder: Path) -> Path:
-    """Write an office map as `building_<number>.yaml` and image, in the format of map_server; return the YAML file."""
+    """Write an office map in the format of map_server, and return its YAML file `building_<number>.yaml`."""
     mapped, resolution = generate_office_map(number)
     image = folder / f"building_{number}.pgm"
     folder.mkdir(parents=True, exist_ok=True)
@@ -117,30 +116,28 @@ def write_office_map(number: int, folder: Path) -> Path:
     return write_text(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")
 
 
-MEETING_WIDTHS_M = (1.4, 2.4)
-"""Range of the width of corridors. In the narrowest, two robots 0.44 m wide pass each other with gaps of 17 cm."""
-MEETING_LENGTH_M = 14.0
-"""Length of these corridors."""
-RAMP_SLOPES_DEG, RAMP_HEIGHTS_M = (2.0, 8.0), (0.03, 0.16)
-"""Ranges of slope and height of ramps. A ramp as high as the lidar would be a wall on the map."""
+MEETING_WIDTH_RANGE_M, MEETING_LENGTH_M = (1.4, 2.4), 14.0
+"""Range of the width, and length of the corridors in which two robots meet."""
+RAMP_SLOPE_RANGE_DEG, RAMP_HEIGHT_RANGE_M = (2.0, 8.0), (0.03, 0.16)
+"""Ranges of slope and height of ramps, which stay below the lidar."""
 HALL_WIDTH_M = 2.4
 """Width of the hall with the ramps."""
 
 
 def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one corridor for each number, in which two robots drive from opposite ends to the other end."""
+    """Write one scenario for each number: two robots drive through a corridor in opposite directions."""
     return _numbered_experiment("two robots in a corridor", folder / "corridor", numbers, _meeting_scenario)
 
 
 def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one hall for each number, with a random ramp up, a platform, and a ramp down on the robot's way."""
+    """Write one scenario for each number: a robot drives up a ramp, along a platform, and down a ramp."""
     return _numbered_experiment("ramps", folder / "ramp", numbers, _ramp_scenario)
 
 
-def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text: Callable[[int], str]) -> Experiment:
-    """Write one scenario for each number, which is also its seed, as `<stem>_<number>.scenario.yaml`."""
+def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text_of: Callable[[int], str]) -> Experiment:
+    """Write the scenario `text_of(number)` to `<stem>_<number>.scenario.yaml` for each number, which is its seed."""
     drives = [
-        Drive(write_text(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text(number)), [number])
+        Drive(write_text(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text_of(number)), [number])
         for number in numbers
     ]
     return Experiment(name, tuple(drives), stem.parent)
@@ -148,7 +145,7 @@ def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text: Ca
 
 def _meeting_scenario(number: int) -> str:
     rng, length = Streams(number).generator("corridor"), MEETING_LENGTH_M
-    width = float(rng.uniform(*MEETING_WIDTHS_M))
+    width = float(rng.uniform(*MEETING_WIDTH_RANGE_M))
     max_offset = width / 2 - 0.35
     west, east = rng.uniform(-max_offset, max_offset, 2).tolist()
     return f"""\
@@ -174,7 +171,7 @@ pass:
 
 def _ramp_scenario(number: int) -> str:
     rng = Streams(number).generator("ramp")
-    slope, height = float(rng.uniform(*RAMP_SLOPES_DEG)), float(rng.uniform(*RAMP_HEIGHTS_M))
+    slope, height = float(rng.uniform(*RAMP_SLOPE_RANGE_DEG)), float(rng.uniform(*RAMP_HEIGHT_RANGE_M))
     run, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
     top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
     end, y = below + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))

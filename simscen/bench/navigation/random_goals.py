@@ -14,16 +14,16 @@ from simscen.core.random_streams import Streams
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 WALL_MARGIN_M = 0.12
-"""Minimum distance of the robot's edge to walls, everywhere on its shortest path."""
+"""Minimum distance of the robot's edge to walls on the shortest path."""
 MOVABLE_MARGIN_M = 1.5
-"""Minimum distance of start and goal to doors and movable objects, which are not on the map."""
+"""Minimum distance of start and goal to doors and movable objects."""
 MAX_ATTEMPTS = 2000
-"""Number of random pairs of start and goal that are tried for a drive."""
+"""Maximum number of random pairs of start and goal for one drive."""
 
 
 @dataclass(frozen=True)
 class RandomDrive:
-    """Start, goal, and the length in m of the shortest path of the robot between them."""
+    """Drive from `start` to `goal`. `length` is the length of the shortest path in m."""
 
     number: int
     start: Pose2
@@ -34,9 +34,9 @@ class RandomDrive:
 def random_drives(
     built: BuiltWorld, radius: float, numbers: Iterable[int], min_length: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """Yield a drive for each number, for a disc-shaped robot of `radius` m, with a path of at least `min_length` m.
+    """Yield a random drive of a disc-shaped robot for each number. `radius` and `min_length` of the path are in m.
 
-    The same number always gives the same drive. A number without a drive after MAX_ATTEMPTS is skipped.
+    The drive depends on the arguments and its number only. A number is skipped if no drive is found for it.
     """
     paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
@@ -61,7 +61,7 @@ def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
 ROBOT_RADIUS_M = 0.22
 """Radius of the default robot, a TurtleBot."""
 MIN_AVERAGE_SPEED_M_S = 0.2
-"""Average speed on the shortest path that is enough for the time limit."""
+"""Average speed with which the robot reaches the goal before the time limit."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
     "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),
@@ -72,19 +72,19 @@ FAULTS = {
     "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
     "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
 }
-"""YAML of each fault, which lasts for the whole drive, and the values that replace … at each of STRENGTHS."""
+"""Name and YAML of each fault, and the values that replace … for each of STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
 FIRST_FAULTY_DRIVE = 1_000_000
-"""Smallest number of a drive with a fault. It is large so that these drives differ from those without faults."""
+"""Smallest number of a drive with a fault. Drives without faults have smaller numbers."""
 
 
 def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
-    """Return the YAML of a drive of the default robot, which must not collide. `faults` are items of `faults:`."""
+    """Return the scenario YAML of a drive. `world` is the value of `world:`, and `faults` are the items of `faults:`."""
     fault_lines = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
     limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (
-        f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose(drive.start)}}}\n"
-        f"goals:\n  - {{pose: {_pose(drive.goal)}}}\n{fault_lines}time_limit: {limit:.0f} s\n"
+        f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose_yaml(drive.start)}}}\n"
+        f"goals:\n  - {{pose: {_pose_yaml(drive.goal)}}}\n{fault_lines}time_limit: {limit:.0f} s\n"
         "pass:\n  - goals_reached: {}\n  - collisions: {max: 0}\n"
     )
 
@@ -92,11 +92,14 @@ def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[st
 def write_random_goals(
     name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """Write the random drives with these numbers in each world. Keys of `worlds` are values of `world:`."""
+    """Write an experiment with the random drives of these numbers in each world.
+
+    Keys of `worlds` are values of `world:`. `world_path` are the folders for `--world-path`.
+    """
     drives = []
     for world, built in worlds.items():
         for drive in random_drives(built, ROBOT_RADIUS_M, numbers):
-            file = folder / f"{_stem(world)}_{drive.number}.scenario.yaml"
+            file = folder / f"{_file_stem(world)}_{drive.number}.scenario.yaml"
             drives.append(Drive(write_text(file, scenario_text(name, world, drive)), [drive.number], world=world))
     return Experiment(name, tuple(drives), folder, world_path)
 
@@ -104,9 +107,9 @@ def write_random_goals(
 def write_degraded_sensing(
     folder: Path, worlds: Mapping[str, BuiltWorld], first: int, world_path: tuple[Path, ...] = ()
 ) -> list[Experiment]:
-    """Write one experiment for each of STRENGTHS with the same drives: one for each of `worlds` and FAULTS.
+    """Write one experiment for each of STRENGTHS. It has one drive for each world and each of FAULTS.
 
-    `worlds` and `world_path` are as in `write_random_goals`. `first` is the seed, and determines the drives.
+    `worlds` and `world_path` are as in `write_random_goals`. The drives depend on `first`, which is also their seed.
     """
     faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
     drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
@@ -118,15 +121,15 @@ def write_degraded_sensing(
                 fault = faults[drive.number]
                 template, values = FAULTS[fault]
                 text = scenario_text(f"{fault}, {strength}", world, drive, [template.replace("…", values[level])])
-                file = folder / strength / f"{_stem(fault)}_{_stem(world)}.scenario.yaml"
+                file = folder / strength / f"{_file_stem(fault)}_{_file_stem(world)}.scenario.yaml"
                 drives.append(Drive(write_text(file, text), [first], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))
     return experiments
 
 
-def _pose(pose: Pose2) -> str:
+def _pose_yaml(pose: Pose2) -> str:
     return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {pose.yaw:.4f}}}"
 
 
-def _stem(text: str) -> str:
-    return Path(text).name.split(".")[0].replace(" ", "_")
+def _file_stem(name: str) -> str:
+    return Path(name).name.split(".")[0].replace(" ", "_")

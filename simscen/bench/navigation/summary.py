@@ -1,6 +1,6 @@
-"""Summarize the runs of `simscen bench nav` with the scores of published navigation benchmarks, and compare two stacks.
+"""Summary of the runs of `simscen bench nav` with the scores of published benchmarks, and comparison of two stacks.
 
-An experiment has several drives (scenarios), and each drive is run with several seeds. A trial is one of these runs.
+An experiment has several drives (scenarios). Each drive is run with several seeds. A trial is one of these runs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -17,11 +17,11 @@ from simscen.judge.metrics.compute import barn_score
 Interval = tuple[float, float]
 """Lower and upper limit of a 95 % confidence interval."""
 TIME_LIMIT_REACHED = "time limit"
-"""Value of `ended` of a run that reached its time limit."""
+"""Reason in `RunResult.ended` of a run that reached its time limit."""
 
 
 class DriveOutcome(str, Enum):
-    """Outcome of a trial. FAILED is any failure without collision or timeout; ERROR means that the run had an error."""
+    """Outcome of a trial. FAILED is a failure without collision and timeout. ERROR means that the run was aborted."""
 
     SUCCESS = "success"
     COLLISION = "collision"
@@ -32,9 +32,10 @@ class DriveOutcome(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run, the length in m of the reference path for its BARN score (None without a score), and its world.
+    """One run of a drive in the world named `world`.
 
-    `top_speed` is the maximum speed of the robot in m/s, or None if unknown.
+    `reference_length` is the length in m of the reference path for the BARN score; None without a score. `top_speed` is
+    the maximum speed of the robot in m/s; None if unknown.
     """
 
     run: RunFinished
@@ -44,7 +45,7 @@ class Trial:
 
     @property
     def drive_outcome(self) -> DriveOutcome:
-        """Outcome of the run. If it had a collision and a timeout, COLLISION is returned."""
+        """Outcome of the run. A run with a collision and a timeout counts as COLLISION."""
         if self.run.outcome is Outcome.ERROR:
             return DriveOutcome.ERROR
         if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
@@ -65,10 +66,9 @@ class Trial:
 
     @property
     def sct(self) -> float | None:
-        """Success weighted by completion time (SCT, Yokoyama et al. 2021): minimum time divided by driven time.
+        """Success weighted by completion time (SCT, Yokoyama et al. 2021); None if a time is unknown.
 
-        The minimum time is that of the shortest path at top speed. 0 without success. None if a time is unknown, for
-        example in a run without goals.
+        SCT is the time for the shortest path at top speed divided by the time to the goal; 0 without success.
         """
         if self.drive_outcome is not DriveOutcome.SUCCESS:
             return 0.0
@@ -79,18 +79,22 @@ class Trial:
         return min_seconds / max(min_seconds, seconds)
 
     def metric(self, name: str) -> float | None:
-        """Return a metric of the run, averaged over all robots; None if the run does not have it."""
+        """Return a metric of the run, averaged over all robots; None if no robot has this metric."""
         return mean([value for key, value in self.run.result.metrics.items() if key.split("/")[-1] == name])
 
 
 @dataclass(frozen=True)
 class ExperimentSummary:
-    """Row of the table for the experiment `case`. The names of the fields are keys of the JSON output.
+    """Summary of one experiment. The names of the fields are keys of the JSON output. Means are None without values.
 
-    `success`, `collisions`, `timeouts`, `failed` and `errors` are rates over all runs. `success_interval` is that of
-    `success_interval()`. `score` (BARN) and `sct` are means over all runs. `seconds` (time to the goal) and
-    `path_ratio` (driven length divided by shortest length) are means over the runs that reached all goals. A mean is
-    None if no run has the value; `sct` also if a single run does not have it.
+    case:             name of the experiment
+    runs:             number of runs
+    success, collisions, timeouts, failed, errors: fraction of the runs with each DriveOutcome
+    success_interval: interval of `success`; None with fewer than five worlds
+    seconds:          mean time to the goal in s, over successful runs
+    score:            mean BARN score
+    path_ratio:       mean of driven length divided by shortest length, over successful runs
+    sct:              mean SCT; None if a run has no SCT
     """
 
     case: str
@@ -108,7 +112,7 @@ class ExperimentSummary:
 
 
 def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
-    """Return the summary of an experiment."""
+    """Return the summary of the trials of an experiment."""
     outcomes = [trial.drive_outcome for trial in trials]
     sct_values = [trial.sct for trial in trials]
     successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
@@ -130,7 +134,7 @@ def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
 
 
 def success_interval(trials: Sequence[Trial]) -> Interval | None:
-    """Return the interval of the success rate, or None with fewer than five worlds."""
+    """Return the interval of the success rate; None with fewer than five worlds."""
     return ClusteredMean.from_pairs(
         (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
     ).rate_interval()
@@ -141,23 +145,23 @@ def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """Return the mean of the values that are not None, or None without any."""
+    """Return the mean of all values except None; None without any such value."""
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
 
 
 @dataclass(frozen=True)
 class ClusteredMean:
-    """Mean of the values of trials, with a confidence interval by bootstrap over worlds (cluster bootstrap).
+    """Mean of the values of trials with a confidence interval from a cluster bootstrap over worlds.
 
-    Each trial has the same weight. Worlds are resampled, because trials in the same world are not independent.
+    Each trial has the same weight. `values_by_world` has the values of all trials in one world after the other.
     """
 
     values_by_world: tuple[tuple[float, ...], ...]
 
     @classmethod
     def from_pairs(cls, pairs: Iterable[tuple[str, float]]) -> "ClusteredMean":
-        """Group values by world; a pair is a world and the value of a trial."""
+        """Group values by world. A pair is the name of the world and the value of one trial."""
         worlds: dict[str, list[float]] = {}
         for world, value in pairs:
             worlds.setdefault(world, []).append(value)
@@ -165,31 +169,31 @@ class ClusteredMean:
 
     @property
     def mean(self) -> float | None:
-        """Mean over all trials, or None without trials."""
+        """Mean over all trials; None without trials."""
         trials = sum(map(len, self.values_by_world))
         return sum(map(sum, self.values_by_world)) / trials if trials else None
 
     def interval(self) -> Interval | None:
-        """Return the bootstrap interval of the mean, or None with fewer than five worlds."""
+        """Return the bootstrap interval of the mean; None with fewer than five worlds."""
         means = [sum(values) / len(values) for values in self.values_by_world]
         return bootstrap_mean_interval(
             means, Streams(1).generator("worlds"), [len(values) for values in self.values_by_world]
         )
 
     def rate_interval(self) -> Interval | None:
-        """Return the interval of a rate, or None with fewer than five worlds.
+        """Return the interval of a rate; None with fewer than five worlds.
 
-        If all worlds have the same rate, the bootstrap interval would have zero width. Then, the result is the Wilson
-        interval with one trial per world.
+        If all worlds have the same rate, return the Wilson interval with one trial per world. The bootstrap interval
+        would have zero width.
         """
         rate = self._common_mean()
         count = len(self.values_by_world)
         return self.interval() if rate is None else wilson_interval(rate * count, count)
 
     def rate_difference_interval(self) -> Interval | None:
-        """Return the interval of a difference of rates, or None with fewer than five worlds.
+        """Return the interval of a difference of rates; None with fewer than five worlds.
 
-        If all worlds have the same difference, it is a Wilson interval, as in `rate_interval`.
+        If all worlds have the same difference, return a Wilson interval, as `rate_interval` does.
         """
         change = self._common_mean()
         if change is None:
@@ -200,18 +204,21 @@ class ClusteredMean:
         return (low, high) if change > 0.0 else (-high, -low)
 
     def _common_mean(self) -> float | None:
-        """Return the mean that all worlds have, or None if the means differ or there are fewer than five worlds."""
+        """Return the common mean of all worlds; None if the means differ, and with fewer than five worlds."""
         means = {sum(values) / len(values) for values in self.values_by_world}
         return means.pop() if len(self.values_by_world) >= MIN_PAIRS and len(means) == 1 else None
 
 
-Pair = tuple[Trial, Trial]
-"""Trials of the reference stack and of the other stack in the same drive with the same seed."""
+TrialPair = tuple[Trial, Trial]
+"""Trial of the reference stack, and trial of the compared stack in the same drive with the same seed."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean of the other stack's value minus the reference's, and its interval (None with fewer than five worlds)."""
+    """Mean over trial pairs of the compared stack's value minus the reference stack's value.
+
+    `interval` is that of the mean; None with fewer than five worlds.
+    """
 
     mean: float
     interval: Interval | None
@@ -219,11 +226,16 @@ class Difference:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """Comparison of two stacks in the experiment `case`. The names of the fields are keys of the JSON output.
+    """Comparison of two stacks in one experiment. The names of the fields are keys of the JSON output.
 
-    `pairs` is the number of pairs of trials without errors. In `better` of them only the other stack succeeded, and in
-    `worse` only the reference. `success` is the difference in success rate, `seconds` in the time to the goal if both
-    succeeded, `sct` in SCT, and `score` in BARN score; None if no pair has both values.
+    case:    name of the experiment
+    pairs:   number of trial pairs without an aborted run
+    better:  number of pairs in which only the compared stack succeeded
+    worse:   number of pairs in which only the reference stack succeeded
+    success: difference of the success rates
+    seconds: difference of the times to the goal, over pairs in which both succeeded; None without any
+    sct:     difference of the SCT; None if no pair has two values
+    score:   difference of the BARN scores; None if no pair has two values
     """
 
     case: str
@@ -237,13 +249,13 @@ class DriveComparison:
 
 
 def compare_drives(experiment: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
-    """Compare trials of two stacks. Raises ValueError unless they have the same drives and seeds in the same order."""
+    """Compare the trials of two stacks. Raises ValueError if drives, seeds, or their order differ."""
     pairs = list(zip(reference, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")
     completed = [pair for pair in pairs if DriveOutcome.ERROR not in (pair[0].drive_outcome, pair[1].drive_outcome)]
     both_succeeded = [pair for pair in completed if all(map(_has_succeeded, pair))]
-    success = _difference(completed, lambda trial: float(_has_succeeded(trial)), rate=True)
+    success = _difference(completed, lambda trial: float(_has_succeeded(trial)), is_rate=True)
     return DriveComparison(
         case=experiment,
         pairs=len(completed),
@@ -261,11 +273,11 @@ def _has_succeeded(trial: Trial) -> bool:
 
 
 def _difference(
-    pairs: Sequence[Pair], measure: Callable[[Trial], float | None], rate: bool = False
+    pairs: Sequence[TrialPair], measure: Callable[[Trial], float | None], is_rate: bool = False
 ) -> Difference | None:
-    """Return the mean difference of a measure, which is a rate or not; None if no pair has both values."""
+    """Return the difference of a measure; None if no pair has two values. `is_rate` selects the kind of interval."""
     both = ((first.world, measure(first), measure(second)) for first, second in pairs)
     differences = ClusteredMean.from_pairs((world, b - a) for world, a, b in both if a is not None and b is not None)
     if differences.mean is None:
         return None
-    return Difference(differences.mean, differences.rate_difference_interval() if rate else differences.interval())
+    return Difference(differences.mean, differences.rate_difference_interval() if is_rate else differences.interval())

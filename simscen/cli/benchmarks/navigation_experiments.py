@@ -109,7 +109,7 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "tb3_sandbox":
             return ["tb3_sandbox, unmapped box"]
         case "corner cases":
-            return [experiments.case_name(file) for file in experiments.case_files(scenarios)]
+            return [experiments.corner_case_name(file) for file in experiments.corner_case_files(scenarios)]
         case "localization":
             return [f"localization, {name}" for name in experiments.LOCALIZATIONS]
         case _:

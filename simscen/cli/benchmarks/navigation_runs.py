@@ -163,7 +163,7 @@ class _Progress:
 def summarize_experiment(experiment: Experiment, trials: list[Trial]) -> ExperimentResult:
     """Return the result of an experiment with these trials."""
     row = summarize(experiment.name, trials)
-    return ExperimentResult(row, _localization_accuracy(trials) if experiment.localization else None)
+    return ExperimentResult(row, _localization_accuracy(trials) if experiment.measures_localization else None)
 
 
 def _localization_accuracy(trials: list[Trial]) -> LocalizationAccuracy:

@@ -116,7 +116,7 @@ def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> 
 
 
 def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
-    made = replace(generated_worlds.write_ramps(tmp_path / "r", (1,)), mapless=True)
+    made = replace(generated_worlds.write_ramps(tmp_path / "r", (1,)), is_mapless=True)
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
