@@ -193,7 +193,7 @@ def _count_neighbors(cells: Cells) -> npt.NDArray[np.int64]:
 
 
 def _cylinder_centers(field: Cells) -> Array:
-    """Return the centers (n, 2) of cylinders: those of the field, and walls around the lane behind and beside the robot."""
+    """Return the centers (n, 2) of all cylinders of the lane: the field, side walls, and a wall behind the start."""
     lane = np.zeros((ROWS, COLUMNS), np.bool_)
     lane[:, [0, -1]], lane[0] = True, True
     lane[ROWS - FIELD_ROWS :] = field

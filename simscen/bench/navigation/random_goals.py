@@ -79,7 +79,7 @@ FIRST_FAULTY_DRIVE = 1_000_000
 
 
 def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
-    """Return the scenario YAML of a drive. `world` is the value of `world:`, and `faults` are the items of `faults:`."""
+    """Return the YAML of a scenario. `world` is the value of `world:`, and `faults` are the items of `faults:`."""
     fault_lines = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
     limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (

@@ -1,4 +1,4 @@
-"""Data class for a measured figure of a benchmark, and a stopwatch for the parts of a run."""
+"""Measured figure of a benchmark, and stopwatch for the parts of a run."""
 
 import statistics
 import time
@@ -9,7 +9,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measured `value` in `unit` ("" for a ratio or count). If it was measured repeatedly, the median of `rounds`."""
+    """Measured `value` in `unit`, which is "" for a ratio or count.
+
+    `rounds` are the values of repeated measurements, and `value` is their median. Empty for a single measurement.
+    """
 
     value: float
     unit: str
@@ -18,7 +21,7 @@ class Measurement:
 
     @classmethod
     def of(cls, rounds: Sequence[float], unit: str, *, more_is_better: bool = False) -> "Measurement":
-        """Return the measurement whose value is the median of the rounds."""
+        """Return the measurement with the median of these rounds as its value."""
         return cls(statistics.median(rounds), unit, tuple(rounds), more_is_better)
 
 
@@ -28,17 +31,16 @@ Measurements = dict[str, Measurement]
 
 @dataclass
 class Stopwatch:
-    """Measures the wall time of the parts of a run by replacing methods of instances with wrappers.
+    """Stopwatch for methods. `seconds` is the wall time by part of a run, in the order of the calls of `watch`.
 
-    If a watched method calls another one, the time of the inner call counts for the inner part only. `seconds` is the
-    wall time by part, in the order of the first `watch`.
+    If a watched method calls another watched method, the time of the inner call counts for the inner part only.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)
     _nested_seconds: list[float] = field(default_factory=list)
 
     def watch(self, part: str, instance: object, *methods: str) -> None:
-        """Add the wall time of these methods of `instance` to `part` from now on."""
+        """Replace these methods of `instance` by wrappers that add their wall time to `part`."""
         self.seconds.setdefault(part, 0.0)
         for name in methods:
             setattr(instance, name, self._timed(part, getattr(instance, name)))

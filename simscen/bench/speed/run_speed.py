@@ -1,4 +1,4 @@
-"""Measure the CPU time of a run and of its parts, compared with a baseline: PyBullet alone in the same world."""
+"""Measure the CPU time of a run and of its parts, and of the baseline: PyBullet without simscen in the same world."""
 
 import gc
 import statistics
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,19 +30,27 @@ PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 """Scenario of most speed benchmarks: a robot drives among racks and a moving cart in a hall."""
 SEED = 1
 ProgressCallback = Callable[[str], None]
-"""Receives the name of the current measurement."""
-BEAMS = 720
+"""Function that is called with the name of each measurement at its start."""
+OBSTACLE_FIELD_BEAMS = 720
 """Number of beams of a scan in measure_obstacle_field."""
+
+
+class RunTimes(NamedTuple):
+    """Simulated time, CPU time, and wall time of a run in s."""
+
+    simulated: float
+    cpu: float
+    wall: float
 
 
 @dataclass(frozen=True)
 class PatrolTimes:
-    """CPU times in s of a run of PATROL. The names of the fields are keys of the JSON output.
+    """CPU times in s of runs of PATROL. The names of the fields are keys of the JSON output.
 
     simulated:      simulated time of a run in s
-    cpu, cpus:      whole run: median, and each round
-    parts, parted:  each part of the run by name: median, and each round
-    bare, bares:    PyBullet baseline with the same steps and scans: median, and each round, measured after the run
+    cpu, cpus:      CPU time of a run: median, and value of each round
+    parts, parted:  CPU time of each part of a run by name: median, and value of each round
+    bare, bares:    CPU time of the PyBullet baseline with the same steps and scans: median, and value of each round
     """
 
     simulated: float
@@ -55,12 +63,12 @@ class PatrolTimes:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """CPU time of each run divided by that of the PyBullet baseline."""
+        """CPU time of the run divided by that of the PyBullet baseline, for each round."""
         return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
 
     @property
     def ratio(self) -> float:
-        """Median of `ratios`. It varies less than CPU times, because a slow machine affects both times of a ratio."""
+        """Median of `ratios`."""
         return statistics.median(self.ratios)
 
     @property
@@ -71,9 +79,10 @@ class PatrolTimes:
 
 @dataclass(frozen=True)
 class ObstacleFieldTimes:
-    """CPU times of a scan with BEAMS beams in ms, and of a physics step in µs, among `obstacles` cylinders.
+    """CPU times of a scan in ms and of a physics step in µs among `obstacles` cylinders.
 
-    simscen merges the cylinders into one mesh. The `bare_` times are those of PyBullet with a body for each cylinder.
+    `scan_ms` and `step_us` are measured with one mesh of all cylinders, as in simscen. `bare_scan_ms` and
+    `bare_step_us` are measured in PyBullet with a body for each cylinder.
     """
 
     obstacles: int
@@ -84,17 +93,17 @@ class ObstacleFieldTimes:
 
 
 def no_progress(_: str) -> None:
-    """Ignore the progress (a ProgressCallback)."""
+    """Do nothing. This is the ProgressCallback without output."""
 
 
 def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress) -> PatrolTimes:
-    """Measure `rounds` runs of PATROL with a log, then the parts of half as many more runs."""
+    """Measure `rounds` runs of PATROL and of its baseline, and then the parts of further runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    simulated, *_ = time_run(prepared)  # the first run pays for imports and caches
+    simulated = time_run(prepared).simulated  # the first run pays for imports and caches
     cpus, bares = list[float](), list[float]()
     for number in range(rounds):
         report_progress(f"patrol, round {number + 1} of {rounds}")
-        cpus.append(time_run(prepared)[1])
+        cpus.append(time_run(prepared).cpu)
         bares.append(time_baseline_patrol(prepared, simulated))
     cpu = statistics.median(cpus)
     report_progress("parts of the patrol")
@@ -105,16 +114,19 @@ def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress)
 
 
 def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
-    """Return the CPU time in s of each part: its wall time, scaled to the CPU time `cpu` of a run without stopwatch."""
+    """Return the CPU time in s of each part of a run by name. Their sum is `cpu`, the CPU time of a run in s.
+
+    The parts are measured as wall time, and scaled to CPU time.
+    """
     watch = Stopwatch()
-    _, _, whole = time_run(prepared, watch)
+    whole = time_run(prepared, watch).wall
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
     parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
     return parts
 
 
-def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
-    """Return simulated, CPU, and wall time in s of a run from setup to verdicts. `watch` measures its parts."""
+def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> RunTimes:
+    """Run a scenario, and return the times from setup to verdicts. `watch` measures the parts of the run."""
     gc.collect()
     gc.freeze()  # as the fork server does, so that older objects are not searched for garbage
     previous = gc.get_threshold()
@@ -126,11 +138,14 @@ def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tupl
         cpu, wall = time.process_time() - cpu_start, time.perf_counter() - wall_start
     gc.set_threshold(*previous)
     gc.unfreeze()
-    return run.result.simulated, cpu, wall
+    return RunTimes(run.result.simulated, cpu, wall)
 
 
 def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
-    """Let `watch` measure the parts of a run, including its `listeners`: trace and log. Return no further listeners."""
+    """Let `watch` measure the parts of a run, and return no further listeners.
+
+    `listeners` are those that the run has already: trace (the recorded states) and log.
+    """
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
@@ -148,10 +163,10 @@ def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSi
 
 
 def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
-    """Return the CPU time in s of PyBullet alone for the steps and scans of `simulated` seconds in the same world."""
+    """Return the CPU time in s of the PyBullet baseline for the steps and scans of `simulated` seconds."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     baseline = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
-    directions = _circle(lidar.beams)
+    directions = _unit_vectors(lidar.beams)
     start = time.process_time()
     for _ in range(round(simulated * lidar.rate)):
         baseline.step(round(240 / lidar.rate))
@@ -162,14 +177,14 @@ def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
 
 
 def measure_obstacle_field(obstacles: int) -> ObstacleFieldTimes:
-    """Measure scans and physics steps among cylinders that are as dense as in a BARN world (0.9 per square meter)."""
+    """Measure scans and physics steps among this number of cylinders, with 0.9 cylinders per square meter."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     solids = random_cylinders(obstacles)
     mesh, start, height = merge_solids(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
     rays = RayScene(mesh)
-    planar = _circle(BEAMS)
-    directions = np.column_stack((planar, np.zeros(BEAMS)))
-    origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
+    planar = _unit_vectors(OBSTACLE_FIELD_BEAMS)
+    directions = np.column_stack((planar, np.zeros(OBSTACLE_FIELD_BEAMS)))
+    origins = np.tile([0.0, 0.0, height], (OBSTACLE_FIELD_BEAMS, 1))
     merged = PyBulletBaseline(mesh, prepared.body, start, triangulate)
     separate = PyBulletBaseline(solids, prepared.body, start, triangulate)
     field = ObstacleFieldTimes(
@@ -184,14 +199,14 @@ def measure_obstacle_field(obstacles: int) -> ObstacleFieldTimes:
     return field
 
 
-def _circle(beams: int) -> Array:
-    """Return evenly spaced unit vectors (beams, 2)."""
+def _unit_vectors(beams: int) -> Array:
+    """Return unit vectors (beams, 2) with evenly spaced directions."""
     angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def random_cylinders(count: int) -> list[Solid]:
-    """Return `count` cylinders at random positions, with a radius of 7.5 cm, none within 1 m of the origin."""
+    """Return `count` cylinders with a radius of 7.5 cm at random positions, at least 1 m from the origin."""
     rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
     positions = rng.uniform(-edge, edge, (4 * count + 40, 2))
@@ -202,7 +217,7 @@ def random_cylinders(count: int) -> list[Solid]:
 
 
 def _cpu_per_call(call: Callable[[], Any], times: int) -> float:
-    """Return the CPU seconds of one call, as median of five rounds."""
+    """Return the CPU time in s of one call: the median of five rounds with `times` calls."""
     rounds = []
     for _ in range(5):
         start = time.process_time()

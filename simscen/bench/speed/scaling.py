@@ -1,7 +1,6 @@
-"""Measure how the CPU time per simulated second grows with the size of a scenario.
+"""Measure the CPU time per simulated second of scenarios of different sizes.
 
-`measure_growth` increases one quantity of the scenario PATROL at a time: obstacles, beams, robots, and so on.
-`measure_worlds` measures drives in large worlds.
+`measure_growth` measures variants of the scenario PATROL, `measure_worlds` measures drives in large worlds.
 """
 
 import gc
@@ -32,7 +31,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import save_map
 
 DURATION_S = 15
-"""Simulated time of each run of the patrol."""
+"""Simulated time of each run of PATROL."""
 QUANTITIES = {
     "obstacles": (0, 100, 1000),
     "objects": (20, 100),
@@ -41,15 +40,15 @@ QUANTITIES = {
     "particles": (500, 2000, 8000),
     "robots": (2, 4),
 }
-"""Quantities of the patrol that are varied, and their values."""
+"""Quantities of PATROL and their values. Each variant changes one quantity."""
 ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
 OBJECTS_PER_ROW = 25
-"""Number of added obstacles or objects in a row; the rows are outside of the patrol's hall."""
+"""Number of crates in a row. All rows are outside of the hall of PATROL."""
 UNIT = "ms per simulated second"
 
 
 def measure_growth(rounds: int, report_progress: ProgressCallback = no_progress) -> Measurements:
-    """Return the CPU time per simulated second for each value of QUANTITIES, as the median of `rounds` runs."""
+    """Return the CPU time per simulated second for each value of QUANTITIES. Each is the median of `rounds` runs."""
     figures: Measurements = {}
     with TemporaryDirectory() as folder:
         for quantity, counts in QUANTITIES.items():
@@ -58,13 +57,13 @@ def measure_growth(rounds: int, report_progress: ProgressCallback = no_progress)
                 prepared = prepare(load_scenario(write_scaled_patrol(Path(folder), quantity, count), Path(folder)))
                 time_run(prepared)  # the first run pays for caches
                 runs = [time_run(prepared) for _ in range(rounds)]
-                costs = [1e3 * cpu / simulated for simulated, cpu, _ in runs]
+                costs = [1e3 * run.cpu / run.simulated for run in runs]
                 figures[f"{count} {quantity}"] = Measurement.of(costs, UNIT)
     return figures
 
 
 def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
-    """Write the patrol with `count` of the `quantity` (a key of QUANTITIES), and return the scenario file."""
+    """Write PATROL with the value `count` of a quantity (a key of QUANTITIES), and return the scenario file."""
     text = PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {DURATION_S} s")
     match quantity:
         case "obstacles":
@@ -90,7 +89,10 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
 
 
 def _crates(count: int, extra_keys: str) -> str:
-    """Return the YAML of crates. In `extra_keys`, {end_x} stands for x + 0.2 m of the crate, and {y} for its y."""
+    """Return the YAML of crates. `extra_keys` are further YAML keys of each crate.
+
+    In `extra_keys`, {y} is replaced by the y of the crate, and {end_x} by the x of the crate plus 0.2 m.
+    """
     lines = []
     for number in range(count):
         row, column = divmod(number, OBJECTS_PER_ROW)
@@ -101,7 +103,7 @@ def _crates(count: int, extra_keys: str) -> str:
 
 
 def _robots(count: int) -> str:
-    """Return the YAML of `count` robots that start in a column. Each begins with another goal of the patrol."""
+    """Return the YAML of `count` robots with the goals of PATROL. Each robot starts with a different goal."""
     goals = scenario_goals(load_scenario(PATROL, PATROL.parent).spec)
     poses = [{"x": goal.pose.x, "y": goal.pose.y, "yaw": goal.pose.yaw} for goal in goals]
     robots = {
@@ -121,7 +123,7 @@ STATIC_COUNT, MOVING_COUNT = 4980, 20
 """Numbers of static objects and moving carts in the warehouse."""
 MAP_SIDE_CELLS = 2000
 """Number of cells of 5 cm along each side of the arena's map: 100 x 100 m."""
-SCENARIO = """\
+SCENARIO_TEMPLATE = """\
 simscen: 1
 seed: 1
 world: {world}
@@ -143,7 +145,7 @@ class WorldCost:
     simulated:    simulated time of a run in s
     milliseconds: CPU time per simulated second in ms
     preparing:    CPU time in s to load and prepare the scenario, once for all runs
-    memory:       maximum memory of this process so far in MB
+    memory:       maximum memory of this process since its start in MB
     """
 
     name: str
@@ -156,7 +158,7 @@ class WorldCost:
 
 
 def measure_worlds(rounds: int) -> Iterator[WorldCost]:
-    """Yield the costs of `rounds` runs in each world: a house, a hall, a warehouse, and an arena with a large map."""
+    """Measure `rounds` runs in each world: a house, a hall, a warehouse, and an arena with a large map."""
     with TemporaryDirectory() as folder:
         yield _measure_world("house, patrol of five rooms", HOUSE, rounds)
         yield _measure_world(f"hall, {MOVABLE_COUNT} movable meshes", write_hall(Path(folder, "hall")), rounds)
@@ -172,13 +174,13 @@ def _measure_world(name: str, file: Path, rounds: int) -> WorldCost:
     preparing = time.process_time() - start
     time_run(prepared)  # the first run pays for imports and caches
     runs = [time_run(prepared) for _ in range(rounds)]
-    simulated = runs[0][0]
+    simulated = runs[0].simulated
     return WorldCost(
         name,
         triangles=len(prepared.built.mesh.faces),
         movable=len(prepared.built.world.bodies),
         simulated=simulated,
-        milliseconds=1e3 * statistics.median(cpu for _, cpu, _ in runs) / simulated,
+        milliseconds=1e3 * statistics.median(run.cpu for run in runs) / simulated,
         preparing=preparing,
         memory=_peak_memory_mb(),
     )
@@ -190,7 +192,7 @@ def _peak_memory_mb() -> float:
 
 
 def write_hall(folder: Path) -> Path:
-    """Write a hall of 30 x 20 m as an SDF world; return its scenario file. Its chairs are meshes of 432 triangles."""
+    """Write an SDF world of 30 x 20 m with MOVABLE_COUNT chairs (meshes of 432 triangles); return its scenario file."""
     folder.mkdir()
     for number in range(4):
         (folder / f"mesh_{number}.obj").write_text(_obj_text(_chair(0.4 + 0.05 * number)))
@@ -206,11 +208,11 @@ def write_hall(folder: Path) -> Path:
         )
     )
     (folder / "hall.world").write_text(f'<sdf version="1.7"><world name="hall">{walls}{models}</world></sdf>')
-    return _scenario(folder, "hall.world", ((1.0, 4.0), (25.0, 4.0), (25.0, 12.0), (1.0, 12.0)))
+    return _write_scenario(folder, "hall.world", ((1.0, 4.0), (25.0, 4.0), (25.0, 12.0), (1.0, 12.0)))
 
 
 def _chair(width: float) -> list[Solid]:
-    """Return the parts of a chair: slats of a seat and of a back, and four legs."""
+    """Return the boxes of a chair with this seat width in m: slats of seat and back, and four legs."""
     half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
     parts = [((width, width / 20, 0.04), (0.0, half * offset, 0.46)) for offset in slats]
     parts += [((0.04, width / 20, 0.5), (-half, half * offset, 0.73)) for offset in slats]
@@ -242,10 +244,7 @@ def _box_model(name: str, x: float, y: float, length: float, width: float) -> st
 
 
 def write_warehouse(folder: Path) -> Path:
-    """Write a warehouse of 100 x 100 m with boxes and drums in rows, and moving carts; return its scenario file.
-
-    The aisles are 2.4 m wide, the cross aisle 8 m. Half of the carts move where the robot drives.
-    """
+    """Write a warehouse of 100 x 100 m with rows of boxes and drums, and moving carts; return its scenario file."""
     folder.mkdir()
     rng = np.random.default_rng(12)
     columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
@@ -264,17 +263,17 @@ def write_warehouse(folder: Path) -> Path:
     walls = "  - {name: outer wall, points: [[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]]}"
     lines = ["simscen: 1", "walls:", walls, "obstacles:", *stock, "objects:", *carts]
     (folder / "warehouse.world.yaml").write_text("\n".join(lines) + "\n")
-    return _scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
+    return _write_scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
 
 
 def _box_or_drum(number: int) -> str:
-    """Return the YAML of a box between 0.5 and 0.65 m wide, or of a drum for every fourth number."""
+    """Return the YAML of a drum for every fourth number, otherwise of a box. The width is 0.5 to 0.65 m."""
     width = 0.5 + 0.05 * (number % 4)
     return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 
 
 def write_arena(folder: Path) -> Path:
-    """Write a ROS map of 100 x 100 m with 400 blocks, and noise in 0.5 % of the cells; return its scenario file."""
+    """Write a ROS map of 100 x 100 m with 400 blocks and some single occupied cells; return its scenario file."""
     folder.mkdir()
     rng = np.random.default_rng(7)
     cells = np.full((MAP_SIDE_CELLS, MAP_SIDE_CELLS), FREE, dtype=np.int8)
@@ -287,14 +286,15 @@ def write_arena(folder: Path) -> Path:
     middle = MAP_SIDE_CELLS // 2
     cells[middle - 12 : middle + 12, 60:-60] = FREE
     save_map(OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0)), folder / "arena.yaml")
-    return _scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
+    return _write_scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
 
 
-def _scenario(folder: Path, world: str, waypoints: tuple[tuple[float, float], ...]) -> Path:
+def _write_scenario(folder: Path, world: str, waypoints: tuple[tuple[float, float], ...]) -> Path:
+    """Write a scenario with its start at the first waypoint (x, y), and goals at all others; return the file."""
     goals = ", ".join(
         f"{{pose: {{x: {bx}, y: {by}, yaw: {math.atan2(by - ay, bx - ax):.4f}}}}}"
         for (ax, ay), (bx, by) in pairwise(waypoints)
     )
     file = folder / f"{folder.name}.scenario.yaml"
-    file.write_text(SCENARIO.format(world=world, start=waypoints[0], goals=goals))
+    file.write_text(SCENARIO_TEMPLATE.format(world=world, start=waypoints[0], goals=goals))
     return file

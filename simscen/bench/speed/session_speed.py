@@ -1,4 +1,4 @@
-"""Measure what a run costs besides simulation: setup, process, and external stack. Measure a session with many runs."""
+"""Measure the overhead of runs (setup, process, and external stack), and the time of a session with many runs."""
 
 import gc
 import statistics
@@ -31,7 +31,7 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs
 from simscen.run.simulate import simulate
 
 SHORT_RUN_S = 0.1
-"""Simulated time of a run that consists almost only of overhead."""
+"""Simulated time of the run for `measure_overhead`."""
 WALL_LIMIT_S = 300.0
 """Wall time after which the supervisor ends a measured run."""
 MILLISECONDS, MEGABYTES = "ms", "MB"
@@ -39,16 +39,16 @@ MILLISECONDS, MEGABYTES = "ms", "MB"
 
 @dataclass(frozen=True)
 class Overhead:
-    """Overhead of runs in several rounds, mostly CPU times in ms. The names of the fields are keys of the JSON output.
+    """Overhead of runs, with one value for each round. The names of the fields are keys of the JSON output.
 
-    run:        a run of SHORT_RUN_S in this process
-    outside:    the part of `run` before the first and after the last beat: setup, start and end of the log, verdicts
-    process:    the same run in a process of its own, from the fork on, with its picture
-    wall:       wall time of the run of `process` in ms
-    memory:     maximum memory of the run of `process` in MB
-    preparing:  preparing the scenario (world, map, shortest paths), once for all of its runs
-    start:      importing the modules of the fork server, such as the physics engine, once per session
-    validate:   `simscen validate`
+    run:        CPU time in ms of a run of SHORT_RUN_S in this process
+    outside:    CPU time in ms of the same run outside the simulation: setup, start and end of the log, verdicts
+    process:    CPU time in ms of such a run in its own process, from the fork on, including its picture
+    wall:       wall time in ms of the run in its own process
+    memory:     maximum memory in MB of the run in its own process
+    preparing:  CPU time in ms for preparing the scenario: world, map, and shortest paths
+    start:      CPU time in ms for importing the modules of the fork server
+    validate:   CPU time in ms of `simscen validate`
     """
 
     run: tuple[float, ...]
@@ -62,7 +62,7 @@ class Overhead:
 
     @property
     def figures(self) -> Measurements:
-        """Median of each field by its printed name."""
+        """Median of each field by printed name."""
         return {
             f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, MILLISECONDS),
             "of that outside the simulation": Measurement.of(self.outside, MILLISECONDS),
@@ -76,27 +76,29 @@ class Overhead:
 
 
 class _BeatTimer:
-    """Listener that counts the beats of a run, and measures the CPU time from the end of its setup to the last beat."""
+    """Listener that counts the beats (recorded ticks) of a run, and measures their CPU time."""
 
     def attach(self, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
-        """Start the timer, and return it as a listener of the run."""
+        """Start the timer, and return the timer as a further listener of the run."""
         self.start = self.end = time.process_time()
         self.count = 0
         return (self,)
 
     def append(self, moment: Moment) -> None:
-        """Record the beat at which the moment was recorded."""
+        """Count the beat at which this moment was recorded."""
         self.end = time.process_time()
         self.count += 1
 
     @property
     def duration(self) -> float:
-        """Measured CPU time in ms."""
+        """CPU time from `attach` to the last beat in ms."""
         return 1e3 * (self.end - self.start)
 
 
-def measure_overhead(rounds: int, entry: Sequence[str], report_progress: ProgressCallback = no_progress) -> Overhead:
-    """Measure runs of PATROL of SHORT_RUN_S. `entry` are the Python arguments that start the fork server."""
+def measure_overhead(
+    rounds: int, fork_server_args: Sequence[str], report_progress: ProgressCallback = no_progress
+) -> Overhead:
+    """Measure the overhead of short runs. `fork_server_args` are the arguments of Python that start the fork server."""
     report_progress("overhead of a run")
     with TemporaryDirectory() as folder:
         file = short_patrol(Path(folder))
@@ -114,7 +116,7 @@ def measure_overhead(rounds: int, entry: Sequence[str], report_progress: Progres
         durations = [(_cpu_ms(run), timer.duration) for _ in range(rounds)]
         keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
         jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT_S) for n, key in enumerate(keys)]
-        with Supervisor(1, entry) as supervisor:
+        with Supervisor(1, fork_server_args) as supervisor:
             ends = [
                 end
                 for update in supervisor.run(jobs)
@@ -128,13 +130,13 @@ def measure_overhead(rounds: int, entry: Sequence[str], report_progress: Progres
             wall=tuple(1e3 * end.wall for end in measured),
             memory=tuple(end.peak_bytes / 1e6 for end in measured),
             preparing=tuple(_cpu_ms(lambda: prepare(loaded)) for _ in range(rounds)),
-            start=tuple(_child_cpu_ms("-c", f"import {entry[-1]}") for _ in range(rounds)),
+            start=tuple(_child_cpu_ms("-c", f"import {fork_server_args[-1]}") for _ in range(rounds)),
             validate=tuple(_child_cpu_ms("-m", "simscen", "validate", str(file)) for _ in range(rounds)),
         )
 
 
 def short_patrol(folder: Path, seconds: float = SHORT_RUN_S) -> Path:
-    """Write PATROL with another time limit, and return the scenario file."""
+    """Write PATROL with this time limit, and return the scenario file."""
     file = folder / "short.scenario.yaml"
     file.write_text(PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {seconds} s"))
     return file
@@ -149,7 +151,7 @@ def _cpu_ms(call: Callable[[], object]) -> float:
 
 
 def _child_cpu_ms(*arguments: str) -> float:
-    """Return the CPU time in ms of a Python process with these arguments."""
+    """Return the CPU time in ms of a Python process with these command-line arguments."""
     before = getrusage(RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
     after = getrusage(RUSAGE_CHILDREN)
@@ -157,7 +159,7 @@ def _child_cpu_ms(*arguments: str) -> float:
 
 
 BASELINE_DURATION_S = 60.0
-"""Simulated time of the PyBullet baseline."""
+"""Simulated time of each measurement of the PyBullet baseline."""
 
 
 @dataclass(frozen=True)
@@ -165,13 +167,13 @@ class SuiteResult:
     """Time and memory of a session with one run for each scenario. The names of the fields are keys of the JSON output.
 
     runs:       number of runs
-    unfinished: tests whose run ended with an error
+    unfinished: names of the scenarios and variations with an aborted run
     workers:    number of parallel processes
     simulated:  simulated time of all runs in s
     wall:       wall time of the session in s
     cpu:        CPU time of all runs in s
-    memory:     maximum memory of each run's process in MB
-    bare:       CPU time of the PyBullet baseline per simulated second, mean of one measurement before and one after
+    memory:     maximum memory of the process of each run in MB
+    bare:       CPU time in s of the PyBullet baseline per simulated second
     """
 
     runs: int
@@ -185,7 +187,7 @@ class SuiteResult:
 
     @property
     def figures(self) -> Measurements:
-        """Figures that are printed and compared, by name."""
+        """All figures of the suite by printed name."""
         baseline_s = self.bare * self.simulated
         return {
             "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
@@ -198,7 +200,7 @@ class SuiteResult:
 
 
 def evenly_spaced(scenarios: Sequence[LoadedScenario], max_count: int) -> list[LoadedScenario]:
-    """Return `max_count` scenarios that are evenly spaced in the sequence, or all if there are fewer."""
+    """Return at most `max_count` of the scenarios, evenly spaced in the sequence."""
     if len(scenarios) <= max_count:
         return list(scenarios)
     return [scenarios[number * len(scenarios) // max_count] for number in range(max_count)]
@@ -208,16 +210,19 @@ def measure_suite(
     scenarios: Sequence[LoadedScenario],
     workers: int,
     out: Path,
-    entry: Sequence[str],
+    fork_server_args: Sequence[str],
     report_progress: ProgressCallback = no_progress,
 ) -> SuiteResult:
-    """Measure a session that runs each scenario once. `entry` are the Python arguments that start the fork server."""
+    """Measure a session that runs each scenario once and writes to the folder `out`.
+
+    `fork_server_args` are the arguments of Python that start the fork server.
+    """
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
     baselines = [time_baseline_patrol(patrol, BASELINE_DURATION_S)]
     start = time.perf_counter()
     jobs = plan_jobs(scenarios, SessionOptions(workers=workers), out)
     finished_runs, ends = list[RunFinished](), list[ProcessEnd]()
-    with Supervisor(workers, entry) as supervisor:
+    with Supervisor(workers, fork_server_args) as supervisor:
         for update in supervisor.run(jobs, plugins_of_all(scenarios)):
             if isinstance(update, Ended):
                 finished_runs.append(finished_run(update.job, update.end))
@@ -240,9 +245,9 @@ def measure_suite(
 
 @dataclass(frozen=True)
 class ExternalStackCost:
-    """Mean wall time in µs that a run waits for the stack in each beat, over `cycles` beats.
+    """Mean wall time in µs that a run waits for the stack per beat (recorded tick), over `cycles` beats.
 
-    `in_process_us` is measured with the stack in the process of the run, `external_us` with it in another process.
+    `in_process_us` is for a stack in the process of the run, `external_us` for a stack in another process.
     """
 
     cycles: int
@@ -251,12 +256,12 @@ class ExternalStackCost:
 
     @property
     def ratio(self) -> float:
-        """Waiting time for the external stack divided by that for the stack in the process."""
+        """`external_us` divided by `in_process_us`."""
         return self.external_us / self.in_process_us
 
 
 def measure_external(rounds: int) -> ExternalStackCost:
-    """Run PATROL `rounds` times with the stack in this process, and `rounds` times with it in another process."""
+    """Run PATROL `rounds` times with the stack in this process, and `rounds` times with the stack in another one."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     in_process = [_wait_per_cycle(prepared) for _ in range(rounds)]
     external = [_wait_per_cycle(with_external_reference(prepared)) for _ in range(rounds)]
@@ -266,7 +271,7 @@ def measure_external(rounds: int) -> ExternalStackCost:
 
 
 def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
-    """Return the number of beats of a run, and the mean wall time in µs that it waits for the stack in each beat."""
+    """Return the number of beats of a run, and the mean wall time in µs that the run waits for the stack per beat."""
     watch, timer = Stopwatch(), _BeatTimer()
 
     def attach(setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
