@@ -1,7 +1,7 @@
 """Hooks of the pytest plug-in for scenarios (`pytest --simscen scenarios/`), and the fixture `simscen`.
 
-Every pytest in an environment with simscen loads this plug-in, so it imports and collects nothing unless requested by
---simscen, by `simscen_paths` in the configuration, or by a scenario file on the command line.
+Scenario files are collected with --simscen, below the paths of the ini option `simscen_paths`, and if they are
+arguments of pytest.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from simscen.pytesting.scenario_items import Simscen
 
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
-"""Ends of the names of scenario files."""
+"""Suffixes of scenario files."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the command-line options of the plug-in, and the settings with the same meaning."""
+    """Add the command-line options and ini options of the plug-in."""
     group = parser.getgroup("simscen")
     group.addoption(
         "--simscen",
@@ -65,7 +65,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Return a collector for a requested scenario file, and None for any other file."""
+    """Return a collector for a scenario file that is to be collected; None for any other file."""
     if not file_path.name.endswith(SUFFIXES) or not _is_requested(file_path, parent):
         return None
     from simscen.pytesting.scenario_items import ScenarioFile
@@ -75,6 +75,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _is_requested(file: Path, parent: pytest.Collector) -> bool:
+    """Return whether --simscen, the command line, or the ini option `simscen_paths` requests the scenario file."""
     config = parent.config
     if config.getoption("--simscen") or parent.session.isinitpath(file):
         return True
@@ -83,7 +84,7 @@ def _is_requested(file: Path, parent: pytest.Collector) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Give all workers of xdist the same output folder."""
+    """Pass the output folder to a worker of pytest-xdist, so that all workers use the same folder."""
     from simscen.pytesting.scenario_items import runner_of
 
     node.workerinput[OUT_OPTION] = str(runner_of(node.config).folder)
@@ -91,7 +92,7 @@ def pytest_configure_node(node: Any) -> None:
 
 @pytest.fixture
 def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
-    """Provide `simscen("goal.scenario.yaml", seed=7)`, which runs a scenario and returns its Run."""
+    """Provide a callable that runs a scenario and returns its Run: `simscen("goal.scenario.yaml", seed=7)`."""
     from simscen.pytesting.scenario_items import Simscen
 
     yield Simscen(request.path.parent, tmp_path)

@@ -1,7 +1,4 @@
-"""Collectors and test items of pytest for scenario files: one item per run, named as on the command line.
-
-Each xdist worker has one fork server. All runs of a session write to one output folder.
-"""
+"""Collector and test items of pytest for scenario files, with one item per run, and the callable of the fixture."""
 
 from __future__ import annotations
 
@@ -42,10 +39,10 @@ WALL_LIMIT_S = 300.0
 
 
 class Runner:
-    """Runs scenarios one after the other, each in its own process, and writes their files to `folder`."""
+    """Runs each scenario in its own process, one at a time, and writes logs and pictures to `folder`."""
 
     def __init__(self, folder: Path) -> None:
-        """Create a runner. Its fork server starts with the first run."""
+        """Create a runner without starting a process."""
         self.folder = folder
         self._numbers = count()
         self._supervisor = Supervisor(1, FORK_SERVER)
@@ -58,7 +55,7 @@ class Runner:
         return finished_run(job, ends[0])
 
     def close(self) -> None:
-        """End the fork server."""
+        """End the process from which the runs are forked."""
         self._supervisor.close()
 
 
@@ -66,10 +63,7 @@ _RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 
 
 def runner_of(config: pytest.Config) -> Runner:
-    """Return the runner of this process, which is created at the first call.
-
-    The controller of xdist determines the output folder for all workers.
-    """
+    """Return the runner of this pytest process. The first call creates it."""
     if (runner := config.stash.get(_RUNNER, None)) is None:
         runner = config.stash[_RUNNER] = Runner(_folder(config))
         config.add_cleanup(runner.close)
@@ -77,7 +71,7 @@ def runner_of(config: pytest.Config) -> Runner:
 
 
 def _folder(config: pytest.Config) -> Path:
-    """Return the output folder: that of the controller, or a new one in the configured folder."""
+    """Return the output folder: in a worker of pytest-xdist that of the controller, otherwise a new folder."""
     controller_folder = getattr(config, "workerinput", {}).get(OUT_OPTION)
     if controller_folder is not None:
         return Path(controller_folder)
@@ -86,20 +80,17 @@ def _folder(config: pytest.Config) -> Path:
 
 
 class Simscen:
-    """Value of the fixture `simscen`, which runs scenarios with `simscen.simulate()` in the process of the test.
-
-    Paths are relative to the folder of the test. The logs are written to the temporary folder of the test.
-    """
+    """Value of the fixture `simscen`. Runs scenarios in the process of the test."""
 
     def __init__(self, folder: Path, out: Path) -> None:
-        """Take the folder of the test and the folder for logs."""
+        """Take the folder to which paths of scenarios are relative, and the folder for logs."""
         self._folder, self._out = folder, out
         self._runs = 0
 
     def __call__(
         self, scenario: str | Path, seed: int | None = None, *, stack: str | None = None, variation: str = ""
     ) -> Run:
-        """Run a scenario; the arguments are those of `simscen.simulate`."""
+        """Run a scenario with the arguments of `simscen.simulate`, and return the run."""
         self._runs += 1
         log = self._out / f"run-{self._runs}.mcap"
         return simscen.simulate(self._folder / scenario, seed, log=log, stack=stack, variation=variation)
@@ -112,17 +103,14 @@ class Simscen:
 PYTEST_MARKERS = frozenset(
     {"skip", "skipif", "xfail", "usefixtures", "filterwarnings", "parametrize", "tryfirst", "trylast"}
 )
-"""Built-in markers of pytest. Tags with these names do not become markers."""
+"""Built-in markers of pytest. Tags of scenarios with these names do not become markers."""
 
 
 class ScenarioFile(pytest.File):
-    """Collector of the runs of a scenario file.
-
-    An invalid file is a collection error with the messages of `simscen validate`.
-    """
+    """Collector of the runs of a scenario file."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Yield an item for each variation, seed, and stack."""
+        """Yield an item for each variation, seed, and stack. Raises CollectError for an invalid scenario."""
         try:
             yield from self._items()
         except InvalidInput as error:
@@ -142,23 +130,22 @@ class ScenarioFile(pytest.File):
             for scenario in scenarios:
                 loaded = scenario.with_changes(several_stacks=len(checker.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
-                    every_seed = options.repeat > 1
-                    yield ScenarioRun.create(self, loaded, seed, every_seed)
+                    yield ScenarioRun.create(self, loaded, seed, with_seed=options.repeat > 1)
 
 
 class ScenarioRun(pytest.Item):
     """Test item for one run of a scenario."""
 
     def __init__(self, *, scenario: LoadedScenario, seed: int, **kwargs: Any) -> None:
-        """Take the scenario, the seed, and pytest's arguments."""
+        """Take the scenario, the seed, and the arguments of `pytest.Item`."""
         super().__init__(**kwargs)
         self._scenario, self._seed = scenario, seed
 
     @classmethod
-    def create(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
-        """Create an item with the scenario's tags as markers. With `every_seed`, its name contains the seed."""
+    def create(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, *, with_seed: bool) -> ScenarioRun:
+        """Create an item with the tags of the scenario as markers. The name contains the seed only if `with_seed`."""
         folder = scenario.id.rpartition("/")[0]
-        name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
+        name = short_run_name(scenario.key(seed), with_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
         for tag in ("simscen", *scenario.spec.tags):
             if tag not in PYTEST_MARKERS:
@@ -169,7 +156,7 @@ class ScenarioRun(pytest.Item):
         return item
 
     def runtest(self) -> None:
-        """Run the scenario in its own process. Raises ScenarioFailed unless it passes or fails as expected."""
+        """Run the scenario in its own process. Raises ScenarioFailed if the run fails unexpectedly or is aborted."""
         _raise_errors(world_problems(self._scenario))
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
@@ -179,7 +166,7 @@ class ScenarioRun(pytest.Item):
             raise ScenarioFailed(run)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return the violated criteria with place and time instead of a traceback."""
+        """Return the violated criteria of a failed run, the problems of an invalid scenario, or else the traceback."""
         if isinstance(excinfo.value, ScenarioFailed):
             return failure_representation(excinfo.value.run)
         if isinstance(excinfo.value, InvalidInput):
@@ -187,18 +174,18 @@ class ScenarioRun(pytest.Item):
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """Return file, line, and name."""
+        """Return file, line, and name of the item."""
         return self.path, 0, self.name
 
 
 def _raise_errors(problems: list[Problem]) -> None:
-    """Raise InvalidInput if there are errors. Warnings are ignored; `simscen validate` reports them."""
+    """Raise InvalidInput if there is a problem with severity error. Ignore warnings."""
     if errors := [problem for problem in problems if problem.severity == "error"]:
         raise InvalidInput(errors)
 
 
 def _seed(config: pytest.Config) -> int | None:
-    """Return the seed from the command line or the configuration; None for the scenario's own. Raises UsageError."""
+    """Return the seed from the command line or the ini option; None for the seed of the scenario. Raises UsageError."""
     given = config.getoption("--simscen-seed")
     setting = config.getini("simscen_seed")
     if given is not None or not setting:
@@ -209,14 +196,14 @@ def _seed(config: pytest.Config) -> int | None:
 
 
 def _properties(run: RunFinished) -> list[tuple[str, object]]:
-    """Return the names and values of the JUnit properties of a run."""
+    """Return names and values of the JUnit properties of a run."""
     files = {"log": run.artifacts.mcap, "picture": run.artifacts.picture}
     facts = {"seed": run.key.seed, "simulated_seconds": f"{run.result.simulated:.3f}", "again": run.again, **files}
     return [(name, value) for name, value in facts.items() if value]
 
 
 class ScenarioFailed(AssertionError):
-    """A run failed unexpectedly or could not be completed."""
+    """A run failed unexpectedly or was aborted."""
 
     def __init__(self, run: RunFinished) -> None:
         """Take the finished run."""
@@ -225,18 +212,16 @@ class ScenarioFailed(AssertionError):
 
 
 def failure_representation(run: RunFinished) -> Any:
-    """Return pytest's representation of a failure, with the lines that the command line prints below a failed run.
-
-    The class is not public in pytest, but it is the only form in which xdist sends a failure to the controller.
-    """
+    """Return pytest's representation of a failed run, with the lines that `simscen run` prints for the run."""
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
     first = next((complaint.line for complaint in reported_violations(run) if not complaint.is_warning), 0)
+    # The class is not public in pytest, but it is the only form in which xdist sends a failure to the controller.
     crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
     return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
 
 
 def _cause(run: RunFinished) -> str:
-    """Return the first reason of the failure in one line."""
+    """Return the first cause of the failure in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
     return next((complaint.message for complaint in reported_violations(run) if not complaint.is_warning), "failed")
