@@ -1,4 +1,4 @@
-"""Run the command line with `python -m simscen`, for example if the program `simscen` is not on PATH."""
+"""Entry point of `python -m simscen`, which does the same as the command `simscen`."""
 
 from simscen.cli.start import start
 

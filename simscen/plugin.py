@@ -1,10 +1,10 @@
 """Stable interface for plug-in authors: `from simscen.plugin import PlannerSpec`.
 
-SI units throughout: meters, seconds, radians, m/s, rad/s. The map frame is that of the robot's map; the base frame has
-x forward and y to the left, and yaw is counterclockwise. Arrays are numpy's, float64 unless stated otherwise.
+All quantities have SI units: meters, seconds, radians, m/s, rad/s. Frames follow REP 103 and REP 105: `map`, `odom`,
+and `base_link` with x forward and y to the left. Arrays are numpy arrays of float64 unless stated otherwise.
 
-Each name is imported on first use, so that a specification does not import an engine, and validating a scenario imports
-only specifications. Names that are not listed here can change without notice.
+Each name is imported on first use, so that a specification does not import the physics engine. Names that are not
+listed in `__all__` can change without notice.
 """
 
 from __future__ import annotations
@@ -215,12 +215,7 @@ __all__ = [
 
 _NAMES_BY_MODULE = {
     # Parts of specifications.
-    "simscen.spec.base": (
-        "Spec",
-        "Value",
-        "Ranged",
-        "by_default",
-    ),
+    "simscen.spec.base": ("Spec", "Value", "Ranged", "by_default"),
     "simscen.spec.choice": ("Choice",),
     "simscen.spec.quantities": (
         "Angle",
@@ -258,18 +253,9 @@ _NAMES_BY_MODULE = {
     "simscen.model.localizers": ("LocalizerSpec",),
     "simscen.model.planners": ("PlannerSpec",),
     "simscen.model.stack_base": ("ControllerSpec",),
-    "simscen.model.robot": (
-        "Mount",
-        "SensorSpec",
-    ),
+    "simscen.model.robot": ("Mount", "SensorSpec"),
     "simscen.criteria.base": ("Criterion", "Measure"),
-    "simscen.faults.base": (
-        "FaultEffect",
-        "Fault",
-        "FaultSetting",
-        "FaultTarget",
-        "SensorSimulator",
-    ),
+    "simscen.faults.base": ("FaultEffect", "Fault", "FaultSetting", "FaultTarget", "SensorSimulator"),
     "simscen.triggers.base": ("Condition",),
     "simscen.actions.base": ("Action",),
     # Interfaces of components, and their environment.
@@ -287,95 +273,30 @@ _NAMES_BY_MODULE = {
         "SupportsZones",
     ),
     "simscen.stack.setting": ("Setting",),
-    "simscen.stack.footprint": (
-        "Footprint",
-        "distances",
-    ),
+    "simscen.stack.footprint": ("Footprint", "distances"),
     "simscen.stack.tasks": ("Task",),
     "simscen.stack.moving_obstacles": ("MovingObstacles",),
-    "simscen.sensors.sensor": (
-        "Sensor",
-        "SensorSetting",
-        "SensorView",
-    ),
+    "simscen.sensors.sensor": ("Sensor", "SensorSetting", "SensorView"),
     # Measurements and findings of criteria.
-    "simscen.criteria.findings": (
-        "at_least",
-        "at_most",
-        "counted",
-        "held",
-        "missed",
-        "undecided",
-    ),
-    "simscen.criteria.trace_signals.ground_truth": (
-        "clearance",
-        "drive",
-        "speed",
-        "truth",
-        "turn_rate",
-    ),
+    "simscen.criteria.findings": ("at_least", "at_most", "counted", "held", "missed", "undecided"),
+    "simscen.criteria.trace_signals.ground_truth": ("clearance", "drive", "speed", "truth", "turn_rate"),
     "simscen.criteria.trace_signals.estimation_errors": ("pose_error",),
     # Shared data types.
     "simscen.core.records.case": ("Case",),
     "simscen.core.random_streams": ("Streams",),
-    "simscen.core.records.events": (
-        "Event",
-        "EventKind",
-    ),
-    "simscen.core.geometry": (
-        "Array",
-        "Pose2",
-        "Pose3",
-        "wrap",
-    ),
+    "simscen.core.records.events": ("Event", "EventKind"),
+    "simscen.core.geometry": ("Array", "Pose2", "Pose3", "wrap"),
     "simscen.core.environment.occupancy_grid": ("OccupancyGrid",),
-    "simscen.core.geometry.kinematics": (
-        "STOP",
-        "Twist",
-    ),
-    "simscen.core.messages.navigation": (
-        "Belief",
-        "ErrorCode",
-        "Estimate",
-        "Goal",
-        "Path",
-        "TaskResult",
-    ),
+    "simscen.core.geometry.kinematics": ("STOP", "Twist"),
+    "simscen.core.messages.navigation": ("Belief", "ErrorCode", "Estimate", "Goal", "Path", "TaskResult"),
     "simscen.core.geometry.polygons": ("distance_to_polygon",),
-    "simscen.core.messages.sensor_data": (
-        "Bump",
-        "Image",
-        "Imu",
-        "Odometry",
-        "Reading",
-        "Readings",
-        "Scan",
-    ),
-    "simscen.core.geometry.shapes": (
-        "Body",
-        "MotionPath",
-    ),
-    "simscen.core.stage": (
-        "Effect",
-        "Situation",
-        "Stage",
-    ),
+    "simscen.core.messages.sensor_data": ("Bump", "Image", "Imu", "Odometry", "Reading", "Readings", "Scan"),
+    "simscen.core.geometry.shapes": ("Body", "MotionPath"),
+    "simscen.core.stage": ("Effect", "Situation", "Stage"),
     "simscen.core.clock": ("Clock",),
-    "simscen.core.records.trace": (
-        "CostGrid",
-        "Decision",
-        "Samples",
-        "Trace",
-    ),
-    "simscen.core.records.verdict": (
-        "Evidence",
-        "Finding",
-        "Status",
-    ),
-    "simscen.core.environment.costmap_filters": (
-        "ZoneSwitch",
-        "Zones",
-    ),
+    "simscen.core.records.trace": ("CostGrid", "Decision", "Samples", "Trace"),
+    "simscen.core.records.verdict": ("Evidence", "Finding", "Status"),
+    "simscen.core.environment.costmap_filters": ("ZoneSwitch", "Zones"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES_BY_MODULE.items() for name in names}
 

@@ -1,4 +1,4 @@
-"""Contract tests for planners, controllers, localizers, behaviors, stacks, criteria, faults and other plug-ins.
+"""Contract tests for plug-ins: checks that a component, such as a planner, keeps the promises (rules) of its protocol.
 
     @pytest.mark.parametrize("promise", promises_of(MyPlannerSpec()), ids=str)
     def test_my_planner(promise):
@@ -27,7 +27,7 @@ _MODULES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name on first use, because every start of pytest imports this package."""
+    """Import a name of `__all__` on first use, because every start of pytest imports this package."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""Fakes for tests of triggers, actions, and sensors: a stage that records all changes, and a robot in a square room."""
+"""Fakes for tests of triggers, actions, and sensors, without a simulation."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,10 +22,10 @@ from simscen.model.robot import Differential
 
 @dataclass
 class FakeStage:
-    """Fake of core.stage.Stage, whose situation tests set.
+    """Fake of core.stage.Stage, the interface of triggers and actions to a run.
 
-    Regions that are not in `regions` are squares around the origin. Objects that are not in `objects` are at
-    (0.5, 0.5). `calls` records the calls that would change the world, as tuples of the method and its arguments.
+    Tests set the fields to the situation of the run. `calls` are the recorded calls of methods that would change the
+    world, as tuples of method name and arguments.
     """
 
     tick: int = 0
@@ -45,28 +45,28 @@ class FakeStage:
     calls: list[Any] = field(default_factory=list)
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the newest scan of this lidar, or of any lidar."""
+        """Return the tick of the newest scan of this lidar, or for None of any lidar; None without a scan."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Return no names, because there is a single robot."""
+        """Return no names. The single robot has no name."""
         return ()
 
     def of(self, robot: str) -> "FakeStage":
-        """Return the same stage for all robots."""
+        """Return this stage, for any robot."""
         return self
 
     def region(self, name: str) -> Polygon:
-        """Return the corners of a region."""
+        """Return the corners of a region; without an entry in `regions`, those of a square of 2 m at the origin."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
     def object(self, name: str) -> Pose2 | None:
-        """Return the pose of an object."""
+        """Return the pose of an object; without an entry in `objects`, (0.5, 0.5)."""
         return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the motion of an object."""
+        """Return the entry of an object in `motions`: its path, and the tick at which it started."""
         return self.motions.get(name)
 
     def mass(self, name: str) -> float:
@@ -86,7 +86,7 @@ class FakeStage:
         self.calls.append(("add_pedestrian", walker))
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return True: there is space everywhere."""
+        """Return True for every place."""
         return True
 
     def rng(self, name: str) -> np.random.Generator:
@@ -141,22 +141,25 @@ class FakeStage:
 
 LINEAR_SPEED_M_S, ANGULAR_SPEED_RAD_S = 0.3, 0.2
 ROOM_HALF_WIDTH_M = 4.0
-"""Half of the side length of the room, which is centered on the origin."""
+"""Half of the side length of a square room. The center of the room is the origin."""
 DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
 
 
 class FakeSensorView:
-    """Fake of sensors.sensor.SensorView: a robot that drives a circle, at the time `seconds`, which tests set."""
+    """Fake of sensors.sensor.SensorView, the interface of sensors to the simulation: a robot that drives a circle.
+
+    Tests set the time `seconds`.
+    """
 
     seconds = 0.0
 
     def base_pose(self) -> Pose3:
-        """Return the current pose on a circle around (0, 1.5)."""
+        """Return the pose of the base on a circle around (0, 1.5)."""
         yaw, radius = ANGULAR_SPEED_RAD_S * self.seconds, LINEAR_SPEED_M_S / ANGULAR_SPEED_RAD_S
         return Pose3.planar(Pose2(radius * math.sin(yaw), radius * (1 - math.cos(yaw)), yaw))
 
     def base_velocity(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return the linear and the angular velocity in the world frame, in m/s and rad/s."""
+        """Return linear velocity in m/s and angular velocity in rad/s of the base, both in the world frame."""
         yaw = ANGULAR_SPEED_RAD_S * self.seconds
         return (LINEAR_SPEED_M_S * math.cos(yaw), LINEAR_SPEED_M_S * math.sin(yaw), 0.0), (
             0.0,
@@ -165,7 +168,7 @@ class FakeSensorView:
         )
 
     def placements(self) -> int:
-        """Return 0, the number of times that the robot was placed elsewhere."""
+        """Return 0 as the number of kidnappings of the robot."""
         return 0
 
     def encoders(self) -> tuple[float, ...]:
@@ -175,13 +178,13 @@ class FakeSensorView:
         return tuple(speed * self.seconds / DRIVE.wheel_radius for speed in (left, right))
 
     def touching(self) -> bool:
-        """Return True in every other second."""
+        """Return whether the bumper touches something: in every second with an odd number."""
         return int(self.seconds) % 2 == 1
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Return a gray image with a depth of 2 m, or `far` if that is less."""
+        """Return a gray image, and depths of 2 m or `far`, whichever is less."""
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 
@@ -189,7 +192,7 @@ class SquareRoomRays(RayCaster):
     """Ray caster for the four walls of the room."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Return the ranges (n,) in m, as described in core.geometry.ray_fans.RayCaster."""
+        """Return the ranges (n,) in m of rays from `origins` (n, 3) along `directions` (n, 3); inf beyond `reach`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
         far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)

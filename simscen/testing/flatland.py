@@ -1,6 +1,6 @@
-"""Planar world of boxes and discs, in which a stack can drive a robot without physics.
+"""Planar world of boxes and discs, and simulated drives of a stack in such a world without a physics engine.
 
-Distances and ranges use closed formulas, independent of the tested code, so that tests can compare both.
+Distances and ranges are computed with closed formulas, independent of the tested code.
 """
 
 import math
@@ -22,14 +22,12 @@ from simscen.model.stack import StackSpec
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 
-RATE = 240
-"""Ticks per second."""
-CONTROL_PERIOD, SCAN_PERIOD, ODOMETRY_PERIOD = 12, 24, 6
-"""Periods in ticks: controller at 20 Hz, lidar at 10 Hz, odometry at 40 Hz."""
+TICK_RATE_HZ = 240
+CONTROL_PERIOD_TICKS, SCAN_PERIOD_TICKS, ODOMETRY_PERIOD_TICKS = 12, 24, 6
 
 
 def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> RobotModel:
-    """Return a round robot like a TurtleBot: radius in m, speed in m/s; `limits` are other fields of RobotModel."""
+    """Return a round robot like a TurtleBot. `radius` is in m, `speed` in m/s; `limits` are fields of RobotModel."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     corners = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
     data: dict[str, Any] = {
@@ -43,19 +41,28 @@ def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> Ro
 
 
 def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
-    """Return a rectangular robot like a Jackal; sizes in m, speed in m/s."""
+    """Return a rectangular robot like a Jackal. `length` and `width` are in m, `speed` in m/s."""
     a, b = length / 2, width / 2
     return RobotModel(((a, b), (-a, b), (-a, -b), (a, -b)), None, speed, speed, 0.0, 2.0, 5.0, 5.0, 10.0)
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """Return the Setting of a component that is tested alone; control at 20 Hz, costmap cells of 5 cm, map `grid`."""
-    return Setting(Surroundings(robot, grid, RATE, lidars=("lidar",)), name, Streams(seed), CONTROL_PERIOD / RATE, 0.05)
+    """Return the Setting with which a component `name` is built: control at 20 Hz, costmap cells of 5 cm.
+
+    `grid` is the map; None for mapless navigation.
+    """
+    return Setting(
+        Surroundings(robot, grid, TICK_RATE_HZ, lidars=("lidar",)),
+        name,
+        Streams(seed),
+        CONTROL_PERIOD_TICKS / TICK_RATE_HZ,
+        0.05,
+    )
 
 
 @dataclass
 class Flatland:
-    """World of boxes (min x, min y, max x, max y) and discs (x, y, radius) in m, which can change during a drive."""
+    """World of boxes (min x, min y, max x, max y) and discs (x, y, radius) in m. A drive can change both."""
 
     boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
     discs: list[tuple[float, float, float]] = field(default_factory=list)
@@ -79,7 +86,7 @@ class Flatland:
         return OccupancyGrid(cells, resolution, Pose2(bounds[0], bounds[1]))
 
     def distance(self, points: Array) -> Array:
-        """Return signed distances (n,) from points (n, 2) to the nearest surface; negative inside obstacles."""
+        """Return signed distances (n,) in m from points (n, 2) to the nearest surface; negative inside obstacles."""
         result = np.full(len(points), np.inf)
         for ax, ay, bx, by in self.boxes:
             dx = np.maximum(ax - points[:, 0], points[:, 0] - bx)
@@ -93,7 +100,7 @@ class Flatland:
         return result
 
     def cast(self, origin: tuple[float, float], angles: Array) -> Array:
-        """Return the distances (n,) from `origin` along rays at world `angles` (n,); inf without a hit."""
+        """Return ranges (n,) in m of rays from `origin` (x, y) at world `angles` (n,) in rad; inf without a hit."""
         c, s = np.cos(angles), np.sin(angles)
         best = np.full(len(angles), np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -110,7 +117,7 @@ class Flatland:
         return best
 
     def clearance(self, robot: RobotModel, pose: Pose2) -> float:
-        """Return the distance from the robot's footprint to the nearest surface; zero or negative in contact."""
+        """Return the distance in m from the robot's footprint to the nearest surface; 0 or negative in contact."""
         if robot.radius is not None:
             return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
         corners = np.array(robot.footprint)
@@ -121,10 +128,18 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """Simulated drive of a robot that a stack controls, with ideal odometry and a noisy lidar.
+    """Simulated drive of a robot with a stack, perfect odometry, and a noisy lidar.
 
-    `blind` stops the scans, `noise` is the standard deviation of ranges in m, and `odometry` contains the names of the
-    odometry sensors. `log` contains the events so far, `track` the true poses, and `min_clearance` is in m.
+    world:      obstacles
+    pose:       true pose
+    noise:      standard deviation of ranges in m
+    range_max:  maximum range of the lidar in m
+    twist:      true velocity in the base frame
+    is_blind:   whether the lidar returns no scans
+    odometry:   names of the odometry sensors
+
+    The recorded values are `log` (events of the stack), `track` (true poses), `commands`, `plans`, and `min_clearance`
+    (minimum clearance in m).
     """
 
     world: Flatland
@@ -137,7 +152,7 @@ class Drive:
     range_max: float = 12.0
     tick: int = 0
     twist: Twist = STOP
-    blind: bool = False
+    is_blind: bool = False
     odometry: tuple[str, ...] = ("ground_truth", "odom")
 
     def __post_init__(self) -> None:
@@ -149,31 +164,31 @@ class Drive:
         self.min_clearance = math.inf
 
     def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
-        """Continue for some seconds, or until an event of the kind `until` ("" = no event). Return the drive itself."""
-        end = self.tick + round(seconds * RATE)
+        """Simulate these seconds, or until an event of the kind `until` ("" for no event). Return this drive."""
+        end = self.tick + round(seconds * TICK_RATE_HZ)
         while self.tick < end:
             if any(event.kind == until for event in self.step()):
                 break
         return self
 
     def step(self) -> tuple[Event, ...]:
-        """Simulate one odometry period, and return the events of the stack."""
+        """Simulate one odometry period, and return the events that the stack reports."""
         readings: list[Reading] = []
-        if self.tick % ODOMETRY_PERIOD == 0:
+        if self.tick % ODOMETRY_PERIOD_TICKS == 0:
             readings += [Odometry(name, self.tick, self.pose, self.twist) for name in self.odometry]
-        if self.tick % SCAN_PERIOD == 0 and not self.blind:
+        if self.tick % SCAN_PERIOD_TICKS == 0 and not self.is_blind:
             readings.append(self.scan())
         decision = self.stack.decide(self.tick, tuple(readings))
         self.log += decision.events
         self.commands.append(decision.command)
         if decision.plan is not None:
             self.plans.append(decision.plan)
-        self._move(decision.command, ODOMETRY_PERIOD / RATE)
-        self.tick += ODOMETRY_PERIOD
+        self._move(decision.command, ODOMETRY_PERIOD_TICKS / TICK_RATE_HZ)
+        self.tick += ODOMETRY_PERIOD_TICKS
         return decision.events
 
     def scan(self) -> Scan:
-        """Return the scan of the lidar at the current pose."""
+        """Return the noisy scan at the current pose."""
         full = self.field_of_view >= 2 * math.pi - 1e-9
         step = self.field_of_view / (self.beams if full else self.beams - 1)
         first = -self.field_of_view / 2
@@ -184,6 +199,7 @@ class Drive:
         return Scan("lidar", self.tick, ranges, first, step, 0.05, self.range_max)
 
     def _move(self, command: Twist, dt: float) -> None:
+        """Move the robot by `dt` seconds within its acceleration limits."""
         r = self.robot
         limit = r.linear_deceleration if abs(command.vx) < abs(self.twist.vx) else r.linear_acceleration
         vx = self.twist.vx + np.clip(command.vx - self.twist.vx, -limit * dt, limit * dt)
@@ -201,7 +217,7 @@ class Drive:
         self.min_clearance = min(self.min_clearance, self.world.clearance(self.robot, self.pose))
 
     def events_of_kind(self, kind: str) -> list[Event]:
-        """Return the events of a kind."""
+        """Return the events of this kind so far."""
         return [event for event in self.log if event.kind == kind]
 
     @property
@@ -221,15 +237,15 @@ def drive(
     stop_on_failure: bool = True,
     **options: Any,
 ) -> Drive:
-    """Return a drive before its first step; by default of the reference stack with true poses.
+    """Return a drive to the goals before its first step. By default, the reference stack drives with true poses.
 
-    Without `grid`, the robot has no map. `options` are fields of Drive.
+    `grid` is the map; None for mapless navigation. `options` are fields of Drive.
     """
     from simscen.stack.build import build_stack
 
     robot = robot or round_robot()
     spec = spec or StackSpec(localizer=GroundTruth(type="ground_truth"))
-    surroundings = Surroundings(robot, grid, RATE, lidars=("lidar",))
-    stack = build_stack(spec, surroundings, Streams(seed), Clock(RATE), stop_on_failure=stop_on_failure)
+    surroundings = Surroundings(robot, grid, TICK_RATE_HZ, lidars=("lidar",))
+    stack = build_stack(spec, surroundings, Streams(seed), Clock(TICK_RATE_HZ), stop_on_failure=stop_on_failure)
     stack.start(Estimate(start), goals)
     return Drive(world, robot, stack, start, **options)

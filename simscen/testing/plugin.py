@@ -1,6 +1,6 @@
 """Plug-in of pytest: `pytest --simscen-contract my_package:MyPlanner` checks all promises of a component.
 
-Every pytest in an environment with simscen loads the plug-in, so it imports the package only if the option is given.
+A promise is one rule of the component's protocol, such as "the same seed gives the same path".
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
-"""Plug-in that collects scenario files, loaded by name because this package must not import simscen.pytesting."""
+"""Further plug-in, which collects scenario files. This package must not import it."""
 
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options."""
+    """Add the options --simscen-contract and --simscen-contract-limit."""
     group = parser.getgroup("simscen", "contracts of simscen's plug-ins")
     group.addoption(
         "--simscen-contract",
@@ -43,7 +43,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Find the promises of the targets. Without paths on the command line, only these promises are tested."""
+    """Find the promises of all --simscen-contract targets. If the command line has no paths, test nothing else.
+
+    Raises UsageError for an invalid target.
+    """
     targets: list[str] = config.getoption("--simscen-contract")
     if not targets:
         return
@@ -59,11 +62,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Add one item for each promise before other plug-ins select items."""
+    """Add one test item for each promise before other plug-ins select items."""
     items.extend(_items(session, config.stash.get(_PROMISES, []), config.getoption("--simscen-contract-limit")))
 
 
 def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:
+    """Yield the items of the promises, below one collector for each component. `limit` is in s."""
     for subject in dict.fromkeys((promise.role, promise.subject) for promise in promises):
         title = f"{subject[0]} {subject[1]}"
         node = SubjectCollector.from_parent(session, name=title, nodeid=title)
@@ -73,10 +77,10 @@ def _items(session: pytest.Session, promises: list[Promise], limit: float) -> It
 
 
 class SubjectCollector(pytest.Collector):
-    """Collector of the promises of one subject."""
+    """Parent of the items of one component."""
 
     def collect(self) -> list[pytest.Item]:
-        """Return nothing, because `pytest_collection_modifyitems` adds the items."""
+        """Return no items, because `pytest_collection_modifyitems` adds them."""
         return []
 
 
@@ -88,11 +92,11 @@ class PromiseItem(pytest.Item):
         self._promise, self._limit = promise, limit
 
     def runtest(self) -> None:
-        """Check the promise."""
+        """Check the promise within the limit. Raises PromiseBroken."""
         self._promise.check(self._limit)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return the observation, the promise, and the traceback of an exception of the component."""
+        """Return what was observed, what is promised, and the traceback if the component raised an exception."""
         from simscen.testing.contracts.base import PromiseBroken
 
         if not isinstance(excinfo.value, PromiseBroken):
@@ -103,5 +107,5 @@ class PromiseItem(pytest.Item):
         return "\n".join(lines).rstrip()
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """Return the promise as a sentence."""
+        """Return file, no line, and the promise as a sentence."""
         return self.path, None, f"{self._promise.role} {self._promise}"

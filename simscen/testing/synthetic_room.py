@@ -1,7 +1,4 @@
-"""Computed drives of a robot through an asymmetric room, with noisy sensors, for tests of localizers.
-
-The truth and the perfect scans of a drive are computed once, without physics. Each seed only changes the noise.
-"""
+"""Computed drives of a robot through one asymmetric room, with noisy sensors, for tests of localizers."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -19,25 +16,26 @@ from simscen.model.localizers import LocalizerSpec
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 
-TICK_RATE_HZ, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
-"""Ticks per second, and periods in ticks: odometry at 40 Hz, scans at 10 Hz."""
-READINGS_PER_SCAN = SCAN_PERIOD // ODOMETRY_PERIOD
+TICK_RATE_HZ, ODOMETRY_PERIOD_TICKS, SCAN_PERIOD_TICKS = 240, 6, 24
+READINGS_PER_SCAN = SCAN_PERIOD_TICKS // ODOMETRY_PERIOD_TICKS
+"""Number of odometry readings per scan."""
 RANGE_MAX_M, BEAMS = 12.0, 360
+"""Maximum range and number of beams of the lidar."""
 BOXES = np.array([
     (-5.07, -4.03, 5.12, -3.87), (-5.07, 3.91, 5.12, 4.06), (-5.07, -4.03, -4.88, 4.06), (4.93, -4.03, 5.12, 4.06),
     (-1.13, 1.62, -0.88, 4.06), (-5.07, -0.52, -3.31, -0.29), (2.21, -2.44, 3.02, -1.17), (1.37, 2.73, 2.96, 3.34),
     (-2.52, -4.03, -1.49, -3.06), (3.58, 0.71, 4.93, 1.29), (-3.52, 2.18, -3.07, 2.61),
 ])  # fmt: skip
-"""Boxes (left, bottom, right, top) in m: four walls of different thickness, then furniture."""
+"""Boxes (left, bottom, right, top) in m: four outer walls, and obstacles in the room."""
 WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
-"""Corners (x, y) in m of the closed route of a drive."""
+"""Waypoints (x, y) in m of a drive, which returns from the last to the first one."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
 
 
 @cache
 def grid(resolution: float = 0.05) -> OccupancyGrid:
-    """Return the map of the room. A cell is occupied if it touches an obstacle, as in a map from SLAM."""
+    """Return the map of the room with cells of `resolution` in m. Cells that touch an obstacle are occupied."""
     x = np.arange(-5.2 + resolution / 2, 5.2, resolution)
     y = np.arange(-4.2 + resolution / 2, 4.2, resolution)[:, None]
     half = resolution / 2
@@ -47,7 +45,7 @@ def grid(resolution: float = 0.05) -> OccupancyGrid:
 
 
 def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
-    """Return exact ranges (n, b) from `poses` (n, 3) along `angles` (b,) to boxes, with the slab method."""
+    """Return exact ranges (n, b) in m to boxes, by the slab method. `poses` (n, 3) and beam `angles` (b,) in rad."""
     heading = poses[:, 2:] + angles
     with np.errstate(divide="ignore"):
         inverse = 1 / np.stack((np.cos(heading), np.sin(heading)), axis=-1)
@@ -61,10 +59,11 @@ def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class RoomDrive:
-    """Drive through the room, sampled at 40 Hz from tick 0.
+    """Drive through the room from tick 0, without noise.
 
-    `truth` (k, 3) are the true poses, `steps` (k, 3) the motion to each pose from the previous one in its base frame,
-    and `ranges` (k / 4, 360) the perfect scans at 10 Hz.
+    truth:  true poses (k, 3) at 40 Hz
+    steps:  motions (k, 3) from the previous pose to each pose, in the base frame of the previous pose; 0 for the first
+    ranges: exact ranges (k / 4, 360) of the scans at 10 Hz
     """
 
     truth: Array
@@ -73,7 +72,7 @@ class RoomDrive:
 
 
 def drive_along(truth: Array) -> RoomDrive:
-    """Return the drive along true poses (k, 3), with its perfect scans."""
+    """Return the drive along true poses (k, 3) at 40 Hz."""
     poses = [Pose2(*row) for row in truth]
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS, dtype=np.float64)
@@ -82,8 +81,8 @@ def drive_along(truth: Array) -> RoomDrive:
 
 @cache
 def drive(seconds: float, first: int = 0) -> RoomDrive:
-    """Return a drive along the waypoints at up to 0.5 m/s and 1 rad/s, from the waypoint with the index `first`."""
-    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE_HZ, Pose2(*WAYPOINTS[first], 0.0), first + 1
+    """Return a drive along WAYPOINTS at up to 0.5 m/s and 1 rad/s. `first` is the index of the start waypoint."""
+    dt, pose, goal = ODOMETRY_PERIOD_TICKS / TICK_RATE_HZ, Pose2(*WAYPOINTS[first], 0.0), first + 1
     truth = [pose]
     for _ in range(round(seconds / dt)):
         waypoint = Pose2(*WAYPOINTS[goal % len(WAYPOINTS)])
@@ -97,12 +96,12 @@ def drive(seconds: float, first: int = 0) -> RoomDrive:
 
 
 def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
-    """Return the surroundings of a stack in the room, with the map `room` (default: `grid()`)."""
+    """Return the robot, map, and tick rate for a localizer. `room` is the map, by default `grid()`."""
     return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE_HZ)
 
 
 def build_localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
-    """Build a localizer in the room that starts from the estimate."""
+    """Build the localizer of a specification for the room, with this initial pose estimate."""
     setting = Setting(surroundings(), "localizer", Streams(seed), estimate=estimate)
     localizer: Localizer = spec.implementation()(spec, setting)
     return localizer
@@ -110,7 +109,15 @@ def build_localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Local
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of lidar ranges, odometry, and IMU; units and meanings as in the sensors of model.robot."""
+    """Standard deviations of sensor errors.
+
+    lidar:                 ranges in m
+    translation:           odometry distance in m per root meter driven
+    rotation:              odometry yaw in rad per root radian turned
+    drift:                 odometry yaw in rad per root meter driven
+    gyro:                  yaw rate in rad/s
+    gyro_bias:             constant error of the yaw rate in rad/s
+    """
 
     lidar: float = 0.01
     translation: float = 0.01
@@ -126,28 +133,31 @@ DEFAULT_NOISE = Noise()
 def run_localizer(
     subject: Localizer, drive: RoomDrive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
 ) -> list[Belief]:
-    """Send noisy readings of the drive to a localizer, with `imu` also yaw rates; return its belief after each pose."""
+    """Send noisy readings of the drive to a localizer, and return the belief (pose estimate) after each odometry.
+
+    With `imu`, the localizer also receives yaw rates.
+    """
     rng, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX_M, np.round(ranges, 3), np.inf)
     odometry, bias = Pose2(0, 0, 0), rng.normal(0, noise.gyro_bias)
     for row, step in enumerate(drive.steps):
-        tick, distance = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
+        tick, distance = row * ODOMETRY_PERIOD_TICKS, float(np.hypot(step[0], step[1]))
         heading_std = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * distance)
         scale = 1 + rng.normal() * noise.translation * np.sqrt(distance) / max(distance, 1e-9)
         odometry = odometry.compose(Pose2(step[0] * scale, step[1] * scale, step[2] + rng.normal() * heading_std))
         if imu and row:
-            rate = step[2] * TICK_RATE_HZ / ODOMETRY_PERIOD + bias + rng.normal() * noise.gyro
+            rate = step[2] * TICK_RATE_HZ / ODOMETRY_PERIOD_TICKS + bias + rng.normal() * noise.gyro
             subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
         subject.on_odometry(Odometry("odom", tick, odometry, Twist()))
-        if tick % SCAN_PERIOD == 0:
-            subject.on_scan(scan(ranges[tick // SCAN_PERIOD], tick))
+        if tick % SCAN_PERIOD_TICKS == 0:
+            subject.on_scan(scan(ranges[tick // SCAN_PERIOD_TICKS], tick))
         beliefs.append(subject.belief)
     return beliefs
 
 
 def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
-    """Return a scan of 360 degrees by a lidar at the center of the robot; `changes` are other fields of Scan."""
+    """Return a scan over 360 degrees of a lidar at the origin of the base frame. `changes` are other fields of Scan."""
     defaults = {
         "angle_min": -np.pi,
         "angle_increment": 2 * np.pi / max(len(ranges), 1),
@@ -158,12 +168,12 @@ def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
 
 
 def pose_errors(beliefs: list[Belief], truth: Array) -> Array:
-    """Return the errors (k, 3) in x, y, and yaw of the beliefs in the map frame; headings are wrapped."""
+    """Return the errors (k, 3) of beliefs in x and y in m and yaw in rad, in the map frame. Yaw errors are wrapped."""
     error: Array = np.array([belief.pose for belief in beliefs]) - truth
     error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
     return error
 
 
 def nees(belief: Belief, error: Array) -> float:
-    """Return the NEES of a belief with the pose error (3,) (Bar-Shalom et al. 2001, section 5.4)."""
+    """Return the NEES of a belief with this pose error (3,); see Bar-Shalom et al. 2001, section 5.4."""
     return float(error @ np.linalg.solve(belief.covariance, error))

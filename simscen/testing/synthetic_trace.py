@@ -1,4 +1,4 @@
-"""Traces and cases built from short descriptions, for golden cases and the documentation of criteria."""
+"""Traces (recorded states of a run) and cases (what the scenario tells criteria), built from short descriptions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,27 +12,26 @@ from simscen.core.records.case import CLEARANCE_RANGE_M, Case, Passage
 from simscen.core.records.events import Disturbance, Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
-TICK_RATE_HZ, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
-"""Ticks per second, and periods in ticks."""
+TICK_RATE_HZ, TRUTH_PERIOD_TICKS, SCAN_PERIOD_TICKS, BELIEF_PERIOD_TICKS = 240, 6, 24, 24
 
 
 def synthetic_trace(description: Mapping[str, Any]) -> Trace:
-    """Return a trace with 240 ticks per second, truth at 40 Hz, scans and belief at 10 Hz.
+    """Return a trace with true poses at 40 Hz, and scans and beliefs at 10 Hz.
 
-    Keys of the description, with times t in seconds:
+    Keys of the description, with times t in s:
 
     seconds:    duration
-    truth:      waypoints [t, x, y, yaw]; between them, straight lines at constant speed
-    belief:     waypoints, or {offset: [dx, dy, dyaw]} from the truth, or null for none
+    truth:      true poses as waypoints [t, x, y, yaw], which are interpolated linearly
+    belief:     estimated poses as waypoints, or {offset: [dx, dy, dyaw]} from the true poses, or null without beliefs
     clearance:  list of [t, meters], or one number
-    scans:      intervals [from, to] with scans
+    scans:      intervals [from, to] of t with scans
     events:     list of [t, kind, name, {data}]
     plans:      list of [t, [[x, y], …]]
     objects:    {name: waypoints}
-    ended:      why the run ended; null for a truncated log
+    ended:      reason why the run ended; null for a truncated log
     """
     end = round(description["seconds"] * TICK_RATE_HZ)
-    ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
+    ticks = np.arange(0, end + 1, TRUTH_PERIOD_TICKS, dtype=np.int64)
     truth = _poses_at(description["truth"], ticks)
     return Trace(
         tick_rate=TICK_RATE_HZ,
@@ -53,7 +52,7 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
 
 
 def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
-    """Return x, y, yaw at `ticks`, interpolated between waypoints [t, x, y, yaw]; headings turn the shorter way."""
+    """Return x, y, yaw at `ticks`, interpolated between waypoints [t, x, y, yaw]. Yaw turns the shorter way."""
     points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
     times = ticks / TICK_RATE_HZ
     columns = [np.interp(times, points[:, 0], points[:, axis]) for axis in (1, 2)]
@@ -62,7 +61,7 @@ def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
 
 
 def _velocity(truth: Samples) -> Array:
-    """Return vx, vy, wz in the base frame over the step after each sample; the last value is repeated."""
+    """Return velocities (n, 3) vx, vy, wz in the base frame from each sample to the next. The last one is repeated."""
     if len(truth) < 2:
         return np.zeros((len(truth), 3))
     step = np.diff(truth.ticks) / TICK_RATE_HZ
@@ -76,7 +75,7 @@ def _velocity(truth: Samples) -> Array:
 def _belief(description: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
     if description is None:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
-    ticks = np.arange(0, end + 1, BELIEF_PERIOD, dtype=np.int64)
+    ticks = np.arange(0, end + 1, BELIEF_PERIOD_TICKS, dtype=np.int64)
     if isinstance(description, Mapping):
         poses = _poses_at(truth, ticks).values + np.array(description["offset"], dtype=np.float64)
     else:
@@ -91,7 +90,7 @@ def _clearance(values: Any, ticks: Ticks) -> Samples:
 
 
 def _scans(intervals: Sequence[Sequence[float]], end: int) -> Ticks:
-    ticks = np.arange(0, end + 1, SCAN_PERIOD, dtype=np.int64)
+    ticks = np.arange(0, end + 1, SCAN_PERIOD_TICKS, dtype=np.int64)
     has_scan = np.zeros(len(ticks), dtype=bool)
     for begin, until in intervals:
         has_scan |= (ticks >= begin * TICK_RATE_HZ) & (ticks <= until * TICK_RATE_HZ)
@@ -108,7 +107,7 @@ def _events(description: Mapping[str, Any], end: int) -> tuple[Event, ...]:
 
 
 def _path_points(points: Sequence[Sequence[float]]) -> Array:
-    """Return the points (n, 3) of a path with the heading of each segment; the last heading is repeated."""
+    """Return the poses (n, 3) of a path through points [x, y]. Yaw is the direction to the next point."""
     xy = np.array(points, dtype=np.float64)[:, :2]
     steps = np.diff(xy, axis=0)
     yaw = np.arctan2(steps[:, 1], steps[:, 0])
@@ -116,13 +115,13 @@ def _path_points(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:
-    """Return a case. Keys of the description are fields of Case, of which these are converted:
+    """Return a case. Keys of the description are fields of Case. These fields are converted:
 
     start:         [x, y, yaw]
-    goals, sent:   list of {name, pose: [x, y, yaw], and other fields of Goal}
-    passages:      list of [goal, end [x, y], end [x, y], name of a solid, name of the other solid]
+    goals, sent:   list of {name, pose: [x, y, yaw], other fields of Goal}
+    passages:      list of [goal, end [x, y], other end [x, y], name of one solid, name of the other solid]
     masks:         {file: {resolution, origin: [x, y, yaw], blocks: list of [column, row, width, height, value]}}
-    disturbances:  list of {name, kind, and other fields of Disturbance}
+    disturbances:  list of {name, kind, other fields of Disturbance}
     """
     goals, sent = (
         tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in description.get(key, []))

@@ -1,4 +1,4 @@
-"""Find the contracts and promises of a plug-in, given its specification, its class, or the name of its entry point."""
+"""Contracts (sets of promises) and promises (rules of a protocol) of a component."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from simscen.testing.flatland import box_robot, round_robot
 from simscen.triggers.base import Condition
 
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
-"""Default robots for planners, controllers, and behaviors, by name: 0.44 m wide, and 0.42 m by 0.31 m."""
+"""Robots by name for the contracts of planners, controllers, and behaviors."""
 
 _CONTRACTS_PER_ROBOT: dict[type, Callable[..., Contract]] = {
     PlannerSpec: PlannerContract,
@@ -58,14 +58,14 @@ _CONTRACTS: dict[type, Callable[..., Contract]] = {
 
 
 class InvalidTarget(Exception):
-    """A target cannot be tested; the message gives the reason."""
+    """A target of --simscen-contract cannot be tested; the message gives the reason."""
 
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
-    """Return the contracts of a specification: one for each robot if it is a planner, controller, or behavior.
+    """Return the contracts of the component of a specification: one per robot for planners, controllers, and behaviors.
 
-    `subject` is the name of the component in reports, and `robots` are robots by name, ROBOTS by default. Raises
-    InvalidTarget.
+    `subject` is the name of the component in reports. `robots` are robots by name, by default ROBOTS. Raises
+    InvalidTarget if `spec` is not a specification.
     """
     for kind, contract in _CONTRACTS_PER_ROBOT.items():
         if isinstance(spec, kind):
@@ -80,29 +80,27 @@ def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | N
 
 
 def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
-    """Return all promises of the component of a specification.
-
-    `spec` is the specification of a planner, controller, localizer, behavior, goal checker, stack, criterion, fault,
-    trigger, action, sensor, or metric. The other parameters are those of `contracts_of`.
-    """
+    """Return all promises of the component of a specification. The parameters are those of `contracts_of`."""
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
 
 def promises_of_target(target: str) -> list[Promise]:
-    """Return the promises of a target: `package.module:Class`, or the name of an entry point.
+    """Return the promises of a target of --simscen-contract. Raises InvalidTarget.
 
-    The class is a specification, or a component whose first argument is one. Values of the specification follow as
-    JSON after `=`: `my_planner={"weight": 2}`. Raises InvalidTarget.
+    A target is `package.module:Class` or the name of an entry point. Values of the specification can follow as JSON
+    after `=`, as in `my_planner={"weight": 2}`.
     """
     component, _, values_json = target.partition("=")
     try:
         values = json.loads(values_json) if values_json else {}
     except ValueError as error:
         raise InvalidTarget(f"{target}: {values_json} is not valid JSON: {error}") from error
-    return [each for model in _models(component) for each in promises_of(_instance(model, values, target), component)]
+    specs = [_instance(spec_class, values, target) for spec_class in _specification_classes(component)]
+    return [each for spec in specs for each in promises_of(spec, component)]
 
 
-def _models(component: str) -> Sequence[Any]:
+def _specification_classes(component: str) -> Sequence[Any]:
+    """Return the specification classes of `package.module:Class`, or of all entry points with this name."""
     if ":" in component:
         return [specification_of(_import_class(component), component)]
     entries = [entry for group in GROUPS if (entry := find(group, component)) is not None]
@@ -129,9 +127,9 @@ def _import_class(component: str) -> Any:
 
 
 def specification_of(component_class: Any, component: str) -> Any:
-    """Return a class if it is a specification, otherwise the specification class that its constructor takes first.
+    """Return the class itself if it is a specification, otherwise the annotated type of its first argument.
 
-    Raises InvalidTarget, whose message names the class as `component`.
+    `component` is the name of the class in messages. Raises InvalidTarget if this type is not a specification.
     """
     if not inspect.isclass(component_class):
         raise InvalidTarget(f"{component} is not a class")
@@ -147,6 +145,7 @@ def specification_of(component_class: Any, component: str) -> Any:
 
 
 def _instance(model: Any, values: Any, target: str) -> Any:
+    """Return the specification with these values. `target` is for messages. Raises InvalidTarget."""
     if not isinstance(values, dict) and not issubclass(model, RootModel):
         raise InvalidTarget(f"{target}: {json.dumps(values)} is not a JSON object")
     try:

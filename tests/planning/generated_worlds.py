@@ -12,7 +12,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 ROBOT = round_robot()
 MOVES = [(a, b) for a in range(4) for b in range(-3, 4) if math.gcd(a, b) == 1 and (a > 0 or b > 0)]
@@ -114,7 +114,7 @@ def costmap_of(
     """Return the costmap of a world between (0, 0) and (width, height); `options` are those of its specification."""
     bounds = (-0.5, -0.5, math.ceil(width) + 0.5, math.ceil(height) + 0.5)
     spec = CostmapSpec(resolution=resolution, **options)
-    return LayeredCostmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
+    return LayeredCostmap(spec, Surroundings(robot, world.grid(bounds, resolution), TICK_RATE_HZ)).view
 
 
 def random_query(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> tuple[Pose2, Pose2]:

@@ -18,7 +18,7 @@ from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, Planner, Surroundings
-from simscen.testing.flatland import RATE, Flatland
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland
 
 WORLDS = {"rooms": rooms, "forest": forest, "maze": maze}
 
@@ -92,7 +92,7 @@ def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, see
 @pytest.mark.slow
 def test_path_through_a_50_m_maze_is_found() -> None:
     """Regression: too many samples for the iterations of one search gave NO_VALID_PATH."""
-    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), TICK_RATE_HZ)).view
     path = medial_axis().plan(view, Pose2(0.7, 0.7), Pose2(53.3, 53.3), 1)
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     assert np.isfinite(rates.at(path.points[:, :2])).all()
@@ -108,7 +108,7 @@ def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
     """
     monkeypatch.setattr(informed_set, "MAX_COST_BLOCKS", 2500)
     monkeypatch.setattr(search_regions, "MAX_SAMPLES", 300)
-    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), TICK_RATE_HZ)).view
     rates, start, goal = TraversalCosts(view, ROBOT, 2.0, True), Pose2(0.7, 0.7), Pose2(14.15, 14.15)
     optimum = cheapest_cost(rates, start, goal)
     for seed in range(3):

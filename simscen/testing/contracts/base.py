@@ -1,7 +1,6 @@
 """Base classes of contracts and promises, and helpers for checks.
 
-A contract checks that a component, such as a planner, keeps the rules of its protocol. A promise is one of these rules.
-The role is the kind of component, e.g. "planner", and the subject is the component that is checked.
+A promise is one rule of a protocol, such as that of planners. A contract is the list of all promises of a protocol.
 """
 
 from __future__ import annotations
@@ -23,20 +22,20 @@ from simscen.spec.base import Component
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.setting import Setting
-from simscen.testing.flatland import RATE, Flatland, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, setting
 
 DEFAULT_LIMIT_S = 60.0
-"""Wall time in s after which a promise counts as broken because the component does not return."""
+"""Wall time after which a promise counts as broken because the component does not return."""
 
 T = TypeVar("T")
 
 
 class PromiseBroken(AssertionError):
-    """A component breaks a promise of its protocol; the message describes the observation."""
+    """A component breaks a promise of its protocol. The message says what was observed."""
 
 
 def require(condition: object, observation: str) -> None:
-    """Raise PromiseBroken with the observation, unless the condition is true."""
+    """Raise PromiseBroken with this message if the condition is false."""
     if not condition:
         raise PromiseBroken(observation)
 
@@ -45,7 +44,10 @@ def require(condition: object, observation: str) -> None:
 class Promise:
     """One rule of a protocol, to be checked for one component.
 
-    `str(promise)` is a sentence; `check()` raises PromiseBroken if the promise is broken.
+    role:    kind of component, such as "planner"
+    subject: name of the component in reports
+    name:    the promise as a sentence
+    verify:  function that raises PromiseBroken if the component breaks the promise
     """
 
     role: str
@@ -57,17 +59,16 @@ class Promise:
         return f"{self.subject} {self.name}" if self.subject else self.name
 
     def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
-        """Check the promise within `limit` seconds, with differently seeded global random generators in each check."""
+        """Check the promise within `limit` seconds. Raises PromiseBroken."""
         reseed_global_generators()
         with time_limit(limit):
             self.verify()
 
 
 def promise(method: Callable[[T], None]) -> Callable[[T], None]:
-    """Mark a method of a contract as a promise.
+    """Mark a method of a contract as a promise (decorator).
 
-    The name of the method, with spaces, is the sentence that is reported. Its docstring describes the setup and the
-    expected result: *Given* … *then* ….
+    The name of the method is the reported sentence. Its docstring has the form "Given SITUATION then RESULT".
     """
     method.__is_promise__ = True  # type: ignore[attr-defined]
     return method
@@ -75,9 +76,9 @@ def promise(method: Callable[[T], None]) -> Callable[[T], None]:
 
 @dataclass(frozen=True, eq=False)
 class Contract:
-    """Promises of one kind of component (`role`), to be checked for the component that `spec` specifies.
+    """All promises of one kind of component, to be checked for the component that `spec` specifies.
 
-    `subject` is the name of the component in reports. Each promise is checked on new components.
+    `role` is the kind of component, such as "planner". `subject` is the name of the component in reports.
     """
 
     role: ClassVar[str]
@@ -85,7 +86,7 @@ class Contract:
     subject: str = ""
 
     def promises(self) -> list[Promise]:
-        """Return all promises in the order of the contract."""
+        """Return all promises in the order of their definition."""
         members = [member for kind in reversed(type(self).__mro__) for member in vars(kind).items()]
         names = [name for name, value in members if hasattr(value, "__is_promise__")]
         return [Promise(self.role, self.subject, n.replace("_", " "), getattr(self, n)) for n in dict.fromkeys(names)]
@@ -95,7 +96,7 @@ _reseed_count = 0
 
 
 def reseed_global_generators() -> None:
-    """Seed the global generators of Python and numpy differently in each call, to detect components that use them."""
+    """Seed the global random generators of Python and numpy with a new value, to detect components that use them."""
     global _reseed_count  # noqa: PLW0603
     _reseed_count += 1
     random.seed(_reseed_count)
@@ -104,7 +105,7 @@ def reseed_global_generators() -> None:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise PromiseBroken if the block takes longer. Only the main thread can be interrupted; others have no limit."""
+    """Raise PromiseBroken if the block takes longer. In other threads than the main thread, there is no limit."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -124,24 +125,25 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class ComponentContract(Contract):
-    """Contract of a component that is built as `Class(spec, setting)`, for one robot."""
+    """Contract of a component that is built for one robot, from its specification and a Setting."""
 
     robot: RobotModel = field(kw_only=True)
 
     def setting(self) -> Setting:
-        """Return the Setting that the component is built with, with a new random generator of the same seed."""
+        """Return the Setting for a new component: robot, random generator with a fixed seed, and no map."""
         return setting(self.robot, name=self.role)
 
     def build(self) -> Any:
-        """Build a new component."""
+        """Build a new component. Raises PromiseBroken if that fails."""
         spec: Component = self.spec
         return call_component("is built", lambda: spec.implementation()(spec, self.setting()))
 
 
 def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """Return the result of a call. `action` describes the call in messages, e.g. "plans" in "raises … when it plans".
+    """Call a method of a component, and return its result.
 
-    Raises PromiseBroken for all exceptions except NavigationFailure with an ErrorCode, which passes through.
+    Raises NavigationFailure if the component fails with an ErrorCode, and PromiseBroken for any other exception.
+    `action` describes the call in the message, such as "plans" in "raises TypeError when it plans".
     """
     try:
         return call(*args, **kwargs)
@@ -156,22 +158,22 @@ def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: An
 
 
 def costmap_of_world(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
-    """Return a costmap of the world in `bounds` (min x, min y, max x, max y) with cells of 5 cm."""
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
+    """Return the costmap of the area `bounds` (min x, min y, max x, max y) of the world, with cells of 5 cm."""
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), TICK_RATE_HZ)).view
 
 
 def copy_costmap(view: CostmapView) -> CostmapView:
-    """Return a copy of a costmap."""
+    """Return a deep copy of a costmap."""
     return replace(view, costs=view.costs.copy(), distance=view.distance.copy())
 
 
-def equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
+def are_equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
     """Return whether two costmaps have the same costs and distances."""
     return np.array_equal(one.costs, other.costs) and np.array_equal(one.distance, other.distance)
 
 
 def overwrite_costmap(view: CostmapView) -> None:
-    """Make all cells of a costmap lethal, to detect components that still use it."""
+    """Make all cells of a costmap lethal in place, to detect components that still use this costmap."""
     view.costs.setflags(write=True)
     view.distance.setflags(write=True)
     view.costs[:], view.distance[:] = 254, 0.0

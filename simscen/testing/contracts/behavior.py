@@ -1,4 +1,4 @@
-"""Contract of recovery behaviors: checks that every behavior must pass."""
+"""Contract of recovery behaviors, such as spin: checks that every behavior must pass."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.testing.contracts.base import (
     ComponentContract,
+    are_equal_costmaps,
     call_component,
     copy_costmap,
     costmap_of_world,
-    equal_costmaps,
     promise,
     require,
 )
@@ -21,24 +21,25 @@ from simscen.testing.contracts.controller import PERIOD_S, checked_command, move
 from simscen.testing.flatland import Flatland
 
 MAX_DURATION_S = 120.0
-"""Maximum simulated duration of a behavior: several times the time allowances of Nav2's behaviors."""
+"""Maximum simulated duration of a behavior."""
 START = Pose2(0.0, 0.0, 0.4)
+"""Pose of the robot at the start of a behavior."""
 
 
 class BehaviorContract(ComponentContract):
-    """Contract of a behavior, in open space and in narrow rooms."""
+    """Contract of a behavior in wide and narrow square rooms."""
 
     role = "behavior"
 
     def view(self, half_width: float = 4.0) -> CostmapView:
-        """Return the costmap of a square room of 2 · `half_width` m around the origin."""
+        """Return the costmap of a square room around the origin, whose sides are 2 · `half_width` m long."""
         inner, outer, edge = half_width, half_width + 0.2, half_width + 1.0
         walls = [(-outer, -outer, outer, -inner), (-outer, inner, outer, outer)]
         walls += [(-outer, -inner, -inner, inner), (inner, -inner, outer, inner)]
         return costmap_of_world(Flatland(walls), self.robot, (-edge, -edge, edge, edge))
 
     def simulate(self, behavior: Behavior, view: CostmapView) -> list[Pose2]:
-        """Return the poses of a base that follows the commands until the behavior is done or fails."""
+        """Return the poses of a robot that follows the commands exactly until the behavior is done or fails."""
         track, seconds = [START], 0.0
         try:
             call_component("starts", lambda: behavior.start(START))
@@ -51,13 +52,16 @@ class BehaviorContract(ComponentContract):
         return track
 
     def command(self, behavior: Behavior, pose: Pose2, view: CostmapView, seconds: float) -> Twist | None:
-        """Return the checked command, or None if the behavior is done."""
+        """Return the next command after checking it (see checked_command); None if the behavior is done.
+
+        `seconds` is the time since the start of the behavior.
+        """
         command = call_component("computes a command", lambda: behavior.step(pose, view, seconds))
         return None if command is None else checked_command(command, self.robot)
 
     @promise
     def it_ends(self) -> None:
-        """Given free space then it is done or fails within two simulated minutes, also when it is started again."""
+        """Given free space then it is done or fails within MAX_DURATION_S, also when it is started again."""
         behavior, view = self.build(), self.view()
         for _ in range(2):
             self.simulate(behavior, view)
@@ -92,4 +96,4 @@ class BehaviorContract(ComponentContract):
         view = self.view(0.6)
         untouched = copy_costmap(view)
         self.simulate(self.build(), view)
-        require(equal_costmaps(view, untouched), "changes the costmap")
+        require(are_equal_costmaps(view, untouched), "changes the costmap")

@@ -14,10 +14,10 @@ from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure, RobotModel
 from simscen.testing.contracts.base import (
     ComponentContract,
+    are_equal_costmaps,
     call_component,
     copy_costmap,
     costmap_of_world,
-    equal_costmaps,
     overwrite_costmap,
     promise,
     require,
@@ -28,34 +28,37 @@ PERIOD_S = 0.05
 """Time between two commands."""
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
-TOLERANCE = 1e-6
-"""Rounding error by which a command may exceed a limit, in m/s and rad/s."""
+SPEED_TOLERANCE = 1e-6
+"""Maximum excess of a command over a limit because of rounding, in m/s and rad/s."""
 GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
-"""Maximum error in m and rad at the goal, and time for which the robot must stay there."""
+"""Maximum position error in m and yaw error in rad at the goal, and time for which the robot must stay at the goal."""
 
 
 class ControllerContract(ComponentContract):
-    """Contract of a controller, on a straight path of 6 m through a room of 9 m by 6 m."""
+    """Contract of a controller on a straight path of 6 m through a room of 9 m by 6 m."""
 
     role = "controller"
 
     def view(self, *discs: tuple[float, float, float]) -> CostmapView:
-        """Return the costmap of the room with discs (x, y, radius)."""
+        """Return the costmap of the room with round obstacles (x, y, radius)."""
         return costmap_of_world(Flatland(discs=list(discs)).room(9, 6), self.robot, (-0.5, -0.5, 9.5, 6.5))
 
     def controller_on_path(self) -> Controller:
-        """Build a controller that follows the path."""
+        """Build a controller, and send it the path PATH_POINTS."""
         controller: Controller = self.build()
         call_component("receives a path", lambda: controller.set_path(Path(PATH_POINTS.copy())))
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
-        """Return the command at this pose and velocity, checked for type, finiteness, and limits."""
+        """Return the command at this pose and velocity after checking it (see checked_command)."""
         command = call_component("computes a command", lambda: controller.command(pose, twist, view, GOAL))
         return checked_command(command, self.robot)
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
-        """Return the poses of an ideal base until it has been at the goal for DWELL_S, or for `seconds`."""
+        """Return the poses of a robot that follows the commands exactly, from `pose` on.
+
+        The drive ends after DWELL_S at the goal, or after `seconds`.
+        """
         track, twist, periods_at_goal = [pose], Twist(), 0
         for _ in range(round(seconds / PERIOD_S)):
             twist = self.command(controller, track[-1], twist, view)
@@ -77,7 +80,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def no_command_exceeds_the_limits_of_the_base(self) -> None:
-        """Given any pose and velocity then no command exceeds the limits."""
+        """Given any pose and velocity then no command exceeds the limits of the robot."""
         view, rng = self.view(), np.random.default_rng(3)
         for _ in range(30):
             pose = Pose2(*rng.uniform((1, 2, -3), (6, 4, 3)).tolist())
@@ -86,14 +89,14 @@ class ControllerContract(ComponentContract):
 
     @promise
     def a_speed_limit_is_kept_and_lifted(self) -> None:
-        """Given a limit of 0.15 m/s then no command is faster; given None then it drives at its full speed again."""
+        """Given a speed limit then no command is faster; given no limit then it drives at its full speed again."""
         controller, view = self.controller_on_path(), self.view()
         require(
             math.isfinite(controller.full_speed) and controller.full_speed > 0, f"full speed {controller.full_speed!r}"
         )
         controller.set_speed_limit(0.15)
         slow = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.15), view).vx for _ in range(20))
-        require(slow <= 0.15 + TOLERANCE, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
+        require(slow <= 0.15 + SPEED_TOLERANCE, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
         require(slow > 0.05, f"drives at no more than {slow:.3f} m/s under a limit of 0.15 m/s")
         controller.set_speed_limit(None)
         fast = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.4), view).vx for _ in range(20))
@@ -101,7 +104,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def a_command_is_collision_free_or_it_fails_with_no_valid_control(self) -> None:
-        """Given an obstacle close ahead then the command is collision-free for 0.5 s, or NO_VALID_CONTROL is raised."""
+        """Given an obstacle ahead then the command is collision-free for 0.5 s, or it fails with NO_VALID_CONTROL."""
         front = max(x for x, _ in self.robot.footprint)
         footprint, pose = Footprint(self.robot, 0.05), Pose2(2.0, 3.0, 0.0)
         for gap in (0.02, 0.1, 0.3, 0.6):
@@ -117,7 +120,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def it_never_drives_into_a_wall_across_its_path(self) -> None:
-        """Given a wall across the path then the robot never touches it."""
+        """Given a wall across the path then the robot never touches the wall."""
         view = self.view(*((4.0, float(y), 0.3) for y in np.arange(0.0, 6.1, 0.3)))
         controller, pose, twist = self.controller_on_path(), Pose2(1.0, 3.0, 0.0), Twist()
         footprint = Footprint(self.robot, 0.05)
@@ -150,14 +153,14 @@ class ControllerContract(ComponentContract):
 
     @promise
     def path_and_costmap_are_neither_changed_nor_kept(self) -> None:
-        """Given a path and a costmap then they are not changed, and an old costmap changes no later command."""
+        """Given a path and a costmap then they are not changed, and later changes of the costmap have no effect."""
         view, controller, path = self.view(), self.build(), Path(PATH_POINTS.copy())
         other, pose = self.controller_on_path(), Pose2(1, 3)
         controller.set_path(path)
         old, untouched = copy_costmap(view), copy_costmap(view)
         self.command(controller, pose, Twist(), old)
         require(np.array_equal(path.points, PATH_POINTS), "changes the path")
-        require(equal_costmaps(old, untouched), "changes the costmap")
+        require(are_equal_costmaps(old, untouched), "changes the costmap")
         overwrite_costmap(old)
         self.command(other, pose, Twist(), view)
         commands = [self.command(each, pose, Twist(), view) for each in (controller, other)]
@@ -176,12 +179,14 @@ class ControllerContract(ComponentContract):
 
 
 def checked_command(command: Twist, robot: RobotModel) -> Twist:
-    """Return a command, checked for type, finiteness and the limits of the robot."""
+    """Return the command. Raises PromiseBroken unless it is a finite Twist within the limits of the robot."""
     require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
     require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-    within = -robot.max_reverse - TOLERANCE <= command.vx <= robot.max_linear + TOLERANCE
+    within = -robot.max_reverse - SPEED_TOLERANCE <= command.vx <= robot.max_linear + SPEED_TOLERANCE
     within = (
-        within and abs(command.vy) <= robot.max_lateral + TOLERANCE and abs(command.wz) <= robot.max_angular + TOLERANCE
+        within
+        and abs(command.vy) <= robot.max_lateral + SPEED_TOLERANCE
+        and abs(command.wz) <= robot.max_angular + SPEED_TOLERANCE
     )
     require(within, f"commands {tuple(command)}, beyond the limits of the base: {robot.max_linear:g} m/s forward, "
            f"{robot.max_reverse:g} backward, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
@@ -189,7 +194,7 @@ def checked_command(command: Twist, robot: RobotModel) -> Twist:
 
 
 def is_at_goal(pose: Pose2) -> bool:
-    """Return whether the base is at GOAL."""
+    """Return whether the pose is within GOAL_TOLERANCE of GOAL."""
     return pose.distance(GOAL.pose) < GOAL_TOLERANCE and abs(pose.yaw - GOAL.pose.yaw) < GOAL_TOLERANCE
 
 
@@ -199,26 +204,26 @@ def move(pose: Pose2, twist: Twist) -> Pose2:
 
 
 def require_no_valid_control(failure: NavigationFailure) -> None:
-    """Require the error code NO_VALID_CONTROL."""
+    """Raise PromiseBroken if the failure has another error code than NO_VALID_CONTROL."""
     require(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")
 
 
-REACHED_GOAL = Goal("g", Pose2(2.0, -1.0, 0.5), xy_tolerance=0.25, yaw_tolerance=0.25)
+CHECKED_GOAL = Goal("g", Pose2(2.0, -1.0, 0.5), xy_tolerance=0.25, yaw_tolerance=0.25)
 CALL_COUNT = 40
 """Number of calls in 2 s at 20 Hz."""
-MOTIONS = (STOP, Twist(0.3), Twist(0.0, 0.0, 0.8), Twist(-0.2, 0.0, -0.4))
+VELOCITIES = (STOP, Twist(0.3), Twist(0.0, 0.0, 0.8), Twist(-0.2, 0.0, -0.4))
 
 
 class GoalCheckerContract(ComponentContract):
-    """Contract of a goal checker, with poses at the goal, outside its tolerances, and far away."""
+    """Contract of a goal checker, for poses at CHECKED_GOAL, outside its tolerances, and far away."""
 
     role = "goal_checker"
 
     def answers_at(self, checker: GoalChecker, pose: Pose2, twist: Twist = STOP) -> list[bool]:
-        """Return the answers of the reset checker for a robot that keeps this pose and velocity for 2 s."""
+        """Reset the checker, and return its answers for a robot that keeps this pose and velocity for 2 s."""
         call_component("is reset", checker.reset)
         answers = [
-            call_component("checks a pose", lambda: checker.reached(REACHED_GOAL, pose, twist))
+            call_component("checks a pose", lambda: checker.reached(CHECKED_GOAL, pose, twist))
             for _ in range(CALL_COUNT)
         ]
         require(all(each in (True, False) for each in answers), f"answers {answers[0]!r}")
@@ -228,46 +233,46 @@ class GoalCheckerContract(ComponentContract):
     def a_robot_that_stands_on_the_goal_has_reached_it_within_two_seconds(self) -> None:
         """Given a robot that stands at the goal then the goal is reached within two seconds."""
         require(
-            self.answers_at(self.build(), REACHED_GOAL.pose)[-1],
+            self.answers_at(self.build(), CHECKED_GOAL.pose)[-1],
             "does not say that a robot that stands at the goal has reached it",
         )
 
     @promise
     def outside_the_tolerances_no_goal_is_reached(self) -> None:
         """Given a robot outside a tolerance of the goal, standing or moving, then the goal is not reached."""
-        x, y, yaw = REACHED_GOAL.pose
+        x, y, yaw = CHECKED_GOAL.pose
         for pose in (
             Pose2(x + 0.26, y, yaw),
             Pose2(x, y - 0.5, yaw),
             Pose2(x, y, yaw + 0.26),
             Pose2(x, y, yaw + math.pi),
         ):
-            for twist in MOTIONS:
+            for twist in VELOCITIES:
                 answers = self.answers_at(self.build(), pose, twist)
                 require(
                     not any(answers),
-                    f"says that a robot at {tuple(pose)} has reached {tuple(REACHED_GOAL.pose)} ± 0.25 m, rad",
+                    f"says that a robot at {tuple(pose)} has reached {tuple(CHECKED_GOAL.pose)} ± 0.25 m, rad",
                 )
 
     @promise
     def a_heading_is_compared_around_the_circle(self) -> None:
-        """Given a heading that differs by a whole turn then it is the same heading."""
-        turned = Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw - 2 * math.pi)
+        """Given a yaw that differs from the goal's yaw by a whole turn then the goal is reached."""
+        turned = Pose2(CHECKED_GOAL.pose.x, CHECKED_GOAL.pose.y, CHECKED_GOAL.pose.yaw - 2 * math.pi)
         require(
             self.answers_at(self.build(), turned)[-1], "treats the goal's heading as another one after a whole turn"
         )
 
     @promise
     def a_reset_forgets_the_goal_before(self) -> None:
-        """Given a reached goal and a reset then the next goal is not reached."""
-        checker, away = self.build(), Pose2(REACHED_GOAL.pose.x + 1.0, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw)
-        self.answers_at(checker, REACHED_GOAL.pose)
+        """Given a reached goal and a reset then the goal is not reached from far away."""
+        checker, away = self.build(), Pose2(CHECKED_GOAL.pose.x + 1.0, CHECKED_GOAL.pose.y, CHECKED_GOAL.pose.yaw)
+        self.answers_at(checker, CHECKED_GOAL.pose)
         require(not any(self.answers_at(checker, away)), "says that a goal is reached because the previous one was")
 
     @promise
     def a_pose_that_is_no_number_reaches_nothing(self) -> None:
         """Given a pose of nan then the goal is not reached."""
-        for pose in (Pose2(math.nan, math.nan, math.nan), Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, math.nan)):
+        for pose in (Pose2(math.nan, math.nan, math.nan), Pose2(CHECKED_GOAL.pose.x, CHECKED_GOAL.pose.y, math.nan)):
             require(
                 not any(self.answers_at(self.build(), pose)), f"says that a robot at {tuple(pose)} has reached the goal"
             )
@@ -275,6 +280,6 @@ class GoalCheckerContract(ComponentContract):
     @promise
     def the_same_calls_give_the_same_answers(self) -> None:
         """Given the same calls then the same answers, independent of clocks and global random generators."""
-        near = Pose2(REACHED_GOAL.pose.x + 0.15, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw + 0.15)
-        answers = [[self.answers_at(self.build(), near, twist) for twist in MOTIONS] for _ in range(2)]
+        near = Pose2(CHECKED_GOAL.pose.x + 0.15, CHECKED_GOAL.pose.y, CHECKED_GOAL.pose.yaw + 0.15)
+        answers = [[self.answers_at(self.build(), near, twist) for twist in VELOCITIES] for _ in range(2)]
         require(answers[0] == answers[1], "two checkers answer the same calls differently")

@@ -16,7 +16,6 @@ from simscen.testing.contracts.base import Contract, call_component, promise, re
 from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-# Descriptions for `synthetic_case` and `synthetic_trace`.
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
 DRIVE: dict[str, Any] = {
     "seconds": 8,
@@ -31,6 +30,7 @@ DRIVE: dict[str, Any] = {
         [7, "navigation.ended", "SUCCEEDED", {"error_code": 0}],
     ],
 }
+"""Description of a drive for `synthetic_trace`; CASE is for `synthetic_case`."""
 STATIONARY: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
 TRUNCATED: dict[str, Any] = {**DRIVE, "seconds": 3, "ended": None, "events": DRIVE["events"][:2]}
 TRACES = {
@@ -38,15 +38,19 @@ TRACES = {
     "the trace of a stationary robot": STATIONARY,
     "a truncated log": TRUNCATED,
 }
+"""Description of each trace (recorded states of a run), by its name in messages."""
 
 
 class CriterionContract(Contract):
-    """Contract of a criterion, on the traces of a drive, of a stationary robot, and of a truncated log."""
+    """Contract of a criterion, checked on all TRACES."""
 
     role = "criterion"
 
     def findings(self, trace: Trace, case: Case, label: str) -> list[Finding]:
-        """Return the findings, checked for their type. `label` describes the trace in messages."""
+        """Return the findings (checked bounds) of the criterion. `label` is the name of the trace in messages.
+
+        Raises PromiseBroken unless the result is a list of findings.
+        """
         criterion: Criterion = self.spec
         findings = call_component(f"judges {label}", criterion.judge, trace, case)
         is_valid = isinstance(findings, list) and all(isinstance(f, Finding) for f in findings)
@@ -65,7 +69,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_margin_has_the_sign_of_the_status(self) -> None:
-        """Given a finding with a margin then the margin is a number, and not negative if and only if it passes."""
+        """Given a finding that passes then its margin is not negative; given one that fails then it is negative."""
         for label, description in TRACES.items():
             for finding in self.findings(synthetic_trace(description), synthetic_case(CASE), label):
                 if finding.margin is None or finding.status not in (Status.PASS, Status.FAIL):
@@ -86,7 +90,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace then it is not changed, because other criteria use it."""
+        """Given a trace and a case then they are not changed, because other criteria use them."""
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         self.findings(trace, case, "a drive")
@@ -103,12 +107,12 @@ class CriterionContract(Contract):
 
 
 class MetricContract(Contract):
-    """Contract of a metric, on the traces of a drive, of a stationary robot, and of a truncated log."""
+    """Contract of a metric, checked on all TRACES."""
 
     role = "metric"
 
     def measure(self, description: dict[str, Any], label: str) -> float | str:
-        """Return the value of the metric for a trace; `label` describes the trace in messages."""
+        """Return the value of the metric, or the reason why there is none. `label` is the trace's name in messages."""
         value: float | str = call_component(
             f"measures {label}", self.spec.measure, synthetic_trace(description), synthetic_case(CASE)
         )
@@ -116,7 +120,7 @@ class MetricContract(Contract):
 
     @promise
     def it_returns_a_finite_number_or_a_reason(self) -> None:
-        """Given any trace then the value is a finite number, or a text with the reason why there is none."""
+        """Given any trace then the result is a finite number, or a text with the reason why there is no number."""
         for label, description in TRACES.items():
             value = self.measure(description, label)
             if isinstance(value, str):
@@ -134,7 +138,7 @@ class MetricContract(Contract):
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace then it is not changed, because criteria use it."""
+        """Given a trace and a case then they are not changed, because criteria use them."""
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         call_component("measures a drive", self.spec.measure, trace, case)
@@ -142,7 +146,7 @@ class MetricContract(Contract):
 
     @promise
     def it_has_a_unit_and_valid_evidence(self) -> None:
-        """Given a metric then its unit is a text, and its evidence is None or a set of Evidence."""
+        """Given a metric then its unit is a text, and its evidence (required data) is None or a set of Evidence."""
         require(isinstance(self.spec.unit, str), f"has the unit {self.spec.unit!r}")
         evidence = call_component("returns its evidence", getattr, self.spec, "evidence")
         is_valid = evidence is None or all(isinstance(each, Evidence) for each in evidence)
@@ -150,19 +154,19 @@ class MetricContract(Contract):
 
 
 class ActionContract(Contract):
-    """Contract of an action, on a fake stage (the interface to the running simulation) that records calls."""
+    """Contract of an action, on a fake stage (interface to the running simulation) that records calls."""
 
     role = "action"
 
     def perform(self) -> tuple[Effect, list[Any]]:
-        """Return the effect and the recorded calls."""
+        """Return the effect of the action, and the recorded calls of the stage's methods."""
         stage = FakeStage()
         effect = call_component("is performed", self.spec.perform, stage)
         return effect, stage.calls
 
     @promise
     def it_returns_an_effect(self) -> None:
-        """Given a stage then the action returns an Effect with a description, `happened` only if it did something."""
+        """Given a stage then the action returns an Effect with a description. Without calls, `happened` is False."""
         effect, done = self.perform()
         require(isinstance(effect, Effect), f"returns {effect!r}, not an Effect")
         require(isinstance(effect.happened, bool), f"happened is {effect.happened!r}")
@@ -181,16 +185,16 @@ SITUATIONS = (
     {"tick": 2400, "robot": Pose2(5.0, -3.0, 2.0), "travelled": 12.0},
     {"tick": 240_000, "robot": Pose2(0.1, 0.1, -1.0), "travelled": 500.0},
 )
-"""Fields of FakeStage at four times of a run."""
+"""Values of FakeStage's fields in four situations of a run."""
 
 
 class TriggerContract(Contract):
-    """Contract of a trigger, in four situations of a run in different orders."""
+    """Contract of a trigger, evaluated in all SITUATIONS in different orders."""
 
     role = "trigger"
 
     def answers(self, order: list[int]) -> dict[int, bool]:
-        """Return the answers by index of SITUATIONS; the trigger is evaluated in this order."""
+        """Evaluate the trigger in the order of these indices of SITUATIONS, and return the answers by index."""
         answers = {k: call_component("is evaluated", self.spec.holds, FakeStage(**SITUATIONS[k])) for k in order}
         for answer in answers.values():
             require(answer is True or answer is False, f"answers {answer!r}")
@@ -198,12 +202,12 @@ class TriggerContract(Contract):
 
     @promise
     def it_returns_true_or_false_at_every_moment(self) -> None:
-        """Given any situation, also without belief, goal, plan or objects, then the answer is True or False."""
+        """Given any situation then the answer is True or False, also without belief, goal, plan, and objects."""
         self.answers([0, 1, 2, 3])
 
     @promise
     def the_same_situation_gives_the_same_answer(self) -> None:
-        """Given the same situation then the same answer, independent of earlier calls and random numbers."""
+        """Given the same situation then the same answer, independent of earlier calls."""
         ascending, descending, mixed = (
             self.answers([0, 1, 2, 3]),
             self.answers([3, 2, 1, 0]),
@@ -213,7 +217,7 @@ class TriggerContract(Contract):
 
     @promise
     def it_changes_nothing(self) -> None:
-        """Given a situation then the trigger changes nothing."""
+        """Given a situation then the trigger does not change the world."""
         stage = FakeStage(**SITUATIONS[1])  # type: ignore[arg-type]
         call_component("is evaluated", self.spec.holds, stage)
         require(not stage.calls, f"changes the world: {stage.calls}")

@@ -29,12 +29,12 @@ NO_NOISE = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=
 
 @cache
 def short_drive() -> RoomDrive:
-    """Return a drive of six seconds through the synthetic room."""
+    """Return a drive of six seconds through the room of synthetic_room.py."""
     return drive(6.0)
 
 
 def start_estimate() -> Estimate:
-    """Return the start pose of the short drive as an estimate."""
+    """Return the true start pose of the short drive as initial estimate, with standard deviations."""
     return Estimate(Pose2(*short_drive().truth[0]), (0.1, 0.1, 0.05))
 
 
@@ -44,7 +44,7 @@ class LocalizerContract(Contract):
     role = "localizer"
 
     def build_at(self, estimate: Estimate) -> Localizer:
-        """Build a localizer that starts from this estimate."""
+        """Build a localizer, and reset it to this initial pose estimate."""
         subject = call_component("is built", lambda: build_localizer(self.spec, estimate, 1))
         call_component("is reset", lambda: subject.reset(estimate))
         return subject
@@ -64,7 +64,7 @@ class LocalizerContract(Contract):
 
     @promise
     def without_motion_the_belief_does_not_drift(self) -> None:
-        """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
+        """Given no motion and exact readings then the belief stays within 5 cm and 0.03 rad of the true pose."""
         still = drive_along(np.tile(short_drive().truth[:1], (400, 1)))
         start = Estimate(start_estimate().pose, (0.02, 0.02, 0.01))
         beliefs = call_component("localizes", lambda: run_localizer(self.build_at(start), still, 1, NO_NOISE, imu=True))
@@ -75,7 +75,7 @@ class LocalizerContract(Contract):
 
     @promise
     def a_belief_does_not_change_after_it_was_given(self) -> None:
-        """Given a belief then later readings do not change its arrays."""
+        """Given a returned belief then later readings do not change its arrays."""
         subject = self.build_at(start_estimate())
         send_odometry(subject, 0, Pose2(0, 0, 0))
         belief = valid_belief(subject)
@@ -88,7 +88,7 @@ class LocalizerContract(Contract):
 
     @promise
     def a_scan_is_neither_changed_nor_kept(self) -> None:
-        """Given a scan then its ranges are not changed, and later changes of them do not affect the belief."""
+        """Given a scan then its ranges are not changed, and later changes of its ranges do not affect the belief."""
         subject, ranges = self.build_at(start_estimate()), short_drive().ranges[0].copy()
         call_component("receives a scan", lambda: subject.on_scan(scan(ranges, 24)))
         require(np.array_equal(ranges, short_drive().ranges[0]), "changes the ranges of a scan")
@@ -101,7 +101,7 @@ class LocalizerContract(Contract):
 
     @promise
     def invalid_ranges_never_make_the_belief_invalid(self) -> None:
-        """Given ranges that are nan, infinite, negative or huge then the belief stays finite and semidefinite."""
+        """Given ranges that are nan, infinite, negative, or huge then the belief stays valid (see valid_belief)."""
         for start in (start_estimate(), Estimate(None)):
             subject = self.build_at(start)
             for k in range(30):
@@ -111,7 +111,7 @@ class LocalizerContract(Contract):
 
     @promise
     def invalid_odometry_never_makes_the_belief_invalid(self) -> None:
-        """Given odometry and turn rates that are nan, infinite or huge then the belief stays valid."""
+        """Given odometry and yaw rates that are nan, infinite, or huge then the belief stays valid."""
         subject, rng = self.build_at(start_estimate()), np.random.default_rng(5)
         for k in range(40):
             x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
@@ -124,7 +124,7 @@ class LocalizerContract(Contract):
 
     @promise
     def scans_of_any_size_range_and_mount_are_accepted(self) -> None:
-        """Given a scan of 0 to 4096 beams, of any range and mount, then the belief stays finite and semidefinite."""
+        """Given a scan with 0 to 4096 beams, any maximum range, and any mount then the belief stays valid."""
         subject = self.build_at(start_estimate())
         for k, size in enumerate((0, 1, 2, 3, 59, 60, 61, 4096)):
             send_odometry(subject, k, Pose2(0.3 * k, 0, 0))
@@ -146,7 +146,10 @@ class LocalizerContract(Contract):
 
 
 def require_near_start(belief: Belief, when: str) -> None:
-    """Require that a belief is within three standard deviations of `start_estimate`; `when` is for the message."""
+    """Raise PromiseBroken if the belief is over three standard deviations from `start_estimate()`.
+
+    `when` is the end of the message, such as "after a reset".
+    """
     start = start_estimate()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
@@ -155,12 +158,15 @@ def require_near_start(belief: Belief, when: str) -> None:
 
 
 def send_odometry(subject: Localizer, number: int, pose: Pose2) -> None:
-    """Send odometry reading `number` to the localizer, one every 0.1 s like the scans."""
+    """Send an odometry reading with this pose to the localizer, with the tick of scan `number`."""
     call_component("receives odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
 
 
 def valid_belief(subject: Localizer) -> Belief:
-    """Return the belief, checked to be finite, with a positive semidefinite covariance and normalized weights."""
+    """Return the belief of the localizer. Raises PromiseBroken if the belief is invalid.
+
+    Pose, covariance, and particles must be finite, the covariance positive semidefinite, and the sum of weights 1.
+    """
     belief: Belief = call_component("returns its belief", lambda: subject.belief)
     require(isinstance(belief, Belief), f"returns {type(belief).__name__}, not a Belief")
     covariance, particles = belief.covariance, belief.particles
@@ -181,7 +187,7 @@ def valid_belief(subject: Localizer) -> Belief:
 
 
 def _invalid_ranges(seed: int) -> Array:
-    """Return ranges (BEAMS,) of a different kind for each seed, most of them invalid."""
+    """Return ranges (BEAMS,) of a scan, most of them invalid. There are different ranges for each seed from 0 to 13."""
     rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
     mixed = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)

@@ -12,10 +12,10 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.testing.contracts.base import (
     ComponentContract,
+    are_equal_costmaps,
     call_component,
     copy_costmap,
     costmap_of_world,
-    equal_costmaps,
     overwrite_costmap,
     promise,
     require,
@@ -24,20 +24,20 @@ from simscen.testing.flatland import Flatland
 
 START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
 MAX_POINT_SPACING_M = 0.1
-"""Largest distance between consecutive points of a path."""
-IMPOSSIBLE = (
+"""Maximum distance between consecutive points of a path."""
+IMPOSSIBLE_REQUESTS = (
     (Pose2(-3, 1), GOAL, ErrorCode.START_OUTSIDE_MAP),
     (START, Pose2(30, 1), ErrorCode.GOAL_OUTSIDE_MAP),
     (Pose2(4.05, 1), GOAL, ErrorCode.START_OCCUPIED),
     (START, Pose2(8.05, 5), ErrorCode.GOAL_OCCUPIED),
     (START, Pose2(15, 3.5), ErrorCode.NO_VALID_PATH),
 )
-"""Requests (start, goal, expected error): outside the map, in a wall, and to a goal in a room without a door."""
+"""Start, goal, and expected error code of requests that no planner can fulfill."""
 
 
 @cache
 def house() -> Flatland:
-    """Return a house: two walls with gaps, a cupboard, and a room without a door."""
+    """Return a world of 12 m by 7 m with two inner walls, a cupboard, and a closed room outside."""
     room = Flatland().room(12, 7)
     room.boxes += [(4.0, 0.0, 4.1, 4.5), (8.0, 2.5, 8.1, 7.0), (14.0, 1.0, 16.0, 1.1), (14.0, 1.0, 14.1, 6.0)]
     room.boxes += [(14.0, 5.9, 16.0, 6.0), (15.9, 1.0, 16.0, 6.0), (1.0, 5.0, 2.5, 6.0)]
@@ -50,7 +50,7 @@ def _house_costmap(robot: RobotModel) -> CostmapView:
 
 
 class PlannerContract(ComponentContract):
-    """Contract of a planner, in a house of 12 m by 7 m with a goal two rooms away."""
+    """Contract of a planner in `house()`."""
 
     role = "planner"
 
@@ -61,7 +61,7 @@ class PlannerContract(ComponentContract):
     def plan(
         self, planner: Planner, view: CostmapView, seed: int, start_and_goal: tuple[Pose2, Pose2] = (START, GOAL)
     ) -> Array:
-        """Return the points (n, 3) of a plan, checked for shape and finiteness."""
+        """Return the points (n, 3) of a plan. Raises PromiseBroken if they have a wrong shape or are not finite."""
         path = call_component("plans", lambda: planner.plan(view, *start_and_goal, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
@@ -103,8 +103,8 @@ class PlannerContract(ComponentContract):
 
     @promise
     def an_impossible_request_fails_with_its_error_code(self) -> None:
-        """Given a start or goal outside the map or in an obstacle, or no path, then it fails with the error code."""
-        for start, goal, code in IMPOSSIBLE:
+        """Given one of IMPOSSIBLE_REQUESTS then it fails with the expected error code."""
+        for start, goal, code in IMPOSSIBLE_REQUESTS:
             try:
                 self.plan(self.build(), self.view(), 1, (start, goal))
             except NavigationFailure as failure:
@@ -114,7 +114,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
-        """Given the same costmap, start, goal and seed then bit-identical paths, independent of earlier calls."""
+        """Given the same costmap, start, goal, and seed then bit-identical paths, independent of earlier calls."""
         first = self.plan(self.build(), self.view(), 7)
         other = self.build()
         self.plan(other, self.view(), 3, (GOAL, START))
@@ -122,10 +122,10 @@ class PlannerContract(ComponentContract):
 
     @promise
     def a_costmap_is_neither_changed_nor_kept(self) -> None:
-        """Given a costmap then it is not changed, and later changes of it do not affect later plans."""
+        """Given a costmap then it is not changed, and later changes of this costmap do not affect later plans."""
         planner, view, untouched = self.build(), self.view(), self.view()
         first = self.plan(planner, view, 1)
-        require(equal_costmaps(view, untouched), "changes the costmap")
+        require(are_equal_costmaps(view, untouched), "changes the costmap")
         original = first.copy()
         overwrite_costmap(view)
         require(np.array_equal(self.plan(planner, untouched, 1), original), "an old costmap affects a new plan")

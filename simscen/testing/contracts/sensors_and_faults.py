@@ -29,16 +29,17 @@ READINGS: dict[str, Callable[[int], Reading]] = {
     "Bump": lambda k: Bump("it", 24 * k, k % 2 == 0),
     "Image": lambda k: Image("it", 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)),
 }
-"""Function that returns the k-th reading of each type, one every 24 ticks."""
+"""Functions that return the k-th reading of each type. There is a reading every 24 ticks."""
 FAULT_READING_COUNT = 40
+"""Number of readings that a fault receives."""
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
 
 class FakeSensorSimulator:
-    """Fake of faults.base.SensorSimulator."""
+    """Fake of faults.base.SensorSimulator, with which a fault can simulate a displaced sensor or missing objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return 2 m for the actual sensor and objects, otherwise 4 m."""
+        """Return ranges of 2 m for the actual sensor mount and all objects, otherwise of 4 m."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
@@ -47,12 +48,12 @@ class FakeSensorSimulator:
 
 
 class FaultContract(Contract):
-    """Contract of a fault, on forty readings or commands of each affected kind."""
+    """Contract of a fault, on FAULT_READING_COUNT readings, commands, beliefs, or maps of each affected kind."""
 
     role = "fault"
 
     def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> FaultEffect:
-        """Start the fault on a kind of target, with a new generator of the same seed; `now` returns the tick."""
+        """Start the fault on a kind of target, such as "Scan". `now` returns the current tick."""
         fault: Fault = self.spec
         setting = FaultSetting(
             0.3, now=now, kind=kind, simulator=FakeSensorSimulator() if kind in ("Scan", "Image") else None
@@ -60,7 +61,7 @@ class FaultContract(Contract):
         return call_component("begins", fault.begin, np.random.default_rng(5), setting)
 
     def outputs(self, kind: str) -> list[Any]:
-        """Return the outputs for readings or commands of a kind, including delayed ones."""
+        """Return all outputs of the fault for inputs of a kind, such as "Scan", including delayed outputs."""
         tick = 0
         outputs: list[Any] = []
         effect = self.start(kind, lambda: tick)
@@ -80,7 +81,7 @@ class FaultContract(Contract):
 
     @promise
     def it_affects_known_targets(self) -> None:
-        """Given a fault then `affects` contains at least one target, and only known ones."""
+        """Given a fault then `affects` contains at least one target, and only known targets."""
         affects = self.spec.affects
         require(affects, "affects nothing")
         unknown = sorted(set(affects) - set(FAULT_TARGET_KINDS))
@@ -88,9 +89,9 @@ class FaultContract(Contract):
 
     @promise
     def it_returns_the_same_type_or_none(self) -> None:
-        """Given a reading then the output has the same type and sensor, or is None; likewise for other targets.
+        """Given a reading or a command then the output has the same type, or is None.
 
-        Beliefs and maps must have an output.
+        Given a belief or a map then the output has the same type.
         """
         for kind in sorted(self.spec.affects):
             for output in self.outputs(kind):
@@ -107,10 +108,10 @@ class FaultContract(Contract):
 
     @promise
     def the_same_generator_gives_the_same_answers_bit_for_bit(self) -> None:
-        """Given the same readings and generator then the same outputs."""
+        """Given the same inputs and random generator then bit-identical outputs."""
         for kind in sorted(self.spec.affects):
             one, other = (self.outputs(kind) for _ in range(2))
-            require(all(map(equal, one, other)), f"returns different outputs for the same {kind} and generator")
+            require(all(map(are_identical, one, other)), f"returns different outputs for the same {kind} and generator")
 
     @promise
     def a_reading_is_never_changed(self) -> None:
@@ -121,18 +122,18 @@ class FaultContract(Contract):
                 reading = READINGS[kind](k)
                 before = copy.deepcopy(reading)
                 call_component(f"receives a {kind}", effect.reading, reading)
-                require(equal(reading, before), f"changes the {kind} that it receives")
+                require(are_identical(reading, before), f"changes the {kind} that it receives")
 
     @promise
     def its_end_leaves_an_effect_or_nothing(self) -> None:
-        """Given the end of a fault then what remains is a FaultEffect or None."""
+        """Given the end of a fault then it returns its remaining FaultEffect, or None."""
         for kind in sorted(self.spec.affects):
             remaining = call_component("ends", self.start(kind).end)
             require(remaining is None or isinstance(remaining, FaultEffect), f"leaves {remaining!r}")
 
 
-def equal(one: Any, other: Any) -> bool:
-    """Return whether two readings or commands are bit-identical."""
+def are_identical(one: Any, other: Any) -> bool:
+    """Return whether two readings, commands, beliefs, or maps are bit-identical."""
     if one is None or isinstance(one, tuple):
         return bool(one == other)
     return type(one) is type(other) and all(
@@ -146,15 +147,15 @@ def _belief(number: int) -> Belief:
     return Belief(pose, 0.01 * np.eye(3), pose.compose(odometry.inverse()), updated=24 * number)
 
 
-NAME = "it"
+SENSOR_NAME = "it"
 """Name of the tested sensor."""
 READING_COUNT = 20
 FIELDS_WITH_NAN = ("ranges", "depth")
-"""Fields whose values may be infinite or nan, because a beam or pixel has no return."""
+"""Fields of readings that may be infinite or nan, for beams and pixels without a return."""
 
 
 class SensorContract(Contract):
-    """Contract of a sensor, on a robot with two wheels that drives a circle in a square room."""
+    """Contract of a sensor on a robot that drives a circle in a square room (see FakeSensorView)."""
 
     role = "sensor"
 
@@ -163,14 +164,14 @@ class SensorContract(Contract):
         return self.measure(*self.build(seed))
 
     def build(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
-        """Build a sensor. Return it with its view and its period in ticks."""
+        """Return a new sensor, its interface to the simulation, and its period in ticks."""
         clock, view = Clock(240), FakeSensorView()
         period, rng = clock.period(self.spec.rate), np.random.default_rng(seed)
-        setting = SensorSetting(NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
+        setting = SensorSetting(SENSOR_NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
-        """Return the next READING_COUNT readings, with the view at the time of each."""
+        """Return READING_COUNT readings from the first period on. `view` and `period` are as in `build`."""
         readings = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240
@@ -179,15 +180,15 @@ class SensorContract(Contract):
 
     @promise
     def a_reading_has_the_declared_type_name_and_tick(self) -> None:
-        """Given a reading then it has the type of the specification, the name of the sensor, and the tick."""
+        """Given a reading then it has the type of the specification, the name of the sensor, and its tick."""
         sensor, view, period = self.build()
-        require(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
+        require(sensor.name == SENSOR_NAME, f"is called {sensor.name!r}, not {SENSOR_NAME!r}")
         require(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
         kind = getattr(sensor_data, self.spec.reading_type)
         for k, reading in enumerate(self.measure(sensor, view, period), start=1):
             require(type(reading) is kind, f"returns {type(reading).__name__}, not {self.spec.reading_type}")
             label = (reading.sensor, reading.tick)
-            require(label == (NAME, k * period), f"labels a reading of tick {k * period} as {label}")
+            require(label == (SENSOR_NAME, k * period), f"labels a reading of tick {k * period} as {label}")
 
     @promise
     def the_numbers_of_a_reading_are_finite(self) -> None:
@@ -202,15 +203,15 @@ class SensorContract(Contract):
 
     @promise
     def the_same_world_and_generator_give_the_same_readings_bit_for_bit(self) -> None:
-        """Given the same world and generator then the same readings."""
+        """Given the same world and random generator then bit-identical readings."""
         one, other = self.readings(), self.readings()
-        require(all(map(equal, one, other)), "returns different readings for the same world and generator")
+        require(all(map(are_identical, one, other)), "returns different readings for the same world and generator")
 
     @promise
     def a_reading_does_not_change_after_it_was_given(self) -> None:
-        """Given a reading then later measurements do not change it."""
+        """Given a returned reading then later readings do not change it."""
         sensor, view, period = self.build()
         first = self.measure(sensor, view, period)
         original = copy.deepcopy(first)
         self.measure(sensor, view, period)
-        require(all(map(equal, first, original)), "a reading changes when the next one is taken")
+        require(all(map(are_identical, first, original)), "a reading changes when the next one is taken")

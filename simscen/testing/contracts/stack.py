@@ -18,7 +18,7 @@ from simscen.core.records.trace import Decision
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
-from simscen.testing.flatland import CONTROL_PERIOD, RATE, Drive, Flatland, round_robot
+from simscen.testing.flatland import CONTROL_PERIOD_TICKS, TICK_RATE_HZ, Drive, Flatland, round_robot
 
 START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
@@ -26,13 +26,13 @@ GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_
 
 
 class CheckedStack:
-    """Wrapper of a stack that checks the types, finiteness, and events of decisions."""
+    """Wrapper of a stack that checks each decision: types, finite commands, and events of the current tick."""
 
     def __init__(self, stack: Stack) -> None:
         self.stack = stack
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Return the checked decision of the stack."""
+        """Return the decision of the stack. Raises PromiseBroken if it is invalid, or if the stack changes a scan."""
         ranges = [reading.ranges.copy() for reading in readings if isinstance(reading, Scan)]
         decision = call_component("decides", lambda: self.stack.decide(tick, readings))
         require(isinstance(decision, Decision), f"returns {type(decision).__name__}, not a Decision")
@@ -51,22 +51,22 @@ class CheckedStack:
 
 @dataclass(frozen=True, eq=False)
 class StackContract(Contract):
-    """Contract of a stack, with a round robot in a room of 6 m by 4 m and almost perfect sensors."""
+    """Contract of a stack in a room of 6 m by 4 m. `robot` is by default a round robot."""
 
     role = "stack"
     robot: RobotModel | None = None
 
     def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = (), seed: int = 1) -> Drive:
-        """Return a drive before its start, in a room with discs (x, y, radius) that are not on the map."""
+        """Return a drive to the goals before its first step. `discs` are unmapped round obstacles (x, y, radius)."""
         robot, world = self.robot or round_robot(), Flatland().room(6, 4)
         grid = world.grid((-0.5, -0.5, 6.5, 4.5))
         world.discs += discs
-        surroundings = Surroundings(robot, grid, RATE, lidars=("lidar",))
+        surroundings = Surroundings(robot, grid, TICK_RATE_HZ, lidars=("lidar",))
         setting = Setting(
             surroundings,
             "stack",
             Streams(seed),
-            CONTROL_PERIOD / RATE,
+            CONTROL_PERIOD_TICKS / TICK_RATE_HZ,
             estimate=Estimate(START, (0.05, 0.05, 0.02)),
         )
         stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
@@ -81,9 +81,11 @@ class StackContract(Contract):
 
     @promise
     def it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(self) -> None:
-        """Given a goal and an obstacle in the way that is on no map then the robot gets there and touches nothing."""
+        """Given an unmapped obstacle on the way to the goal then the robot reaches the goal without contact."""
         d = self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
-        require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
+        require(
+            d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / TICK_RATE_HZ:.0f} s"
+        )
         distance = d.pose.distance(FAR.pose)
         require(distance <= FAR.xy_tolerance, f"says that it has reached a goal that is {distance:.2f} m away")
         require(d.min_clearance > 0, f"the robot touches something: clearance {d.min_clearance:.3f} m")
@@ -97,9 +99,11 @@ class StackContract(Contract):
 
     @promise
     def once_a_task_has_ended_it_commands_zero(self) -> None:
-        """Given a finished task then the command is zero from that step on."""
+        """Given a task that has ended then the command is zero from the step of its end on."""
         d = self.new_drive(NEAR).run(30)
-        require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
+        require(
+            d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / TICK_RATE_HZ:.0f} s"
+        )
         ended = len(d.commands) - 1
         d.run(0.5, until="")
         require(set(d.commands[ended:]) == {STOP}, "commands a velocity after the end of its task")
@@ -107,7 +111,7 @@ class StackContract(Contract):
 
     @promise
     def a_canceled_task_ends_at_once(self) -> None:
-        """Given a cancel then goal and task end as canceled, and the command is zero from the next step on."""
+        """Given a canceled task then task and goal end as canceled, and the command is zero from the next step on."""
         d = self.new_drive(FAR, NEAR).run(2)
         call_component("is canceled", lambda: d.stack.cancel(d.tick))
         canceled_at = len(d.commands)
@@ -122,7 +126,7 @@ class StackContract(Contract):
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
-        """Given a goal that preempts then the current goal is canceled, and the robot drives to the new one."""
+        """Given a goal that preempts the task then the current goal is canceled, and the robot drives to the new one."""
         d = self.new_drive(FAR).run(1)
         call_component("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
         d.run(0.5, until="")
@@ -137,7 +141,7 @@ class StackContract(Contract):
 
     @promise
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
-        """Given goals of which the last is unreachable then each goal is accepted once and ends once, in order."""
+        """Given a reachable and an unreachable goal then each goal is accepted once and ends once, in this order."""
         d = self.new_drive(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
         accepted = [e.name for e in d.events_of_kind("goal.accepted")]
         ended = [e.name for e in d.log if e.kind in GOAL_END_KINDS]
@@ -158,10 +162,10 @@ class StackContract(Contract):
 
     @promise
     def invalid_scans_never_make_a_decision_invalid(self) -> None:
-        """Given scans of nan then the decisions stay valid."""
+        """Given scans without any return, and then with ranges of nan, then all decisions are valid."""
         d = self.new_drive(FAR)
         d.run(1, until="")
-        d.range_max = -1.0  # nothing is within range any more
+        d.range_max = -1.0  # no beam has a return
         d.run(1, until="")
         d.noise = math.nan
         d.run(1, until="")

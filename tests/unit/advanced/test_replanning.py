@@ -14,7 +14,7 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 GOAL = Goal("g", Pose2(7.0, 3.0))
 HERE = Pose2(1.0, 3.0)
@@ -53,7 +53,7 @@ class Bench:
     def __init__(self, **options: object) -> None:
         self.script = Scripted()
         grid = WORLD.grid((-0.5, -0.5, 8.5, 6.5))
-        self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
+        self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, TICK_RATE_HZ))
         self.journal: list[Event] = []
         self.now = 0.0
         self.keeper = AdvancedPlanManager(

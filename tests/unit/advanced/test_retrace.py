@@ -20,7 +20,7 @@ from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
 Allowed = Callable[[Twist, Pose2], Twist]
 LONG = box_robot(0.42, 0.42)
@@ -29,7 +29,7 @@ POSTS = ((0.29, -0.03, 0.05), (-0.4, 0.17, 0.05))
 
 
 def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), TICK_RATE_HZ)).view
 
 
 def driven(*legs: tuple[Twist, float]) -> list[Pose2]:
@@ -129,7 +129,7 @@ def test_retrace_sends_only_commands_that_the_collision_monitor_allows() -> None
     way = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
     ranges = np.full(5, 9.0)
     ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, towards which the way back turns
-    monitor = CollisionMonitor(MonitorSpec(), LONG, ("lidar",), RATE)
+    monitor = CollisionMonitor(MonitorSpec(), LONG, ("lidar",), TICK_RATE_HZ)
     monitor.on_scan(Scan("lidar", 0, ranges, math.atan2(0.217, 0.02) - 0.02, 0.01, 0.1, 10.0), Pose2(0.0, 0.0))
     view = view_of(LONG, Flatland())
     with pytest.raises(NavigationFailure, match="too long"):

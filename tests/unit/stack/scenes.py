@@ -173,7 +173,7 @@ def silent(spec: StackSpec) -> Iterator[object]:
     """The lidar falls silent for a while."""
     d = begin(room(), Pose2(0.8, 2.0), spec, Pose2(2.4, 2.0))
     yield from steps(d, 0.5)
-    d.blind = True
+    d.is_blind = True
     yield from steps(d, 1.2)
 
 

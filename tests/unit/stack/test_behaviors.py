@@ -13,14 +13,14 @@ from simscen.stack.behaviors import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
 ROUND, LONG = round_robot(), box_robot()
 
 
 def view_of(robot: RobotModel, *boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -3.0, 3.0, 3.0))
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, TICK_RATE_HZ)).view
 
 
 def run(behavior: Behavior, view: CostmapView, pose: Pose2 = Pose2(0, 0)) -> tuple[Pose2, float, list[Twist]]:

@@ -22,7 +22,7 @@ from simscen.stack.costmap.layers import SpeedFilter
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.tasks import Task
-from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, setting
 
 GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
 
@@ -34,7 +34,7 @@ def checker_that(*, stateful: bool) -> SimpleGoalChecker:
 
 
 def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), TICK_RATE_HZ)).view
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,9 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
 def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
     zones = ((((0, 0), (2, 0), (2, 2), (0, 2)), 0.3), (((1, 0), (3, 0), (3, 2), (1, 2)), 0.2))
     mask = SpeedLimits(OccupancyGrid(np.full((2, 1), 50, np.int8), 1.0), True, 0.0, 1.0)
-    found = SpeedFilter(Surroundings(round_robot(), None, RATE, speed_zones=zones, masks=FilterMasks(speed=mask)))
+    found = SpeedFilter(
+        Surroundings(round_robot(), None, TICK_RATE_HZ, speed_zones=zones, masks=FilterMasks(speed=mask))
+    )
     assert found.limit(Pose2(0.5, 1), 0.5) == 0.25
     assert found.limit(Pose2(0.5, 1), 1.0) == 0.3
     assert found.limit(Pose2(1.5, 1), 0.5) == 0.2

@@ -12,7 +12,7 @@ from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import RobotModel
-from simscen.testing.flatland import RATE, box_robot, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, box_robot, round_robot
 
 
 def scan(*points: tuple[float, float], tick: int = 0) -> Scan:
@@ -25,7 +25,7 @@ def scan(*points: tuple[float, float], tick: int = 0) -> Scan:
 
 
 def monitor(robot: RobotModel | None = None, **options: float) -> CollisionMonitor:
-    return CollisionMonitor(MonitorSpec(**options), robot or round_robot(), ("lidar",), RATE)
+    return CollisionMonitor(MonitorSpec(**options), robot or round_robot(), ("lidar",), TICK_RATE_HZ)
 
 
 @pytest.mark.parametrize(("x", "scale"), [(2.0, 1.0), (0.22 + 0.02 + 0.125, 0.5), (0.23, 0.0)])
@@ -107,7 +107,7 @@ def test_silent_lidar_has_a_reason() -> None:
 def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_would(
     robot: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), RATE) for _ in range(2))
+    hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), TICK_RATE_HZ) for _ in range(2))
     monkeypatch.setattr(thorough, "_may_meet_moving", lambda *_: True)
     rng, braked, spared = np.random.default_rng(4), 0, 0
     for _ in range(400):

@@ -19,7 +19,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
 ROUND, OMNI, BOX = round_robot(speed=1.2), round_robot(speed=1.2, max_lateral=0.6), box_robot(0.6, 0.3)
 CAR = round_robot(speed=1.2, turning_radius=0.6)
@@ -148,7 +148,7 @@ PROBES: dict[type[ControllerSpec], list[Probe]] = {
 @cache
 def view_of(robot: RobotModel, boxes: tuple[tuple[float, float, float, float], ...]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.5, -2.5, 5.0, 3.5))
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, TICK_RATE_HZ)).view
 
 
 def dense(corners: tuple[tuple[float, float], ...]) -> Path:

@@ -21,7 +21,7 @@ from simscen.model.stack import StackSpec
 from simscen.stack.build import build_stack
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.protocols import NavigationFailure
-from simscen.testing.flatland import RATE, Drive, Flatland, drive, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Drive, Flatland, drive, round_robot
 
 ODD = Path(__file__).with_name("odd_components.py").read_text()
 """Module of the package."""
@@ -195,24 +195,24 @@ def test_components_have_independent_random_streams(odd) -> None:
 def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> None:
     spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
     assert type(pickle.loads(pickle.dumps(spec))) is type(spec)
-    stack = build_stack(spec, driven_setting(), Streams(1), Clock(RATE))
+    stack = build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ))
     assert stack.decide(0, ()).command == (0.0, 0.0, 0.0)
     with pytest.raises(RunError, match=r"stack `still` \(odd:StillStack\) returned str instead of a Decision"):
         stack.decide(60, ())
     with pytest.raises(RunError, match="returned NoneType instead of a Decision"):
-        build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).decide(120, ())
+        build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ)).decide(120, ())
 
 
 def test_stack_without_zone_support_is_detected_before_switching(odd, tmp_path: Path) -> None:
     spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
-    assert not build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).can_switch_zones
-    assert build_stack(StackSpec(), driven_setting(), Streams(1), Clock(RATE)).can_switch_zones
+    assert not build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ)).can_switch_zones
+    assert build_stack(StackSpec(), driven_setting(), Streams(1), Clock(TICK_RATE_HZ)).can_switch_zones
 
 
 def driven_setting():
     from simscen.stack.protocols import Surroundings
 
-    return Surroundings(round_robot(), None, RATE)
+    return Surroundings(round_robot(), None, TICK_RATE_HZ)
 
 
 def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:

@@ -19,9 +19,9 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import Surroundings
 from simscen.stack.reference import ReferenceStack
 from simscen.testing.flatland import (
-    CONTROL_PERIOD,
-    ODOMETRY_PERIOD,
-    RATE,
+    CONTROL_PERIOD_TICKS,
+    ODOMETRY_PERIOD_TICKS,
+    TICK_RATE_HZ,
     Drive,
     Flatland,
     drive,
@@ -59,9 +59,9 @@ def test_zero_latency_is_bit_identical_to_unset_latency(seed: int, zero: dict[st
 def test_a_plan_is_there_when_its_planner_is_done_and_the_robot_stands_until_then() -> None:
     d = start(planner=0.2).run(1.0)
     made = d.events_of_kind("plan.made")[0].tick
-    assert made - d.events_of_kind("goal.accepted")[0].tick == 0.2 * RATE
-    assert set(d.commands[: made // ODOMETRY_PERIOD]) == {STOP}
-    assert d.commands[made // ODOMETRY_PERIOD] != STOP
+    assert made - d.events_of_kind("goal.accepted")[0].tick == 0.2 * TICK_RATE_HZ
+    assert set(d.commands[: made // ODOMETRY_PERIOD_TICKS]) == {STOP}
+    assert d.commands[made // ODOMETRY_PERIOD_TICKS] != STOP
 
 
 def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
@@ -70,7 +70,7 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
     d.world.discs.append((5.0, 1.0, 0.25))
     d.run(5.0)
     blocked = next(event.tick for event in d.events_of_kind("plan.made") if event.data["reason"] == "blocked")
-    before = d.commands[(blocked - RATE) // ODOMETRY_PERIOD : blocked // ODOMETRY_PERIOD]
+    before = d.commands[(blocked - TICK_RATE_HZ) // ODOMETRY_PERIOD_TICKS : blocked // ODOMETRY_PERIOD_TICKS]
     assert all(command.vx > 0.3 for command in before)
     assert d.run(40).result == "SUCCEEDED"
     assert d.min_clearance > 0.02
@@ -80,7 +80,7 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
                                                ({"controller": 0.025, "collision_monitor": 0.025}, 12)])  # fmt: skip
 def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[str, float], late: int) -> None:
     soon, later = start().run(3.0), start(**latency).run(3.0)
-    first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY_PERIOD for d in (soon, later)]
+    first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY_PERIOD_TICKS for d in (soon, later)]
     assert first[1] - first[0] == late
     assert later.run(30).result == "SUCCEEDED"
 
@@ -88,15 +88,15 @@ def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[
 def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_speeds_up_as_fast() -> None:
     d = start(controller=0.12).run(2.5)
     changes = [k for k, (a, b) in enumerate(pairwise(d.commands)) if a is not b]
-    assert min(b - a for a, b in pairwise(changes)) * ODOMETRY_PERIOD >= 2 * CONTROL_PERIOD
+    assert min(b - a for a, b in pairwise(changes)) * ODOMETRY_PERIOD_TICKS >= 2 * CONTROL_PERIOD_TICKS
     assert d.commands[-1].vx > 0.45
     assert d.run(40).result == "SUCCEEDED"
 
 
 def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
     """The robot has moved on by half a meter when they are done."""
-    maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, RATE), 0.5, latency=36)
-    odometry, ranges = OdometryHistory(RATE), np.full(360, np.inf)
+    maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, TICK_RATE_HZ), 0.5, latency=36)
+    odometry, ranges = OdometryHistory(TICK_RATE_HZ), np.full(360, np.inf)
     ranges[180] = 1.0
     maps.add_reading(Scan("lidar", 0, ranges, -math.pi, math.pi / 180, 0.05, 12.0))
     for tick, x, shown in ((0, 0.0, 0), (24, 0.3, 0), (36, 0.5, 1), (48, 0.6, 1)):

@@ -16,7 +16,7 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.protocols import CostmapView
-from simscen.testing.flatland import CONTROL_PERIOD, RATE, Drive, Flatland, drive, round_robot
+from simscen.testing.flatland import CONTROL_PERIOD_TICKS, TICK_RATE_HZ, Drive, Flatland, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
 CORRIDOR = Flatland().room(14, 1.6)
@@ -27,7 +27,7 @@ class Corrected:
     """Between the sensors and a stack: what its localizer is told jumps at `at`, what its wheels say never does."""
 
     def __init__(self, drive: Drive, at: float, jump: Pose2) -> None:
-        self.stack, self._at, self._jump = drive.stack, at * RATE, jump
+        self.stack, self._at, self._jump = drive.stack, at * TICK_RATE_HZ, jump
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         return self.stack.decide(tick, tuple(self._told(one) if tick >= self._at else one for one in readings))
@@ -62,8 +62,8 @@ def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jer
     ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
     assert len(ghosts) > 50
     assert np.abs(ghosts).max() < 0.1
-    robot, period = d.robot, CONTROL_PERIOD / RATE
-    driven = d.commands[RATE * 5 // 2 // 6 :]
+    robot, period = d.robot, CONTROL_PERIOD_TICKS / TICK_RATE_HZ
+    driven = d.commands[TICK_RATE_HZ * 5 // 2 // 6 :]
     for before, now in pairwise(driven):
         assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
         assert abs(now.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
@@ -118,7 +118,7 @@ def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_
     d.stack.inner.set_zones(0, Zones(keepout=(zone,)))
     d.stack = Corrected(d, 3.0, Pose2(0.2, 0.0))
     for end, shift in ((2.9, 0.0), (4.0, 0.2)):
-        d.run(end - d.tick / RATE)
+        d.run(end - d.tick / TICK_RATE_HZ)
         points = lethal(costmaps(d).local_costmap.view)
         inside = points[(points[:, 1] > 0.1) & (points[:, 1] < 0.38)]
         assert inside[:, 0].min() == pytest.approx(3.0 - shift, abs=0.06)

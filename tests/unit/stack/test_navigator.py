@@ -226,7 +226,7 @@ def test_on_goal_failure_stops_or_continues() -> None:
 
 def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when_it_speaks() -> None:
     d = start(rooms()).run(5.0)
-    d.blind = True
+    d.is_blind = True
     d.run(0.5)
     assert d.twist.vx < 0.06
     d.run(14.5)
@@ -236,7 +236,7 @@ def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when
     assert held.name == "collision_monitor"
     assert held.tick < 6.6 * 240
     assert "`lidar` has been silent" in held.data["message"]
-    d.blind = False
+    d.is_blind = False
     d.run(60)
     assert d.result == "SUCCEEDED"
     assert not d.events_of_kind("recovery.started")

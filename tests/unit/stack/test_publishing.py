@@ -11,7 +11,7 @@ from simscen.model.costmaps import Costmap, LocalCostmap
 from simscen.stack.frames import Frames
 from simscen.stack.protocols import CostmapView
 from simscen.stack.publishing import Publisher
-from simscen.testing.flatland import RATE
+from simscen.testing.flatland import TICK_RATE_HZ
 
 FRAMES = Frames(Pose2(0.0, 0.0), Pose2(0.0, 0.0))
 
@@ -31,9 +31,9 @@ class ChangingCostmap:
 
 def published(costmaps: Any, seconds: float = 10.0) -> dict[str, int]:
     """How often each costmap is published."""
-    publisher = Publisher(RATE, SimpleNamespace(), SimpleNamespace())  # type: ignore[arg-type]
+    publisher = Publisher(TICK_RATE_HZ, SimpleNamespace(), SimpleNamespace())  # type: ignore[arg-type]
     counts = {"global": 0, "local": 0}
-    for tick in range(0, round(seconds * RATE), 12):
+    for tick in range(0, round(seconds * TICK_RATE_HZ), 12):
         for grid in publisher.updates(tick, FRAMES, None, costmaps)[2]:
             counts[grid.name] += 1
     return counts

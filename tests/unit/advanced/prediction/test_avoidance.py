@@ -23,7 +23,7 @@ from simscen.model.stack_base import ControllerSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
-from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
+from simscen.testing.flatland import TICK_RATE_HZ, Drive, Flatland, box_robot, drive
 
 Disc = tuple[float, float, float]
 FAR = Goal("far", Pose2(10.0, 0.0), xy_tolerance=0.3)
@@ -49,9 +49,9 @@ def start(
 
 def among(d: Drive, discs: Callable[[float], list[Disc]], seconds: float, until: str = "navigation.ended") -> Drive:
     """Drive on while these move."""
-    end = d.tick + round(seconds * RATE)
+    end = d.tick + round(seconds * TICK_RATE_HZ)
     while d.tick < end:
-        d.world.discs = discs(d.tick / RATE)
+        d.world.discs = discs(d.tick / TICK_RATE_HZ)
         if any(event.kind == until for event in d.step()):
             break
     return d
@@ -86,7 +86,7 @@ def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
     goal = Goal("here", Pose2(1.0, 0.0), xy_tolerance=0.25)
     d = among(start(goal), lambda _: [], 10.0)
     assert d.result == "SUCCEEDED"
-    stood, began = d.pose, d.tick / RATE
+    stood, began = d.pose, d.tick / TICK_RATE_HZ
 
     def through(t: float) -> list[Disc]:
         return [(stood.x + 0.05, stood.y - 6.0 + 1.0 * (t - began), 0.4)]
@@ -148,7 +148,7 @@ def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypat
 
 def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_braking_helps() -> None:
     robot = box_robot()
-    monitor = CollisionMonitor(CollisionMonitorSpec(), robot, (), RATE)
+    monitor = CollisionMonitor(CollisionMonitorSpec(), robot, (), TICK_RATE_HZ)
     still = np.zeros((1, 4, 4))
 
     def told(x: float, y: float, vx: float, vy: float) -> float:

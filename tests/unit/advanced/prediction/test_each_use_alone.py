@@ -9,7 +9,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.model.stack import StackSpec
 from simscen.stack.frames import Frames
 from simscen.stack.moving_obstacles import no_moving_obstacles
-from simscen.testing.flatland import RATE, Flatland, drive, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, drive, round_robot
 
 CONTROLLERS: dict[str, dict[str, Any]] = {
     "regulated_pure_pursuit": {},
@@ -39,8 +39,8 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     stack._on_costmaps_updated = update
     world.discs.append((4.5, 0.5, 0.3))
     nearest = 9.0
-    while driven.tick < 10.5 * RATE:
-        world.discs[-1] = (4.5, min(max(4.0 - 0.8 * (6.5 - driven.tick / RATE), 0.5), 7.5), 0.3)
+    while driven.tick < 10.5 * TICK_RATE_HZ:
+        world.discs[-1] = (4.5, min(max(4.0 - 0.8 * (6.5 - driven.tick / TICK_RATE_HZ), 0.5), 7.5), 0.3)
         driven.step()
         nearest = min(nearest, world.clearance(driven.robot, driven.pose))
     return nearest

@@ -2,7 +2,7 @@
 
 from simscen.advanced.prediction.tracks import MAX_UPDATES_OUTSIDE_FREE_SPACE, Track, TrackLifecycle
 from simscen.model.guards import Prediction
-from simscen.testing.flatland import RATE
+from simscen.testing.flatland import TICK_RATE_HZ
 
 
 def track(*came: bool) -> Track:
@@ -10,13 +10,13 @@ def track(*came: bool) -> Track:
     found = Track.start(0, 0j, 0.02, 0.3)
     found.velocity = 0.5 + 0j
     for step, one in enumerate(came):
-        found.last_fast_tick = RATE // 10 * step
+        found.last_fast_tick = TICK_RATE_HZ // 10 * step
         found.record_update(found.last_fast_tick, one, False, 1, 0.03)
     return found
 
 
 def ended(*tracks: Track) -> list[bool]:
-    going = TrackLifecycle(Prediction(), RATE)
+    going = TrackLifecycle(Prediction(), TICK_RATE_HZ)
     return [going.has_ended(each, each.last_update_tick, list(tracks), lambda _: True) for each in tracks]
 
 

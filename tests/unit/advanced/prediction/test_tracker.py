@@ -18,7 +18,7 @@ from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
-from simscen.testing.flatland import RATE, Flatland
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland
 
 Disc = tuple[float, float, float]
 FULL, FRONT = 2 * math.pi, math.radians(270.0)
@@ -40,7 +40,7 @@ class Watch:
         """`covered`: range of the first 40 beams, if something covers them."""
         self.discs, self.base, self.told = discs, base, told or base
         self.walls, self.view, self.beams, self.covered = walls or Flatland(), view, beams, covered
-        self.tracker, self.rng, self.time = Tracker(Prediction(), RATE), np.random.default_rng(1), 0.0
+        self.tracker, self.rng, self.time = Tracker(Prediction(), TICK_RATE_HZ), np.random.default_rng(1), 0.0
 
     def run(self, seconds: float, each: Callable[["Watch"], None] = lambda _: None) -> "Watch":
         for _ in range(round(seconds * 10)):
@@ -53,7 +53,7 @@ class Watch:
             ranges = np.round(np.where(ranges > 30.0, np.inf, ranges), 3)
             if self.covered is not None:
                 ranges[:40] = self.covered
-            scan = Scan("lidar", round(self.time * RATE), ranges, -self.view / 2, step, 0.1, 30.0)
+            scan = Scan("lidar", round(self.time * TICK_RATE_HZ), ranges, -self.view / 2, step, 0.1, 30.0)
             self.tracker.on_scan(scan, self.told(self.time))
             each(self)
         return self
@@ -294,7 +294,7 @@ def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
 
 
 def test_garbage_scan_creates_no_tracks() -> None:
-    tracker = Tracker(Prediction(), RATE)
+    tracker = Tracker(Prediction(), TICK_RATE_HZ)
     rng = np.random.default_rng(1)
     for k in range(20):
         ranges = rng.uniform(-5, 40, 360)

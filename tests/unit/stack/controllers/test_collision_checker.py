@@ -15,11 +15,11 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot
 
 
 def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), TICK_RATE_HZ)).view
 
 
 def test_arcs_are_those_of_a_fine_integration() -> None:

@@ -16,7 +16,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import NavigationFailure, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, setting
 
 CASES = yaml.safe_load((Path(__file__).parent / "golden/regulated_pure_pursuit.yaml").read_text(encoding="utf-8"))
 PLAIN = {"use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False}
@@ -31,7 +31,7 @@ def test_commands_match_the_formulas(case: dict[str, Any]) -> None:
     controller.set_path(Plan(np.column_stack((points, np.append(headings, headings[-1])))))
     controller.set_speed_limit(case.get("limit"))
     grid = Flatland([tuple(box) for box in case.get("boxes", [])]).grid((-4.0, -4.0, 5.0, 4.0))
-    view = LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, TICK_RATE_HZ)).view
     pose, twist = Pose2(*case.get("pose", (0.0, 0.0, 0.0))), Twist(*case.get("twist", (0.0, 0.0, 0.0)))
     goal = Goal("g", Pose2(*case.get("goal", (50.0, 0.0, 0.0))))
     expect = case["expect"]

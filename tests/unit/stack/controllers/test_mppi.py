@@ -26,7 +26,7 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits, poses_along
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
 LIMITS = VelocityLimits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (-3.0, -3.0, -3.5), 0.0)
@@ -34,7 +34,7 @@ LIMITS = VelocityLimits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (
 
 def view_of(*boxes: tuple[float, float, float, float], length: float = 12.0) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-2.0, -3.0, length, 3.0))
-    return LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, TICK_RATE_HZ)).view
 
 
 def straight(length: float) -> np.ndarray:

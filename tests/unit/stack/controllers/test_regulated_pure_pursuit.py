@@ -11,7 +11,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, setting
 
 ROBOT = round_robot(speed=1.0)
 FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
@@ -20,7 +20,7 @@ PLAIN = {"use_velocity_scaled_lookahead_dist": False, "lookahead_dist": 0.6}
 
 def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
-    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, TICK_RATE_HZ)).view
 
 
 def rpp(path: np.ndarray, **options: object) -> RegulatedPurePursuit:

@@ -10,7 +10,7 @@ from simscen.stack.controllers.collision_checker import RotationClearance
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot
 
 LONG = box_robot(0.8, 0.4)
 ROUND = round_robot()
@@ -20,7 +20,7 @@ SLOT = Flatland([(-0.6, 0.3, 2.0, 0.5), (-0.6, -0.5, 2.0, -0.3)])
 
 
 def seen(world: Flatland, robot: RobotModel) -> CostmapView:
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), TICK_RATE_HZ)).view
 
 
 def room_of(robot: RobotModel) -> RotationClearance:

@@ -15,7 +15,7 @@ from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursui
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distance_at
 from simscen.stack.protocols import CostmapView, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, setting
 
 PERIOD, BRAKES = 0.05, 3.0
 ROBOT = round_robot(0.21, speed=2.0, linear_deceleration=BRAKES)
@@ -24,7 +24,7 @@ FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
 
 def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
-    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, TICK_RATE_HZ)).view
 
 
 def bent(radius: float, straight: float = 3.0) -> np.ndarray:

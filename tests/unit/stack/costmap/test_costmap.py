@@ -12,7 +12,7 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 ROBOT = round_robot()
 BOUNDS = (-0.5, -0.5, 8.5, 6.5)
@@ -29,7 +29,7 @@ def scan_of(world: Flatland, pose: Pose2, beams: int = 360, range_max: float = 1
 
 def costmap(world: Flatland | None, spec: Spec | None = None, **options: object) -> LayeredCostmap:
     grid = world.grid(BOUNDS) if world else None
-    return LayeredCostmap(spec or Spec(), Surroundings(ROBOT, grid, RATE, **options))
+    return LayeredCostmap(spec or Spec(), Surroundings(ROBOT, grid, TICK_RATE_HZ, **options))
 
 
 def at(costmap: LayeredCostmap, x: float, y: float) -> tuple[int, float]:
@@ -57,7 +57,7 @@ def test_costmaps_of_one_map_tell_each_their_own_distances() -> None:
     for radius in (0.1, 0.3, 0.1):
         robot, zone = round_robot(radius), ((4.0, 3.0), (4.5, 3.0), (4.5, 3.5))
         for keepout in ((), (zone,)):
-            map_ = LayeredCostmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, RATE, keepout=keepout))
+            map_ = LayeredCostmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, TICK_RATE_HZ, keepout=keepout))
             distance = distance_transform_edt(map_.view.costs != 254) * 0.05
             assert np.allclose(map_.view.distance, np.minimum(distance, radius + 0.5), atol=1e-6)
             assert at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
@@ -74,7 +74,7 @@ def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radi
 def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_there() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
-    map_ = LayeredCostmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE))
+    map_ = LayeredCostmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ))
     assert at(map_, 1.025, 1.125)[0] == 253
     assert at(map_, 1.025, 1.725)[0] == 255
 
@@ -83,7 +83,7 @@ def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
     cells = np.zeros((40, 60), dtype=np.int8)
     cells[10, 50] = 100
     grid = OccupancyGrid(cells, 0.05, Pose2(1.0, 2.0, math.pi / 2))
-    view = LayeredCostmap(Spec(), Surroundings(ROBOT, grid, RATE)).view
+    view = LayeredCostmap(Spec(), Surroundings(ROBOT, grid, TICK_RATE_HZ)).view
     row, column = np.argwhere(view.costs == 254)[0]
     x, y = grid.center_of(np.array([[10, 50]]))[0]
     assert view.origin[0] + (column + 0.5) * 0.05 == pytest.approx(x, abs=0.051)
@@ -319,7 +319,7 @@ def test_zones_are_switched_in_a_window_that_rolls() -> None:
 def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
-    surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE)
+    surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ)
     assert at(LayeredCostmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
     assert at(LayeredCostmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
     assert at(costmap(None), 5.0, 5.0)[0] == 255
@@ -333,7 +333,7 @@ def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has(
     known = costmap(world, spec)
     grid = world.grid(BOUNDS)
     map_ = LayeredCostmap(spec, Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
-                                                             grid.origin), RATE))  # fmt: skip
+                                                             grid.origin), TICK_RATE_HZ))  # fmt: skip
     pose = Pose2(4.0, 1.0)
     for each in (known, map_):
         each.update(pose, scan_of(world, pose))
@@ -360,7 +360,7 @@ def test_lethal_cost_threshold_is_the_lowest_occupancy_of_an_obstacle(threshold,
     spec = Spec() if threshold is None else Spec(lethal_cost_threshold=threshold)
     grid = OccupancyGrid(cells, 0.05)
     for _ in range(2):  # the second one uses what the first one has cached
-        view = LayeredCostmap(spec, Surroundings(ROBOT, grid, RATE, keepout=keepout)).view
+        view = LayeredCostmap(spec, Surroundings(ROBOT, grid, TICK_RATE_HZ, keepout=keepout)).view
         found = tuple(each for number, each in enumerate(occupancies) if view.costs[10, 5 + 5 * number] == 254)
         assert found == lethal
 
@@ -368,7 +368,7 @@ def test_lethal_cost_threshold_is_the_lowest_occupancy_of_an_obstacle(threshold,
 def test_costmaps_of_one_map_have_their_own_threshold() -> None:
     grid = OccupancyGrid(np.full((20, 20), 50, dtype=np.int8), 0.05)
     costs = [
-        LayeredCostmap(Spec(lethal_cost_threshold=value), Surroundings(ROBOT, grid, RATE)).view.costs[5, 5]
+        LayeredCostmap(Spec(lethal_cost_threshold=value), Surroundings(ROBOT, grid, TICK_RATE_HZ)).view.costs[5, 5]
         for value in (65, 50, 65)
     ]
     assert costs == [0, 254, 0]

@@ -12,7 +12,7 @@ from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.costmap.obstacle_layer import remove_small_groups
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 
 def scan_of(world: Flatland, pose: Pose2, noise: float) -> Scan:
@@ -57,7 +57,7 @@ def test_incremental_updates_equal_a_full_computation() -> None:
     rng = np.random.default_rng(5)
     world = Flatland(discs=[(x, y, 0.03) for x, y in rng.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
     spec = Spec(denoise_layer=DenoiseLayer(enabled=True, minimal_group_size=4), rolling_size=8.0)
-    map_ = LayeredCostmap(spec, Surroundings(round_robot(), None, RATE))
+    map_ = LayeredCostmap(spec, Surroundings(round_robot(), None, TICK_RATE_HZ))
     for k in range(6):
         pose = Pose2(0.1 * k, 0.0)
         map_.update(pose, scan_of(world, pose, noise=0.03))

@@ -10,7 +10,7 @@ from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, round_robot
 
 MOUNT = Pose3(0.1, 0.0, 0.3)
 WIDTH, HEIGHT, VIEW = 64, 48, 1.2
@@ -40,7 +40,7 @@ def image(*slabs: Slab, base: Pose2 = Pose2(0.0, 0.0)) -> Image:
 
 def costmap(**options: float) -> LayeredCostmap:
     return LayeredCostmap(
-        Spec(rolling_size=8.0, track_unknown_space=False, **options), Surroundings(round_robot(), None, RATE)
+        Spec(rolling_size=8.0, track_unknown_space=False, **options), Surroundings(round_robot(), None, TICK_RATE_HZ)
     )
 
 

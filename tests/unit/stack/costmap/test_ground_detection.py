@@ -11,7 +11,7 @@ from simscen.core.messages.sensor_data import Image
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, round_robot
 
 WIDTH, HEIGHT, VIEW = 64, 48, 1.2
 FOCAL = WIDTH / 2 / math.tan(VIEW / 2)
@@ -41,7 +41,7 @@ def image(ground: Ground, mount: Pose3) -> Image:
 def marked(ground: Ground, mount: Pose3, **options: float) -> np.ndarray:
     """How far ahead (n,) the middle of the costmap is marked."""
     spec = Spec(rolling_size=8.0, track_unknown_space=False, **options)
-    map_ = LayeredCostmap(spec, Surroundings(round_robot(), None, RATE))
+    map_ = LayeredCostmap(spec, Surroundings(round_robot(), None, TICK_RATE_HZ))
     map_.update(Pose2(0.0, 0.0), image(ground, mount))
     view = map_.view
     points = (np.argwhere(view.costs == 254)[:, ::-1] + 0.5) * view.resolution + view.origin
@@ -105,7 +105,9 @@ def test_without_a_slope_that_is_ground_all_that_is_higher_is_marked_as_in_nav2(
 
 def test_a_short_ramp_that_was_seen_from_afar_stays_ground_when_all_of_it_is_too_near_to_be_seen() -> None:
     """And a step as high, which nobody saw before, is an obstacle."""
-    map_ = LayeredCostmap(Spec(rolling_size=8.0, track_unknown_space=False), Surroundings(round_robot(), None, RATE))
+    map_ = LayeredCostmap(
+        Spec(rolling_size=8.0, track_unknown_space=False), Surroundings(round_robot(), None, TICK_RATE_HZ)
+    )
     for away in (1.5, 1.0, 0.5, 0.3):
         map_.update(Pose2(1.5 - away, 0.0), image(ramp(8, away, 0.08), LEVEL))
         assert not (map_.view.costs == 254).any()

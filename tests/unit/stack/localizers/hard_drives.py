@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, RoomDrive, cast
+from simscen.testing.synthetic_room import (
+    BEAMS,
+    BOXES,
+    READINGS_PER_SCAN,
+    SCAN_PERIOD_TICKS,
+    TICK_RATE_HZ,
+    RoomDrive,
+    cast,
+)
 
 
 def kidnapped(before: RoomDrive, after: RoomDrive) -> RoomDrive:
@@ -37,7 +45,7 @@ def crowded(path: RoomDrive, seed: int, people: int = 8) -> RoomDrive:
     for row, (scan, yaw) in enumerate(zip(ranges, path.truth[::READINGS_PER_SCAN, 2], strict=True)):
         bearing += rng.normal(0, 0.05, people)
         distance = np.clip(distance + rng.normal(0, 0.05, people), 0.5, 3)
-        is_near = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE_HZ / period + phase) > 0
+        is_near = np.sin(2 * np.pi * row * SCAN_PERIOD_TICKS / TICK_RATE_HZ / period + phase) > 0
         for direction, range_m in zip(bearing[is_near], distance[is_near], strict=True):
             angle = np.abs((angles - direction + yaw + np.pi) % (2 * np.pi) - np.pi)
             np.minimum(scan, range_m, out=scan, where=angle < np.arctan(0.3 / range_m))

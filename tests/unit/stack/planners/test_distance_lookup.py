@@ -5,12 +5,12 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distances
 from simscen.stack.planners.pose_search import DistanceLookup
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 
 def test_distance_lookup_equals_the_costmap_and_detects_outside_points() -> None:
     world = Flatland().room(8, 6)
-    view = LayeredCostmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), RATE)).view
+    view = LayeredCostmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), TICK_RATE_HZ)).view
     tested = DistanceLookup(view)
     for x, y in np.random.default_rng(1).uniform((0, 0), (8, 6), (50, 2)).tolist():
         assert tested.distance(x, y) == distances(view, np.array([[x, y]]))[0]

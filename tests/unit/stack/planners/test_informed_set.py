@@ -8,14 +8,14 @@ from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 
 def ground(*boxes: tuple[float, float, float, float], radius: float = 0.22) -> TraversalCosts:
     world = Flatland(list(boxes)).room(10, 6)
     grid = world.grid((-0.5, -0.5, 10.5, 6.5))
     robot = round_robot(radius)
-    return TraversalCosts(LayeredCostmap(Spec(), Surroundings(robot, grid, RATE)).view, robot, 2.0, True)
+    return TraversalCosts(LayeredCostmap(Spec(), Surroundings(robot, grid, TICK_RATE_HZ)).view, robot, 2.0, True)
 
 
 WALL = (4.9, 0.0, 5.0, 4.0)  # the way from (1, 1) to (9, 1) leads over its end, at (4.95, 4.22)

@@ -17,7 +17,7 @@ from simscen.stack.planners.ompl_search import OmplSearch
 from simscen.stack.planners.path_postprocessing import SPACING_M, densify
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot
 
 ROBOT = round_robot()
 
@@ -35,7 +35,7 @@ def house() -> Flatland:
 
 def view_of(world: Flatland, robot: RobotModel = ROBOT, size: tuple[float, float] = (14, 10)) -> CostmapView:
     grid = world.grid((-0.5, -0.5, size[0] + 0.5, size[1] + 0.5))
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, TICK_RATE_HZ)).view
 
 
 def shortest(view: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
@@ -119,7 +119,7 @@ def test_planning_failures_have_nav2_error_codes(
     world = house()
     world.boxes += [(16.0, 0.0, 16.1, 5.0), (16.0, 5.0, 19.0, 5.1), (18.9, 0.0, 19.0, 5.0), (16.0, 0.0, 19.0, 0.1)]
     grid = world.grid((-0.5, -0.5, 19.5, 10.5))
-    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, TICK_RATE_HZ)).view
     with pytest.raises(NavigationFailure) as failed:
         planner().plan(view, Pose2(*start), Pose2(*goal), 1)
     assert failed.value.code == code

@@ -14,7 +14,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.planners import ompl_planner as ompl_planner_module
 from simscen.stack.planners.ompl_planner import ompl_planner
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, box_robot, setting
+from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, setting
 
 CAR = RobotModel(box_robot(0.9, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.8)
 OMNI = replace(CAR, turning_radius=0.0, max_lateral=1.0, holonomic=True)
@@ -23,7 +23,7 @@ OMNI = replace(CAR, turning_radius=0.0, max_lateral=1.0, holonomic=True)
 def hall(*boxes: tuple[float, float, float, float], robot: RobotModel = CAR) -> CostmapView:
     world = Flatland().room(9, 6)
     world.boxes += boxes
-    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), TICK_RATE_HZ)).view
 
 
 def planned(view: CostmapView, start: Pose2, goal: Pose2, robot: RobotModel = CAR, **options: object) -> np.ndarray:
