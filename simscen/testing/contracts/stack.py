@@ -126,7 +126,7 @@ class StackContract(Contract):
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
-        """Given a goal that preempts the task then the current goal is canceled, and the robot drives to the new one."""
+        """Given a goal that preempts then the current goal is canceled, and the robot drives to the new goal."""
         d = self.new_drive(FAR).run(1)
         call_component("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
         d.run(0.5, until="")
