@@ -1,7 +1,4 @@
-"""Shell completion of arguments: each function returns the values that start with an incomplete argument.
-
-Commands import this module, so its functions import what they need only when they are called.
-"""
+"""Shell completion of arguments. The functions return the values that start with an incomplete argument."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,24 +7,24 @@ from simscen.core.version import PACKAGE
 
 
 def scenarios(incomplete: str) -> list[str]:
-    """Return scenario files and folders."""
+    """Return paths of scenario files and folders."""
     from simscen.loading.files.discovery import SCENARIO_SUFFIXES
 
     return list(_files(incomplete, SCENARIO_SUFFIXES))
 
 
 def logs(incomplete: str) -> list[str]:
-    """Return logs and folders."""
+    """Return paths of MCAP logs and folders."""
     return list(_files(incomplete, (".mcap",)))
 
 
 def files(incomplete: str) -> list[str]:
-    """Return YAML files and folders."""
+    """Return paths of YAML files and folders."""
     return list(_files(incomplete, (".yaml", ".yml")))
 
 
 def topics(incomplete: str) -> list[str]:
-    """Return the names that `explain` knows; for an argument with a dot, the keys of topics."""
+    """Return names that `simscen explain` knows; for an argument with a dot, paths of keys such as `goals.pose`."""
     from simscen.cli.catalog.topic_lookup import known_names
 
     names = known_names(keys="." in incomplete)
@@ -35,12 +32,12 @@ def topics(incomplete: str) -> list[str]:
 
 
 def scenarios_to_copy(incomplete: str) -> list[str]:
-    """Return ids of shipped scenarios, and scenario files and folders."""
+    """Return ids of shipped scenarios, and paths of scenario files and folders."""
     return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *scenarios(incomplete)]
 
 
 def stacks(incomplete: str) -> list[str]:
-    """Return names of stacks: shipped, installed, and configured by the user."""
+    """Return names of stacks: of simscen, of installed packages, and of the user's configuration."""
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
@@ -71,12 +68,12 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
 
 
 _SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
-"""Folders that contain the folder `scenarios`: the first in an installed package, the second in a checkout."""
+"""Possible parents of the folder `scenarios`: in an installed package, and in a clone of the repository."""
 _SUFFIX = ".scenario.yaml"
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """Return the files of the shipped scenarios by id, such as "navigation/goal"; empty if they are not installed."""
+    """Return the files of the shipped scenarios by id, such as "navigation/goal"; empty without shipped scenarios."""
     folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
     if folder is None:
         return {}

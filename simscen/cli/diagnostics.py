@@ -1,4 +1,4 @@
-"""Formats problems (errors and warnings about files) as text, JSON, or GitHub annotations, and prints text safely."""
+"""Output of problems (errors and warnings about files) as text, JSON, and GitHub annotations."""
 
 import json
 import os
@@ -22,9 +22,9 @@ from simscen.report.display_text import (
 )
 
 MAX_PROBLEMS_PER_FILE = 50
-"""Number of problems of one file that are printed; further ones are only counted."""
+"""Maximum number of problems of one file that are printed."""
 MAX_COLUMNS = 100
-"""Maximum number of characters in a line of a hint or of the source."""
+"""Maximum width of a hint or of an excerpt of a source line, in characters."""
 
 _WORD = r"(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+"
 _TOKEN = re.compile(rf"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|-(?=\s)|{_WORD}(?: +{_WORD})*""")
@@ -33,17 +33,17 @@ _WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
 
 
 def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[Problem]:
-    """Convert the paths of problems from relative to `root` to relative to the working directory.
+    """Return the problems with paths relative to the working directory, or absolute paths if these are shorter.
 
-    Terminals and editors can open such paths. An absolute path is used if it is shorter.
+    The paths of the given problems are relative to `root`.
     """
     return [replace(problem, path=_relative_path(problem.path, root)) for problem in problems]
 
 
 def as_text(problems: Sequence[Problem]) -> str:
-    """Return each problem with its source line, a caret, and its hint; at most MAX_PROBLEMS_PER_FILE for each file.
+    """Return each problem as lines: place and message, source line, carets, and hint.
 
-    The problems of one file must be adjacent.
+    The problems of one file must be adjacent. Only the first MAX_PROBLEMS_PER_FILE of a file are included.
     """
     blocks = []
     for path, group in groupby(problems, key=lambda problem: problem.path):
@@ -55,7 +55,7 @@ def as_text(problems: Sequence[Problem]) -> str:
 
 
 def as_json(problems: Iterable[Problem], **more: Any) -> str:
-    """Return a JSON object with the list `problems`, and with the keyword arguments as further keys."""
+    """Return a JSON object with the key `problems`. The keyword arguments are further keys."""
     keys = ("path", "line", "col", "code", "severity", "message", "hint")
     listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
     return escape_ci_markers_in_json(json.dumps({**more, "problems": listed}, indent=2))
@@ -67,15 +67,12 @@ def as_github(problems: Iterable[Problem]) -> str:
 
 
 def escaped(text: str) -> str:
-    """Return untrusted text on one line, without control sequences of terminals and CI systems.
-
-    GitHub executes `::command::` at the start of a line; a backslash prevents it.
-    """
+    """Return untrusted text as one line without control sequences of terminals and commands of CI systems."""
     return escape_ci_markers(_WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)))
 
 
 def print_text(text: str, stream: TextIO | None = None) -> None:
-    """Print to a stream (default: stdout). Characters that its encoding lacks are replaced by ASCII."""
+    """Print to a stream, by default stdout. If its encoding cannot represent the text, print ASCII characters only."""
     out = sys.stdout if stream is None else stream
     try:
         text.encode(out.encoding or "ascii")
@@ -102,7 +99,7 @@ def _block(problem: Problem) -> str:
 
 
 def _excerpt(problem: Problem) -> list[str]:
-    """Return the source line, and carets under the key or value; of a long line, only the part around them."""
+    """Return two lines: the source line, and carets under the key or value. Long source lines are shortened."""
     source, start = problem.source.replace("\t", " "), max(problem.col - 1, 0)
     token = _TOKEN.match(source, start)
     length = len(token[0]) if token else 1
@@ -117,22 +114,22 @@ def _excerpt(problem: Problem) -> list[str]:
 
 def _annotation(problem: Problem) -> str:
     level = "error" if problem.severity == "error" else "warning"
-    where = f"file={_property(relative_to_checkout(problem.path))}"
+    where = f"file={_escape_property(relative_to_checkout(problem.path))}"
     if problem.line:
         where += f",line={problem.line},col={problem.col}"
     message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
-    return f"::{level} {where},title={_property(f'simscen {problem.code}')}::{_data(message)}"
+    return f"::{level} {where},title={_escape_property(f'simscen {problem.code}')}::{_escape_message(message)}"
 
 
-def _data(text: str) -> str:
+def _escape_message(text: str) -> str:
     return escape_ci_markers(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _property(text: str) -> str:
-    return _data(text).replace(":", "%3A").replace(",", "%2C")
+def _escape_property(text: str) -> str:
+    return _escape_message(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def _relative_path(path: str, root: Path) -> str:
-    """Return the shorter of the relative and the absolute path; a path that does not exist is returned unchanged."""
+    """Return the relative or the absolute path, whichever is shorter. A missing path is returned unchanged."""
     absolute = str(root.absolute() / path)
     return min(os.path.relpath(absolute), absolute, key=len) if os.path.lexists(absolute) else path

@@ -1,6 +1,6 @@
 """Checks of the machine and the installation for `simscen doctor`.
 
-Each check returns a text about what it found, or raises CheckFailed.
+Each check returns its result as text, or raises CheckFailed.
 """
 
 import os
@@ -18,28 +18,28 @@ from simscen.run.reproducibility import PACKAGES, cpu_flags
 
 SUPPORTED_PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 MIN_DISK_BYTES = 500 << 20
-"""Space for about a hundred logs of one minute."""
+"""Minimum free disk space: about a hundred logs of one minute."""
 MIN_MEMORY_BYTES = 1 << 30
-"""Memory that is enough for a run in a typical world."""
+"""Minimum memory limit of a run."""
 MIN_SHARED_MEMORY_BYTES = 16 << 20
-"""Space in /dev/shm that OpenMP and the renderer request."""
+"""Minimum free space in /dev/shm, which OpenMP and the renderer use."""
 MIN_OPEN_FILES = 64
-"""Number of open files that is enough for a run."""
+"""Minimum limit of open files of a run."""
 
 
 class CheckFailed(Exception):
-    """A check failed; the message states the reason and what to do."""
+    """A check failed. The message states the reason, and what to do."""
 
 
 def check_python() -> str:
-    """Check the Python version, and return it with the path of the interpreter."""
+    """Check the version of Python, and return the version and the path of the interpreter."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         raise CheckFailed(f"{platform.python_version()}: simscen needs Python 3.10 to 3.13")
     return f"{platform.python_version()} ({sys.executable})"
 
 
 def check_packages() -> str:
-    """Check that all packages are installed in supported versions, and return the versions."""
+    """Check that all required packages have supported versions, and return the versions that affect logs."""
     if problems := unmet_requirements():
         raise CheckFailed("; ".join(problems))
     return ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
@@ -53,12 +53,12 @@ def _version(name: str) -> str:
 
 
 def describe_processor() -> str:
-    """Return architecture, number of cores, and CPU flags: the logs of different CPUs may differ in the last bits."""
+    """Return architecture, number of cores, and CPU flags of this machine."""
     return f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {' '.join(cpu_flags()) or 'flags unknown'}"
 
 
 def check_fork() -> str:
-    """Check that processes can be forked: each run is forked from another process."""
+    """Check that processes can be forked."""
     if sys.platform != "linux":
         raise CheckFailed(f"{sys.platform}: simscen runs on Linux only")
     child = os.fork()
@@ -70,7 +70,7 @@ def check_fork() -> str:
 
 
 def check_pidfd() -> str:
-    """Check that the system call pidfd_open works, with which the supervisor waits for processes."""
+    """Check that the system call pidfd_open works, and return the version of Linux."""
     try:
         os.close(os.pidfd_open(os.getpid()))
     except (AttributeError, OSError) as error:
@@ -90,7 +90,7 @@ def check_writable(folder: Path) -> str:
 
 
 def check_disk_space(folder: Path) -> str:
-    """Check that the folder is writable and has space for logs."""
+    """Check that a folder is writable and has MIN_DISK_BYTES of free space."""
     result = check_writable(folder)
     free = shutil.disk_usage(folder).free
     if free < MIN_DISK_BYTES:
@@ -99,7 +99,7 @@ def check_disk_space(folder: Path) -> str:
 
 
 def check_resource_limits() -> str:
-    """Check that the limits of shell, container, and system allow a run."""
+    """Check that the limits of shell, container, and system for memory, open files, and file sizes allow a run."""
     memory = min(_soft_limit(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
     files, length = _soft_limit(resource.RLIMIT_NOFILE), _soft_limit(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:
@@ -114,7 +114,7 @@ def check_resource_limits() -> str:
 
 
 def check_shared_memory() -> str:
-    """Check that /dev/shm has free space; Docker limits it to 64 MiB."""
+    """Check that /dev/shm has MIN_SHARED_MEMORY_BYTES of free space."""
     try:
         free = shutil.disk_usage("/dev/shm").free
     except OSError as error:
@@ -125,13 +125,13 @@ def check_shared_memory() -> str:
 
 
 def _soft_limit(limit: int) -> int:
-    """Return the soft limit of a resource (RLIMIT_…), or sys.maxsize if it is unlimited."""
+    """Return the soft limit of a resource, such as resource.RLIMIT_AS; sys.maxsize if the resource is unlimited."""
     soft = resource.getrlimit(limit)[0]
     return sys.maxsize if soft == resource.RLIM_INFINITY else soft
 
 
 def _cgroup_memory() -> int:
-    """Return the memory limit of the control group (version 2 or 1) in bytes, or sys.maxsize if there is none."""
+    """Return the memory limit of the control group (version 2 or 1) in bytes; sys.maxsize without a limit."""
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             text = Path(name).read_text(encoding="ascii").strip()

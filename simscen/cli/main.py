@@ -38,10 +38,9 @@ class _LazyModule(ModuleType):
 
 
 def import_lazily(name: str, *functions: str) -> None:
-    """Defer the import of a module until one of its attributes is accessed.
+    """Defer the import of a module until one of its attributes is accessed, as by `from name import attribute`.
 
-    `from name import attribute` is such an access, except for the names in `functions`. Each of these is imported as a
-    stand-in function, which imports the module when it is called.
+    The attributes in `functions` can be imported without this effect. They import the module when they are called.
     """
     if name in sys.modules:
         return
@@ -58,7 +57,7 @@ def import_lazily(name: str, *functions: str) -> None:
 
 
 def _lazy_function(module: str, function: str) -> Any:
-    """Return a stand-in function that imports the module and calls its function with the same arguments."""
+    """Return a function that imports the module, and calls the module's function with the same arguments."""
 
     def call(*arguments: Any, **keywords: Any) -> Any:
         if isinstance(sys.modules[module], _LazyModule):
@@ -97,27 +96,27 @@ COMMANDS = {
 }
 """Help text of each command by name.
 
-The module `simscen.cli.commands.<name>` has a function `command`, or an `app` with subcommands.
+The command is the function `command` in the module `simscen.cli.commands.<name>`, or the typer application `app`.
 """
 
 LIGHT_COMMANDS = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
-"""Commands that must start fast. Importing NumPy takes long, so they import it only when they use it."""
+"""Commands that must start fast, and therefore import NumPy only when they use it."""
 
 
 def is_light(arguments: Sequence[str]) -> bool:
-    """Return whether the command line needs only a light command, the help, or the version."""
+    """Return whether command-line arguments call one of LIGHT_COMMANDS, or request only the help or the version."""
     return not arguments or arguments[0] in LIGHT_COMMANDS or arguments[0].startswith("-")
 
 
 class CommandGroup(TyperGroup):
-    """Command group that imports only the module of the called command, so that `validate` never loads PyBullet."""
+    """Command group that imports only the module of the called command."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the available commands in the order of COMMANDS."""
         return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Import the module of a command and return the command, or None if there is no such command."""
+        """Import the module of a command, and return the command; None for an unknown command."""
         if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
         if cmd_name in LIGHT_COMMANDS or cmd_name == "run":
@@ -150,7 +149,7 @@ app = typer.Typer(
 )
 
 
-def _print_version(is_requested: bool) -> None:
+def _print_version_and_exit(is_requested: bool) -> None:
     if is_requested:
         from importlib.metadata import version
 
@@ -161,14 +160,14 @@ def _print_version(is_requested: bool) -> None:
 @app.callback()
 def _simscen(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", callback=_print_version_and_exit, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Run declarative, deterministic scenario tests for mobile-robot navigation."""
 
 
 def main() -> None:
-    """Run the command line and exit. Expected errors are printed without a traceback and set the exit code."""
+    """Run the command line and exit. Print a SimscenError without a traceback, and exit with its code."""
     reopen_closed_streams()
     # Pydantic plug-ins of other packages could change which files are valid, and searching for them takes time.
     os.environ[PYDANTIC_PLUGINS_VARIABLE] = "__all__"
@@ -181,7 +180,7 @@ def main() -> None:
 
 
 def _run_command() -> int:
-    """Run the command and return its exit code. If an error ends the command, return the exit code of the error."""
+    """Run the command, print its error, if any, and return the exit code."""
     try:
         try:
             if sys.argv[1:2] and not sys.argv[1].startswith("-"):
@@ -206,6 +205,7 @@ def _run_command() -> int:
 
 
 def _print_error(error: SimscenError) -> Exit:
+    """Print an expected error, and return its exit code."""
     if isinstance(error, InvalidInput):
         from simscen.cli.diagnostics import as_text, print_text
 
@@ -218,6 +218,7 @@ def _print_error(error: SimscenError) -> Exit:
 
 
 def _print_internal_error() -> Exit:
+    """Print the traceback of the current exception as a bug of simscen, and return INTERNAL."""
     import traceback
 
     traceback.print_exc()

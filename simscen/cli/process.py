@@ -1,4 +1,4 @@
-"""Process of a command: standard streams, working directory, environment variables, and user configuration file."""
+"""Process of a command: standard streams, working directory, environment variables, and configuration file."""
 
 import errno
 import os
@@ -11,21 +11,20 @@ from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
-"""Error numbers of a stream that accepts no more output: disk full, quota exceeded, terminal closed."""
+"""Error numbers of writing to a stream: disk full, quota exceeded, terminal closed."""
 
 PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
 """Environment variable that disables plug-ins of pydantic."""
 COMPLETION_VARIABLE = "_SIMSCEN_COMPLETE"
-"""Environment variable through which a shell asks click for completions."""
+"""Environment variable with which a shell requests completions from click."""
 _PYDANTIC_PLUGINS_AT_START = os.environ.get(PYDANTIC_PLUGINS_VARIABLE)
-"""Value that the caller of simscen set; simscen overrides it for its own process."""
+"""Value of this variable at the start; None if it was not set. `main` changes the variable."""
 
 
 def reopen_closed_streams() -> None:
-    """Redirect closed standard streams (`simscen run . >&-`) to /dev/null.
+    """Redirect closed standard streams, as in `simscen run . >&-`, to /dev/null.
 
-    Otherwise the next file that is opened, for example the journal, would get the file descriptor of the closed stream,
-    and everything printed to the stream would be written to that file.
+    Otherwise, the next opened file would get the file descriptor of the stream, and all printed text.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -45,7 +44,7 @@ def require_working_directory() -> None:
 
 
 def report_lost_output(error: OSError) -> Exit:
-    """Print to stderr why stdout accepts no more output, discard all further output, and return INCOMPLETE."""
+    """Print the error of writing to stdout to stderr, discard all further output, and return INCOMPLETE."""
     discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
@@ -55,7 +54,10 @@ def report_lost_output(error: OSError) -> Exit:
 
 
 def flush_output(code: Exit | int) -> Exit | int:
-    """Flush stdout and stderr, and return the exit code: `code`, or INCOMPLETE if output was lost."""
+    """Flush stdout and stderr, and return the final exit code of the process.
+
+    It is `code`, or INCOMPLETE if output was lost and `code` does not report an error already.
+    """
     try:
         sys.stdout.flush()
         sys.stderr.flush()
@@ -77,7 +79,7 @@ def discard_output(descriptor: int) -> None:
 
 @contextmanager
 def engine_output_on_stderr() -> Iterator[None]:
-    """Redirect file descriptor 1 to stderr, because Bullet prints warnings from C to stdout."""
+    """Redirect file descriptor 1 to stderr within the context, because Bullet prints warnings to stdout."""
     sys.stdout.flush()
     saved = os.dup(1)
     os.dup2(2, 1)
@@ -90,7 +92,7 @@ def engine_output_on_stderr() -> Iterator[None]:
 
 
 def caller_environment() -> dict[str, str]:
-    """Return the environment variables as the caller of simscen set them, for programs that simscen starts."""
+    """Return the environment variables that the process had at its start, for programs that simscen starts."""
     changed = {PYDANTIC_PLUGINS_VARIABLE, *pinned_variables()}
     variables = {name: value for name, value in os.environ.items() if name not in changed}
     if _PYDANTIC_PLUGINS_AT_START is not None:

@@ -1,10 +1,10 @@
-"""Finds installed packages whose versions do not meet the requirements of simscen."""
+"""Comparison of the versions of installed packages with the requirements of simscen."""
 
 import re
 from collections.abc import Iterator
 
 MIN_TYPER = (0, 20)
-"""Oldest version of typer (major, minor) that works with every version of click; also in pyproject.toml."""
+"""Oldest supported version of typer (major, minor), as in pyproject.toml."""
 
 _COMPARE = {
     ">=": lambda installed, required: installed >= required,
@@ -27,7 +27,7 @@ def unmet_requirements() -> list[str]:
 
 
 def unmet_typer() -> list[str]:
-    """Return a message if typer is too old. Light commands check nothing else, because that would slow their start."""
+    """Return a message if typer is too old. This is faster than `unmet_requirements`."""
     from typer import __version__
 
     required = f">={'.'.join(map(str, MIN_TYPER))}"
@@ -56,7 +56,7 @@ def _mismatch(name: str, installed: str, required: str) -> str:
 
 
 def _version_numbers(version: str) -> tuple[int, ...]:
-    """Return the numbers of a version for comparison, without trailing zeros; 2.17.7.post6 is newer than 2.17.7."""
+    """Return the numbers of a version without trailing zeros: (2, 17, 7, 6) for 2.17.7.post6."""
     numbers = [int(number) for number in re.findall(r"\d+", version.split("+", maxsplit=1)[0])]
     while numbers and numbers[-1] == 0:
         numbers.pop()

@@ -1,4 +1,4 @@
-"""Command-line options that several commands share: options for runs, and options for reading logs."""
+"""Command-line options of several commands: for runs, and for reading logs."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -30,7 +30,7 @@ LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported
 
 
 class TimeStamps(str, Enum):
-    """Time stamp of a message that is used: that in its header, or the time at which it was logged."""
+    """Time stamp of a message: the stamp in its header, or the time at which it was logged."""
 
     HEADER = "header"
     LOG = "log"
@@ -58,10 +58,9 @@ SameFrameOption = Annotated[
 def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
-    """Return the options for reading a log that simscen did not write.
+    """Return the options for reading the log of a real robot, from the values of the options of the same names.
 
-    The parameters are the values of --truth, --topic, --time, --tick-rate, and --same-frame. Raises UsageError if
-    --truth or --topic is invalid.
+    Raises UsageError if --truth or --topic is invalid.
     """
     clock: Clock = "log" if time is TimeStamps.LOG else "header"
     options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
@@ -70,7 +69,7 @@ def foreign_log_options(
 
 
 def _check_truth(options: ForeignLogOptions) -> None:
-    """Raise UsageError if --truth is malformed or is the topic of the robot's belief."""
+    """Raise UsageError if --truth has the wrong form, or is the topic of the robot's pose estimate."""
     if options.truth is None:
         return
     if not options.truth.startswith("/") and not (options.frames and all(options.frames)):
@@ -81,9 +80,9 @@ def _check_truth(options: ForeignLogOptions) -> None:
 
 
 def parse_topics(arguments: list[str], names: Collection[str]) -> dict[str, str]:
-    """Return the topics by name, from arguments such as "odom=/my/odom".
+    """Return topics by name from arguments such as "odom=/my/odom".
 
-    Raises UsageError if an argument has another form, or its name is not one of `names`.
+    Raises UsageError for an argument of another form, or with a name that is not in `names`.
     """
     topics = {}
     for argument in arguments:

@@ -1,4 +1,4 @@
-"""Entry point of the installed command `simscen`, tuned so that light commands start fast."""
+"""Entry point of the command `simscen`."""
 
 import gc
 import os
@@ -8,16 +8,12 @@ from typing import NoReturn
 
 INTERRUPTED = 130
 INCOMPLETE = 3
-"""Exit codes, equal to those of `simscen.core.errors.Exit`, whose module is not imported yet."""
+"""Exit codes as in `simscen.core.errors.Exit`, which is not imported here to start fast."""
 
 
 def start() -> None:
-    """Run the command line.
-
-    To start and end fast, it disables garbage collection during imports and skips the teardown of the interpreter after
-    light commands (docs/design/startup.md).
-    """
-    gc.disable()
+    """Run the command line, and exit."""
+    gc.disable()  # until the command is imported, to start fast (docs/design/startup.md)
     try:
         from simscen.cli.main import is_light, main
         from simscen.core.cpu_kernels import pin_kernels
@@ -33,14 +29,14 @@ def start() -> None:
         main()
     except SystemExit as end:
         if light and isinstance(end.code, int):
-            os._exit(end.code)  # all output is flushed
+            os._exit(end.code)  # skips the teardown of the interpreter; all output is flushed
         raise
 
 
 def _check_requirements(all_packages: bool) -> None:
     """Exit with a message if a package is missing or has an unsupported version.
 
-    Without `all_packages`, only typer is checked, which every command needs.
+    Unless `all_packages`, only typer is checked.
     """
     from simscen.cli.requirements import unmet_requirements, unmet_typer
 
@@ -49,13 +45,13 @@ def _check_requirements(all_packages: bool) -> None:
 
 
 def _exit_unusable(problems: list[str]) -> NoReturn:
-    """Print what is wrong with the installation, and exit with INCOMPLETE."""
+    """Print the problems of the installation, and exit with INCOMPLETE."""
     print(f"simscen: this installation does not work: {'; '.join(problems)}", file=sys.stderr)
     sys.exit(INCOMPLETE)
 
 
 def _exit_on_interrupt(*_: object) -> NoReturn:
-    """Exit without a traceback when Ctrl-C arrives during imports."""
+    """Exit without a traceback: handler of SIGINT (Ctrl-C) during imports."""
     os._exit(INTERRUPTED)
 
 

@@ -1,4 +1,4 @@
-"""Command `simscen bench localization`: measures the accuracy of AMCL."""
+"""Command `simscen bench localization`, which measures the accuracy of AMCL."""
 
 import json
 import os
@@ -75,6 +75,7 @@ def command(
 
 
 def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, format_: Format) -> None:
+    """Run the benchmark with --sparse on the buildings with these numbers, and print the table."""
     from simscen.bench.localization.sparse_logs import run_sparse_logs, sparse_table
 
     if only:
@@ -96,6 +97,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
 
 
 def _print_failures(name: str, trials: "Sequence[Trial]") -> None:
+    """Print each trial without success to stderr. `name` is that of the parameter set."""
     for trial in trials:
         if not trial.succeeded:
             log = f"building {trial.building}, log {trial.number}, {trial.circumstance}"
@@ -108,11 +110,14 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Heading of the column for each circumstance of the logs."""
+"""Column heading of each circumstance of the logs."""
 
 
 def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -> str:
-    """Return one line per set of parameters, then the consistency of each, wrapped at `columns` (None: unlimited)."""
+    """Return a table with a line for each parameter set, and then the consistency (ANEES) of each parameter set.
+
+    Lines are wrapped at `columns` characters; None stands for unlimited width.
+    """
     head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
     lines = align_columns([head, *table], str.ljust)
@@ -124,23 +129,23 @@ def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -
 def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
     return (
         row.parameters,
-        *(_share_text(row.shares[name]) for name in COLUMN_NAMES),
+        *(_success_text(row.shares[name]) for name in COLUMN_NAMES),
         f"{row.median:.3f} m{_interval_text(row.median_interval)}",
         f"{row.ms:.1f}",
         f"{row.slowest_ms:.0f}",
     )
 
 
-def _share_text(share: "SuccessRate") -> str:
-    return f"{share.count} of {share.of}{_interval_text(share.interval, '.2f')}"
+def _success_text(rate: "SuccessRate") -> str:
+    return f"{rate.count} of {rate.of}{_interval_text(rate.interval, '.2f')}"
 
 
-def _interval_text(interval: "Interval", form: str = ".3f") -> str:
-    return "" if interval is None else f" ({interval[0]:{form}} … {interval[1]:{form}})"
+def _interval_text(interval: "Interval", number_format: str = ".3f") -> str:
+    return "" if interval is None else f" ({interval[0]:{number_format}} … {interval[1]:{number_format}})"
 
 
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
-    """Return the ANEES for each circumstance, with the values that a consistent covariance would give."""
+    """Return lines with the ANEES for each circumstance, and its bounds for a consistent localizer."""
     from simscen.bench.localization.campaign import CHECK_TIMES_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:

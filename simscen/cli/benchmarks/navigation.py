@@ -1,4 +1,4 @@
-"""Command `simscen bench nav`: measures the navigation of the reference stack."""
+"""Command `simscen bench nav`, which measures the navigation of the reference stack."""
 
 import os
 import sys
@@ -119,9 +119,9 @@ def command(
 
 
 def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
-    """Return the same experiments with the parameters of a stack file.
+    """Return experiments with the same drives and the parameters of a stack file. Raises InvalidInput.
 
-    New scenarios are written to `generated`. `project` is the root of the stack file. Raises InvalidInput.
+    Their scenarios are written to the folder `generated`. `project` is the root folder of the stack file.
     """
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.choice import load_stack_file
@@ -139,4 +139,5 @@ def with_stack(file: Path, experiments: list["Experiment"], generated: Path, pro
 
 
 def _is_selected(name: str, only: list[str] | None) -> bool:
+    """Return whether --only selects the name of an experiment or group."""
     return not only or any(part.casefold() in name.casefold() for part in only)

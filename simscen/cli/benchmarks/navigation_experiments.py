@@ -1,4 +1,4 @@
-"""Groups of experiments of `simscen bench nav`, with the functions that create them."""
+"""Groups of experiments of `simscen bench nav`. The experiments of a group are created only if they are selected."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from simscen.core.environment.world_model import BuiltWorld
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
-"""Names of the shipped worlds with random goals."""
+"""Names of the shipped worlds in which robots drive to random goals."""
 BARN_SOURCE = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2_SOURCE = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
-"""Messages for experiments whose data is missing: the option, and the website of the data."""
+"""Messages if the data of BARN or Nav2 is missing."""
 LIDAR_HEIGHT_M = 0.2
-"""Height of the lidar for which the maps of worlds are generated."""
+"""Height of the lidar with which the maps of the worlds are made."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of the experiments.
+    """Sizes of the experiments: the options of `simscen bench nav` with the same names.
 
     first:    number of the first field, building, drive, and seed
     seeds:    number of seeds of each scenario; None for the default of each experiment
-    fields:   number of generated obstacle fields; there are half as many narrow fields
+    fields:   number of generated obstacle fields, and twice the number of narrow fields
     dynamic:  number of fields of moving cylinders at each speed
     goals:    number of random goals in each world, of ramps, and of corridors
     lost:     number of drives with an unknown start
@@ -43,11 +43,11 @@ class Sizes:
     lost: int = 50
 
     def seeds_or(self, default: int) -> Sequence[int]:
-        """Return the seeds of a scenario: `seeds` of them if that is set, otherwise `default`."""
+        """Return the seeds of a scenario. `default` is their number if `seeds` is None."""
         return self.numbers(self.seeds or default)
 
     def numbers(self, count: int) -> Sequence[int]:
-        """Return `count` numbers starting at `first`."""
+        """Return `count` consecutive numbers, of which the first is `first`."""
         return range(self.first, self.first + count)
 
 
@@ -56,10 +56,10 @@ class ExperimentGroup:
     """Group of experiments that need the same data.
 
     name:    name of the group
-    needs:   folder with the data; None if it was not given
-    make:    creates the experiments, which may take a while
-    source:  message if the folder was not given: its option, and the website of the data
-    parts:   names of the experiments, if they differ from the name of the group, to select them before they are created
+    needs:   folder with the data; None if the option for the folder was not given
+    make:    function that creates the experiments
+    source:  message if `needs` is None
+    parts:   names of the experiments, except the name of the group
     """
 
     name: str
@@ -70,7 +70,7 @@ class ExperimentGroup:
 
     @property
     def missing(self) -> str:
-        """Message about missing data; "" if the data is available."""
+        """Message that the data is missing; "" if the data is available."""
         if self.needs is None:
             return self.source
         return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
@@ -79,10 +79,10 @@ class ExperimentGroup:
 def experiment_groups(
     barn_data: Path | None, nav2: Path | None, project: Path, generated: Path, sizes: Sizes
 ) -> list[ExperimentGroup]:
-    """Return all groups of experiments in the order of the table.
+    """Return all groups of experiments in the order of the result table.
 
-    `barn_data` and `nav2` are the folders of --barn and --nav2. `project` is the folder with simscen's scenarios and
-    worlds. Generated files are written to `generated`.
+    `barn_data` and `nav2` are the folders of --barn and --nav2; None without these options. `project` is the folder
+    with simscen's scenarios and worlds. `generated` is the folder for generated files.
     """
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
@@ -92,7 +92,7 @@ def experiment_groups(
 
 
 def _parts(name: str, scenarios: Path) -> list[str]:
-    """Return the names of the experiments of a group that differ from its name."""
+    """Return the names of a group's experiments, except the name of the group."""
     match name:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
@@ -166,7 +166,7 @@ def _groups_without_parts(
 
 
 def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
+    """Write the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
     seeds = sizes.seeds_or(5)
     yield experiments.write_barn_challenge(generated, barn_data, seeds)
     yield experiments.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
@@ -175,6 +175,7 @@ def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
+    """Write the experiments with random goals in shipped worlds, and on ROS maps of generated buildings."""
     folder, maps = generated / "random_goals", generated / "buildings"
     yield random_goals.write_random_goals(
         "random goals", folder, _shipped_worlds(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
@@ -184,7 +185,7 @@ def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Exper
 
 
 def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    """Return the experiments with degraded sensing. The number of worlds is a quarter of `sizes.goals`."""
+    """Write the experiments with sensor faults, in a quarter of `sizes.goals` worlds."""
     folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)
     buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))
@@ -202,7 +203,7 @@ def _generated_buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, B
 
 
 def _build_worlds(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
-    """Return the built worlds by their file names. `folder` is created for the scenarios that use them."""
+    """Build the worlds of these files in the folder `worlds`, and return them by file name. Create `folder`."""
     from simscen.loading.builders import world_from_file
     from simscen.loading.files.single_files import load_world_file
     from simscen.worlds.built_world import build_world_and_map

@@ -1,4 +1,4 @@
-"""Executes the experiments of `simscen bench nav` as ordinary runs, and summarizes their results."""
+"""Execution of the experiments of `simscen bench nav`, and summary of their results."""
 
 import shlex
 import sys
@@ -29,19 +29,19 @@ from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 WALL_LIMIT_S = 1800.0
-"""Wall-clock limit of a run in seconds; long, because a busy machine is not a failure of the stack."""
+"""Wall-clock limit of a run."""
 ANEES_TIMES_S = (5.0, 10.0, 20.0, 30.0)
-"""Times in a run, in seconds, at which ANEES is averaged over the runs."""
+"""Simulated times at which the NEES is averaged over all runs."""
 
 
 @dataclass(frozen=True)
 class LocalizationAccuracy:
     """Accuracy of the localization in an experiment. The names of the fields are keys of the JSON output.
 
-    rmse:        root mean square error of the position in m, mean over the runs; None if no run has it
-    worst_rmse:  the largest of these errors in m
-    anees:       average NEES over the runs, by the time in the run in seconds (ANEES_TIMES_S)
-    bounds:      95 % interval of the ANEES for a consistent covariance
+    rmse:        mean over the runs of the root mean square position error in m; None without values
+    worst_rmse:  maximum over the runs of the root mean square position error in m; None without values
+    anees:       average NEES over the runs at each of ANEES_TIMES_S, by time in s
+    bounds:      95 % interval of the ANEES of a consistent localizer
     """
 
     rmse: float | None
@@ -52,9 +52,9 @@ class LocalizationAccuracy:
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """Result of one experiment: the row of the table, and the accuracy of the localization if it was measured.
+    """Result of one experiment. The names of the fields are keys of the JSON output.
 
-    The names of the fields are keys of the JSON output.
+    `tally` is the summary of its runs. `localized` is the accuracy of the localization; None if it was not measured.
     """
 
     tally: ExperimentSummary
@@ -64,10 +64,10 @@ class ExperimentResult:
 def execute_experiments(
     experiments: Sequence[Experiment], journal: Journal, workers: int
 ) -> tuple[list[list[Trial]], Exit | None]:
-    """Execute the runs that have no result in the journal yet, and print progress and failures to stderr.
+    """Execute all runs without a result in the journal, and print progress and failures to stderr.
 
-    Return the trials of each experiment, and the exit code of the signal that interrupted the runs, or None. Raises
-    InvalidInput.
+    Return the trials (runs with their results) of each experiment, and the exit code of the signal that interrupted the
+    runs; None without a signal. Raises InvalidInput.
     """
     jobs, drives = _plan_jobs(experiments, journal.folder)
     pending = plan_session(journal, jobs, workers)
@@ -106,8 +106,8 @@ ExperimentDrive = tuple[int, Drive]
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
     """Return a job for each run, and the experiment and drive of each run.
 
-    Only the first scenario of each experiment is validated. The others are generated in the same way, with
-    reachable goals. Raises InvalidInput, and ValueError for two runs with the same key.
+    Only the first scenario of each experiment is validated. Raises InvalidInput, and ValueError for two runs with the
+    same key.
     """
     jobs: list[Job] = []
     drives: dict[RunKey, ExperimentDrive] = {}
@@ -127,13 +127,13 @@ def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job],
 
 
 def _top_speed(scenario: LoadedScenario) -> float | None:
-    """Return the speed in m/s of the fastest robot; None if a robot is not defined by a robot file."""
+    """Return the speed in m/s of the fastest robot; None if a robot has no robot file."""
     robots = [view.robot.spec for view in scenario.robot_views.values()]
     return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 
 def repeat_command(job: Job) -> str:
-    """Return the command that repeats a run, with the root and the world path of its experiment."""
+    """Return the shell command that repeats a run."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
     root = ["--root", str(scenario.root)]
@@ -141,13 +141,13 @@ def repeat_command(job: Job) -> str:
 
 
 class _Progress:
-    """Prints the number of finished runs to a terminal, and each run that did not pass."""
+    """Listener that prints the number of finished runs and each run that did not pass to stderr."""
 
     def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
         self._total, self._jobs, self._done = total, jobs, done
 
     def __call__(self, event: SessionEvent) -> None:
-        """Process an event of the session."""
+        """Handle an event of the session."""
         if not isinstance(event, RunFinished) or _was_interrupted(event):
             return
         self._done += 1
@@ -161,7 +161,7 @@ class _Progress:
 
 
 def summarize_experiment(experiment: Experiment, trials: list[Trial]) -> ExperimentResult:
-    """Return the result of an experiment with these trials."""
+    """Return the result of an experiment from its trials."""
     row = summarize(experiment.name, trials)
     return ExperimentResult(row, _localization_accuracy(trials) if experiment.measures_localization else None)
 

@@ -1,4 +1,4 @@
-"""Output of `simscen bench nav` as text, fitted to the width of the terminal, and as JSON."""
+"""Output of `simscen bench nav` as text and as JSON."""
 
 import json
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulato
     f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
 )
 COMPARISON_HEAD = ("with minus without --stack", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
-"""Columns of the comparison. SCT is success weighted by completion time, and score is the BARN score."""
+"""Column headings of the comparison. SCT is success weighted by completion time, and score is the BARN score."""
 TABLE_HEAD = (
     "experiment",
     "runs",
@@ -30,10 +30,9 @@ TABLE_HEAD = (
 
 
 def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
-    """Return the table of results, then the effect of --stack on each pair of experiments, then published figures.
+    """Return the table of results, the comparisons of --stack in `pairs`, and the published figures of BARN.
 
-    If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers. None
-    stands for unlimited width.
+    `columns` is the width of the terminal in characters; None stands for unlimited width.
     """
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
     lines = align_columns(table)
@@ -50,33 +49,32 @@ def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] =
 
 
 def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = ()) -> str:
-    """Return all numbers as JSON, with the published figures of DWA."""
+    """Return results, comparisons, and the published figures of BARN as JSON."""
     data = {"experiments": [asdict(row) for row in rows], "dwa_published": PUBLISHED_DWA_RESULTS}
     return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
 
 
 def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
-    """Return one line per pair of experiments, or labeled numbers if such lines are too long."""
-    changes = [_changes(pair) for pair in pairs]
+    """Return a table with one line per comparison, or one number per line with its heading if the table is too wide."""
+    changes = [_comparison_cells(pair) for pair in pairs]
     lines = align_columns([COMPARISON_HEAD, *changes])
     if columns is None or fits(lines, columns):
         return lines
     return [COMPARISON_HEAD[0], *(line for row in changes for line in label_cells(COMPARISON_HEAD, row, columns))]
 
 
-def _changes(pair: DriveComparison) -> tuple[str, ...]:
-    """Return the cells of a row that compares the same drives with the parameters of --stack and without."""
+def _comparison_cells(pair: DriveComparison) -> tuple[str, ...]:
+    """Return the cells of one comparison, with the columns COMPARISON_HEAD."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
-    changes = (_change(difference, form) for difference, form in forms)
+    changes = (_difference_text(difference, form) for difference, form in forms)
     return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
 
 
-def _change(difference: Difference | None, form: str) -> str:
+def _difference_text(difference: Difference | None, number_format: str) -> str:
     if difference is None:
         return "-"
-    if difference.interval is None:
-        return f"{difference.mean:+{form}}"
-    return f"{difference.mean:+{form}} ({difference.interval[0]:+{form}} … {difference.interval[1]:+{form}})"
+    mean, *bounds = (f"{value:+{number_format}}" for value in (difference.mean, *(difference.interval or ())))
+    return f"{mean} ({' … '.join(bounds)})" if bounds else mean
 
 
 def _cells(row: ExperimentSummary) -> tuple[str, ...]:
@@ -89,19 +87,21 @@ def _cells(row: ExperimentSummary) -> tuple[str, ...]:
         f"{row.collisions:.3f}",
         f"{row.timeouts:.3f}",
         f"{row.failed + row.errors:.3f}",
-        _or_none(row.seconds, ".1f", " s"),
-        _or_none(row.path_ratio, ".2f"),
-        _or_none(row.sct, ".3f"),
-        _or_none(row.score, ".3f"),
+        _value_text(row.seconds, ".1f", " s"),
+        _value_text(row.path_ratio, ".2f"),
+        _value_text(row.sct, ".3f"),
+        _value_text(row.score, ".3f"),
     )
 
 
-def _or_none(value: float | None, form: str, unit: str = "") -> str:
-    return "-" if value is None else f"{value:{form}}{unit}"
+def _value_text(value: float | None, number_format: str, unit: str = "") -> str:
+    return "-" if value is None else f"{value:{number_format}}{unit}"
 
 
 def _localization_lines(experiment: str, localized: LocalizationAccuracy) -> list[str]:
     low, high = localized.bounds
     moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
-    errors = f"{_or_none(localized.rmse, '.3f', ' m')} RMSE, worst run {_or_none(localized.worst_rmse, '.3f', ' m')}"
+    errors = (
+        f"{_value_text(localized.rmse, '.3f', ' m')} RMSE, worst run {_value_text(localized.worst_rmse, '.3f', ' m')}"
+    )
     return [f"{experiment}: {errors}", f"  ANEES {moments}; a consistent belief lies in {low:.2f} … {high:.2f} (95 %)"]

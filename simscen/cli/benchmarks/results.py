@@ -1,4 +1,4 @@
-"""Results of `simscen bench`: JSON files, printed output, and the comparison of two results."""
+"""Results of `simscen bench speed` and similar commands: JSON files, printed output, and comparison of two results."""
 
 import json
 import sys
@@ -16,13 +16,13 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.installation import describe_processor
 from simscen.core.errors import UsageError
 
-FORMAT = 1
-"""Version of the JSON format; it increases when names or meanings change."""
+FORMAT_VERSION = 1
+"""Version of the JSON format."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Figures that one call of `simscen bench` measured, with the machine and the version of simscen."""
+    """Figures of one call of `simscen bench`, with a description of the machine and the version of simscen."""
 
     figures: Measurements
     machine: str
@@ -30,19 +30,19 @@ class Result:
 
     @classmethod
     def on_this_machine(cls, figures: Measurements) -> "Result":
-        """Return the result with the processor of this machine and the installed version of simscen."""
+        """Return the result of this machine and of the installed version of simscen."""
         return cls(figures, describe_processor(), version("simscen"))
 
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
-    """Return the result as JSON. `sections` are further keys: the data from which the figures were computed."""
-    header = {"simscen_bench": FORMAT, "simscen": result.simscen, "machine": result.machine}
+    """Return the result as JSON. `sections` are further keys."""
+    header = {"simscen_bench": FORMAT_VERSION, "simscen": result.simscen, "machine": result.machine}
     figures = {name: asdict(figure) for name, figure in result.figures.items()}
     return json.dumps({**header, "figures": figures, **(sections or {})}, indent=2)
 
 
 def read_result(file: Path) -> Result:
-    """Read a result from a JSON file. Raises UsageError if it is not a result or has another version."""
+    """Read a result from a JSON file. Raises UsageError if the file has another format or version."""
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -54,8 +54,8 @@ def read_result(file: Path) -> Result:
         raise UsageError(f"{file} is not a result of `simscen bench --format json`: {error}") from None
     if not isinstance(data, dict) or "simscen_bench" not in data:
         raise UsageError(f"{file} is not a result of `simscen bench --format json`: the key `simscen_bench` is missing")
-    if data["simscen_bench"] != FORMAT:
-        versions = f"format {data['simscen_bench']!r}, this version reads {FORMAT}"
+    if data["simscen_bench"] != FORMAT_VERSION:
+        versions = f"format {data['simscen_bench']!r}, this version reads {FORMAT_VERSION}"
         raise UsageError(
             f"{file} is a result of another version of simscen bench ({versions}): measure again with this one"
         )
@@ -71,10 +71,9 @@ def _figure(entry: dict[str, Any]) -> Measurement:
     return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 
 
-HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
-"""Headings of the comparison of two results."""
+COMPARISON_HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
 MIN_ROUNDS = 2
-"""Minimum number of rounds of a figure for telling changes from noise."""
+"""Minimum number of rounds (repeated measurements) of a figure to distinguish changes from noise."""
 
 
 def compare_command(
@@ -90,14 +89,14 @@ def compare_command(
 
 
 def comparison_text(before: Result, after: Result) -> str:
-    """Return one line for each figure that both results have, then the names of the others.
+    """Return one line for each common figure, and then the names of the other figures.
 
     Raises UsageError if the results have no common figure.
     """
     common = [name for name in after.figures if name in before.figures]
     if not common:
         raise UsageError("the two results have no common figure; compare results of the same command")
-    table = [HEAD, *(_row(name, before.figures[name], after.figures[name]) for name in common)]
+    table = [COMPARISON_HEAD, *(_comparison_row(name, before.figures[name], after.figures[name]) for name in common)]
     lines = align_columns(table)
     for figures, label in ((before.figures, "before"), (after.figures, "after")):
         if names := [name for name in figures if name not in common]:
@@ -110,7 +109,7 @@ def comparison_text(before: Result, after: Result) -> str:
 
 
 def judgment(before: Measurement, after: Measurement) -> str:
-    """Return "noise" if the ranges of the rounds overlap, otherwise "better" or "worse"; "" for too few rounds."""
+    """Return "noise" if the ranges of all rounds overlap, otherwise "better" or "worse"; "" with too few rounds."""
     if min(len(before.rounds), len(after.rounds)) < MIN_ROUNDS:
         return ""
     if min(after.rounds) <= max(before.rounds) and min(before.rounds) <= max(after.rounds):
@@ -118,7 +117,7 @@ def judgment(before: Measurement, after: Measurement) -> str:
     return "better" if (after.value > before.value) == after.more_is_better else "worse"
 
 
-def _row(name: str, before: Measurement, after: Measurement) -> tuple[str, ...]:
+def _comparison_row(name: str, before: Measurement, after: Measurement) -> tuple[str, ...]:
     ratio = f"{after.value / before.value:.2f}" if before.value else "-"
     values = (_value(before.value, before.unit), _value(after.value, after.unit))
     return name, *values, ratio, _spread(before), _spread(after), judgment(before, after)
@@ -140,16 +139,20 @@ class Format(str, Enum):
 
 
 COMPARE_HELP = "Compare with this result of --format json, and tell changes from noise."
+"""Help text of the option --compare."""
 
 
 def print_progress(text: str) -> None:
-    """Replace the progress line of a terminal by a text. Print nothing if stderr is not a terminal."""
+    """Replace the progress line on stderr by this text. Print nothing if stderr is not a terminal."""
     if sys.stderr.isatty():
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:
-    """Print a result as JSON with its sections, or as text with a comparison with the result `before`, if any."""
+    """Print a result in a format: as JSON with further keys `sections`, or `text`.
+
+    The text is followed by the comparison with the result `before`, if any.
+    """
     print_progress("")
     if format_ is Format.JSON:
         print(as_json(result, sections))
@@ -160,5 +163,5 @@ def print_result(result: Result, text: str, sections: dict[str, Any], format_: F
 
 
 def load_baseline(file: Path | None) -> Result | None:
-    """Return the result in the file of --compare, or None. Called before anything is measured. Raises UsageError."""
+    """Return the result in the file of the option --compare; None without a file. Raises UsageError."""
     return None if file is None else read_result(file)

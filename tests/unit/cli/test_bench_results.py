@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.bench.speed.measurement import Measurement
-from simscen.cli.benchmarks.results import FORMAT, Result, as_json, comparison_text, judgment, read_result
+from simscen.cli.benchmarks.results import FORMAT_VERSION, Result, as_json, comparison_text, judgment, read_result
 from simscen.core.errors import UsageError
 
 BEFORE = Result(
@@ -77,11 +77,19 @@ def test_result_survives_writing_and_reading(tmp_path: Path) -> None:
         ("[" * 100_000, "is not a result of `simscen bench --format json`"),
         ("[1]", "is not a result of `simscen bench --format json`: the key `simscen_bench` is missing"),
         ('{"patrol": {"cpu": 2.17}}', "the key `simscen_bench` is missing"),
-        (json.dumps({"simscen_bench": FORMAT + 1}), f"of another version of simscen bench (format {FORMAT + 1}, this"),
-        (json.dumps({"simscen_bench": FORMAT}), "is a damaged result of simscen bench: KeyError at 'figures'"),
-        (json.dumps({"simscen_bench": FORMAT, "figures": [1]}), "is a damaged result of simscen bench: AttributeError"),
         (
-            json.dumps({"simscen_bench": FORMAT, "figures": {"patrol": {"value": "fast", "unit": "", "rounds": []}}}),
+            json.dumps({"simscen_bench": FORMAT_VERSION + 1}),
+            f"of another version of simscen bench (format {FORMAT_VERSION + 1}, this",
+        ),
+        (json.dumps({"simscen_bench": FORMAT_VERSION}), "is a damaged result of simscen bench: KeyError at 'figures'"),
+        (
+            json.dumps({"simscen_bench": FORMAT_VERSION, "figures": [1]}),
+            "is a damaged result of simscen bench: AttributeError",
+        ),
+        (
+            json.dumps(
+                {"simscen_bench": FORMAT_VERSION, "figures": {"patrol": {"value": "fast", "unit": "", "rounds": []}}}
+            ),
             "is a damaged result of simscen bench: ValueError",
         ),
     ],
