@@ -48,7 +48,7 @@ class Parameter:
 
 
 def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the words that call a command, such as "world export", and its function; likewise for each subcommand."""
+    """Yield name and function of a command, or of each of its subcommands, such as "world export"."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)
     if app is None:
@@ -63,12 +63,12 @@ def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
-    """Return the arguments and options of the function of a command, in the order of its help."""
+    """Return the arguments and options of a command, given its function."""
     return [_parameter(*annotated) for annotated in _annotated_parameters(function)]
 
 
 def command_section(command: str, function: Callable[..., Any]) -> str:
-    """Return the Markdown section of a command, given the words that call it and its function."""
+    """Return the Markdown section of a command, given its name, such as "world export", and its function."""
     rows = [
         f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help.strip())} |"
         for p in parameters_of(function)
@@ -115,7 +115,7 @@ def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | Opt
 
 
 def _item_type(kind: Any) -> tuple[bool, Any]:
-    """Return whether a type that may be None is a list, and the type of its items."""
+    """Return whether a type is a list, and the type of its items or itself. None as an alternative is ignored."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(member for member in get_args(kind) if member is not type(None))
     repeated = get_origin(kind) is list
@@ -132,10 +132,7 @@ def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
 
 
 def _plain(text: str) -> str:
-    """Escape text for a Markdown table, so that *.world.yaml and <run-id> are neither emphasis nor HTML.
-
-    In code between backticks, only `|` is escaped.
-    """
+    """Escape text for a cell of a Markdown table. In code between backticks, escape only `|`."""
     parts = text.replace("|", "\\|").split("`")
     return "`".join(part if index % 2 else _ESCAPED.sub(r"\\\g<0>", part) for index, part in enumerate(parts))
 

@@ -1,4 +1,4 @@
-"""Writes the generated JSON Schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
+"""Generator of JSON Schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
 
 import sys
 from itertools import groupby
@@ -31,7 +31,7 @@ def generated_files() -> dict[str, str]:
 
 
 def outdated_files(root: Path = ROOT) -> list[str]:
-    """Return the generated files that are missing or not up to date."""
+    """Return the paths in the repository of the generated files that are missing or out of date."""
     return [
         name for name, text in generated_files().items() if not (root / name).is_file() or _read(root / name) != text
     ]
@@ -86,7 +86,7 @@ _HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
 
 
 def language_page(installed: bool = False) -> str:
-    """Return the text of docs/reference/language.md, with the types of installed packages if `installed`."""
+    """Return the text of docs/reference/language.md. With `installed`, include the types of installed packages."""
     all_topics = [*topics(installed), *added_topics(AnyMeasure, installed)]
     parts = [f"{_GENERATED_NOTE}# Language reference\n", _units()]
     for group, members in groupby(all_topics, key=lambda topic: topic.group):
@@ -134,7 +134,7 @@ def _section(topic: Topic) -> str:
 
 
 def _markdown(text: str) -> str:
-    """Return a docstring as Markdown; its headings become a list."""
+    """Return a docstring as Markdown. Its _HEADINGS become list items."""
     lines: list[str] = []
     for line in text.splitlines():
         heading = next((h for h in _HEADINGS if line.startswith(h)), None)

@@ -1,4 +1,4 @@
-"""Generates the JSON Schemas of simscen's YAML files, which editors use for completion, hover texts, and errors."""
+"""JSON Schemas of simscen's YAML files, which editors use for completion, hover texts, and errors."""
 
 import json
 from typing import Any
@@ -27,13 +27,13 @@ MODELS: dict[str, type[BaseModel]] = {
     "config": UserConfigSpec,
     "base": ScenarioSpec,
 }
-"""Model of each kind of file. A base file contains some of the keys of a scenario."""
+"""Pydantic model of each kind of file. A base file is a scenario file from which scenarios extend."""
 DRAFT = "http://json-schema.org/draft-07/schema#"
-"""Version of JSON Schema: the one that yaml-language-server supports best."""
+"""Version of JSON Schema."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """Return the JSON Schema of a kind of file, a key of MODELS; `installed` adds the types of installed packages."""
+    """Return the JSON Schema of a kind of file (a key of MODELS). `installed` adds the types of installed packages."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if installed else _Generator)
     if name == "stack":
@@ -52,7 +52,7 @@ def schema_of(name: str, installed: bool = False) -> Schema:
 
 
 def _remove_scenario_keys(generated: Schema) -> None:
-    """Remove the keys that only a scenario may set, not a stack file."""
+    """Remove SCENARIO_KEYS, which a stack file must not set."""
     for definition in generated["$defs"].values():
         for key in SCENARIO_KEYS:
             definition.get("properties", {}).pop(key, None)
@@ -71,15 +71,15 @@ def _append_keys(generated: Schema) -> Schema:
 
 
 def _make_extensible_keys_optional(generated: Schema) -> None:
-    """Make required keys of a base file optional, except in lists, because the extending file can add them."""
+    """Make required keys optional, except in lists, because the file that extends a base file can add them."""
     definitions = generated.get("$defs", {})
-    in_lists = _referenced_definitions(generated, definitions, lists=True)
-    for name in _referenced_definitions(generated, definitions, lists=False) - in_lists:
+    in_lists = _referenced_definitions(generated, definitions, in_lists=True)
+    for name in _referenced_definitions(generated, definitions, in_lists=False) - in_lists:
         definitions[name].pop("required", None)
 
 
-def _referenced_definitions(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
-    """Return the definitions to which a schema refers: within lists if `lists`, otherwise outside of lists."""
+def _referenced_definitions(schema: Schema, definitions: Schema, *, in_lists: bool) -> set[str]:
+    """Return the names of definitions to which a schema refers: only within lists, or only outside of lists."""
     found: set[str] = set()
     seen: set[tuple[str, bool]] = set()
 
@@ -92,7 +92,7 @@ def _referenced_definitions(schema: Schema, definitions: Schema, lists: bool) ->
         name = str(node.get("$ref", "")).rpartition("/")[2]
         if name and (name, in_list) not in seen:
             seen.add((name, in_list))
-            if in_list == lists:
+            if in_list == in_lists:
                 found.add(name)
             walk(definitions[name], in_list)
         for key, value in node.items():
@@ -115,7 +115,7 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Schema generator of pydantic that also requires exactly one key of a choice, and describes plain values."""
+    """Schema generator that also requires exactly one key of a Choice, and adds descriptions of plain values."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -127,7 +127,7 @@ class _Generator(GenerateJsonSchema):
 
 
 class _InstalledTypesGenerator(_Generator):
-    """Schema generator that also adds the usable types of installed packages."""
+    """Schema generator that also adds the types of installed packages."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -151,7 +151,7 @@ class _InstalledTypesGenerator(_Generator):
         return {"anyOf": [result, *more]} if more else result
 
     def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
-        """Return the schema of a specification that is selected by the name of its entry point."""
+        """Return the schema of a mapping with this `type`, the name of an entry point, and the keys of the model."""
         typed: Schema = {"properties": {"type": {"const": name}}, "required": ["type"]}
         model.model_rebuild()
         return {"allOf": [self.generate_inner(model.__pydantic_core_schema__), typed]}
@@ -160,10 +160,9 @@ class _InstalledTypesGenerator(_Generator):
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     """Return a schema that requires exactly one of `keys`.
 
-    For a mapping with an unknown key instead, an editor shows only that this key is unknown. For a mapping with only
-    modifiers, it shows "expected one of …". `maxProperties` is not used, because yaml-language-server counts the key
-    that is being typed and would offer no completions.
+    If only modifiers of the model are present, editors show "expected one of: …".
     """
+    # With `maxProperties`, yaml-language-server would count the key that is being typed, and offer no completions.
     present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
     modifiers = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
     missing = {"type": "string", "errorMessage": f"expected one of: {', '.join(keys)}"}
@@ -175,7 +174,7 @@ def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
 
 
 def _simplify(node: Any, definitions: Schema) -> Any:
-    """Return a schema without titles, nulls, and bulky defaults, and with unions as if/then."""
+    """Return an equivalent schema without titles, nulls, and defaults that are mappings, and with unions as if/then."""
     if isinstance(node, list):
         return [_simplify(item, definitions) for item in node]
     if not isinstance(node, dict):
@@ -192,7 +191,7 @@ def _simplify(node: Any, definitions: Schema) -> Any:
 
 
 def _by_type(node: Schema, definitions: Schema) -> Schema:
-    """Return a union discriminated by `type` as if/then, so that an editor considers only the selected member."""
+    """Return a union that is discriminated by `type` as if/then, so that editors show only the selected member."""
     members = {
         ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
     }
@@ -214,9 +213,9 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
 
 
 def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
-    """Return a union as if/then in which the members without `type` are selected by their only required key.
+    """Return a union as if/then. Members without `type` are selected by their only required key.
 
-    `keys` are these keys by the reference of the member.
+    `keys` are these required keys by the reference of the member.
     """
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     others = [option for option in node["oneOf"] if option.get("$ref") not in keys]
@@ -227,7 +226,7 @@ def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
 
 
 def _by_json_type(node: Schema) -> Schema:
-    """Return a union of text and mapping, or of item and list, as if/then, so that errors refer to the right member."""
+    """Return a union of two JSON types as if/then, such as text and mapping, so that errors refer to the used one."""
     options = node.get("oneOf", [])
     plain = [option for option in options if option.get("type") in ("string", "array")]
     if len(options) != 2 or not plain or options[0].get("type") == options[1].get("type"):
@@ -240,7 +239,7 @@ def _by_json_type(node: Schema) -> Schema:
 
 
 def _without_null(node: Schema) -> Schema:
-    """Remove null from the schema of an optional value: an optional key is omitted instead."""
+    """Return the schema of an optional value without the alternative null."""
     options = node.get("anyOf", [])
     if {"type": "null"} not in options:
         return node
@@ -252,13 +251,13 @@ def _without_null(node: Schema) -> Schema:
 
 
 def _without_noise(node: Schema) -> Schema:
-    """Remove the title of a schema, and its default if that is null, a mapping, or a list."""
+    """Return the schema without its title, and without a default that is null, a mapping, or a list."""
     bulky = isinstance(node.get("default"), dict | list) or node.get("default", 0) is None
     return {key: value for key, value in node.items() if key != "title" and not (key == "default" and bulky)}
 
 
 def _join_descriptions(text: str, more: str) -> str:
-    """Append a further description in parentheses, if it is different."""
+    """Return a description, followed by a second one in parentheses if both differ."""
     if text and more and text != more:
         return f"{text}\n\n({more})"
     return text or more

@@ -1,4 +1,4 @@
-"""Topics of `simscen explain` about results: signals, metrics, and error and exit codes; also their reference pages."""
+"""Topics of `simscen explain` and reference pages about signals, metrics, error codes, and exit codes."""
 
 from simscen.cli.catalog.commands_page import EXIT_CODES
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics
@@ -45,11 +45,7 @@ EXTERNAL_ONLY_CODES = frozenset({
     ErrorCode.FOLLOW_WAYPOINTS_UNKNOWN, ErrorCode.TASK_EXECUTOR_FAILED, ErrorCode.NO_VALID_WAYPOINTS,
     ErrorCode.BACKUP_INVALID_INPUT, ErrorCode.NAVIGATE_UNKNOWN,
 })  # fmt: skip
-"""Codes that the reference stack never returns.
-
-Its planners and controllers have no time limit, its planners return no empty path, every robot can drive backward, and
-goals are checked before a run.
-"""
+"""Codes that the reference stack never returns."""
 EXTERNAL_ONLY_NOTE = "The reference stack never returns this code; Nav2, external stacks, and installed components may."
 
 JUNIT_ERROR_TYPES = {
@@ -69,7 +65,7 @@ JUNIT_ERROR_TYPES = {
     FAILED: "An external stack reported that it cannot continue.",
     BROKEN_COMPONENT: "A component of an installed package returned an invalid value.",
 }
-"""Meaning of the types of JUnit `<error>` elements, none of which is a verdict on the robot."""
+"""Meaning of each type of the JUnit element `<error>`."""
 
 
 def code_topics() -> list[Topic]:
@@ -115,7 +111,7 @@ def signal_kind(signal: Signal) -> str:
 
 
 def signal_description(signal: Signal) -> str:
-    """Return the description of a signal with its unit and its arguments."""
+    """Return the description of a signal, with its unit and arguments."""
     return (
         f"{signal.text}\n\nIt is a {signal_kind(signal)}.{_arguments_sentence(signal)}"
         if not signal.is_boolean
@@ -124,7 +120,7 @@ def signal_description(signal: Signal) -> str:
 
 
 def signal_example(name: str, signal: Signal) -> str:
-    """Return an example in YAML: a condition that uses the signal."""
+    """Return a YAML example of a condition with this signal."""
     arguments = "".join(
         f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
     )

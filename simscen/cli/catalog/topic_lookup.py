@@ -1,4 +1,4 @@
-"""Finds the topics of `simscen explain` by their names or by the path of a key, such as `goals.pose`."""
+"""Lookup of topics of `simscen explain` by name, or by the path of a key, such as `goals.pose`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,21 +13,20 @@ from simscen.spec.choice import Choice
 
 
 def all_topics() -> list[Topic]:
-    """Return all topics in the order of the overview. Problem codes, such as SC012, are not topics."""
+    """Return all topics in the order of the overview, without problem codes, such as SC012."""
     return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
 
 
 def known_names(keys: bool = False) -> list[str]:
-    """Return all names that can be explained, including problem codes; with `keys`, the paths of all keys instead."""
+    """Return the names of all topics and problem codes; with `keys`, the paths of all keys instead."""
     found = all_topics()
     return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
 
 
 def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
-    """Return a topic for each key that a path such as `goals.pose` or `stack.localizer.alpha1` can mean.
+    """Return a topic for each key with a path such as `goals.pose` or `stack.localizer.alpha1`.
 
-    `known` are the topics to search. A path starts at a topic or at the top of a file; a single key is searched in all
-    topics.
+    A path starts at one of the topics `known`, or at the top of a file. A single key is searched in all of `known`.
     """
     parts = path.split(".")
     if len(parts) == 1:
@@ -51,7 +50,7 @@ def keys_of_topics(known: Sequence[Topic]) -> list[str]:
 
 
 def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
-    """Yield each model at which a path can start, and the keys below it. Its first parts can be the name of a topic."""
+    """Yield each model at which a path can start, and the remaining keys of the path."""
     for length in (1, 2):
         prefix, keys = ".".join(parts[:length]), parts[length:]
         for topic in known:
@@ -62,7 +61,7 @@ def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[typ
 
 
 def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
-    """Yield a topic for the last of the nested `keys` below a model, with its own keys if its value is a mapping."""
+    """Yield a topic for the last of the nested `keys` of a model. It lists the keys of a value that is a mapping."""
     *parents, key = keys
     for parent in models_at(model, _with_indices(model, parents)):
         for field in fields_of(parent):
@@ -73,7 +72,7 @@ def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[
 
 
 def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
-    """Return the keys as a location in a file: a key whose value is a list is followed by the index 0."""
+    """Return the keys as a location in a file, with the index 0 after each key whose value is a list."""
     path: list[str | int] = []
     for key in keys:
         path.append(key)

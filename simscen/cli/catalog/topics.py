@@ -1,6 +1,6 @@
-"""Topics of the scenario language, such as its criteria and faults, for `simscen explain` and the language reference.
+"""Topics of the scenario language for `simscen explain` and the language reference.
 
-They are collected from the pydantic models and their docstrings.
+A topic is a part of the language, such as a criterion or a fault. Its text is the docstring of its pydantic model.
 """
 
 import inspect
@@ -48,16 +48,16 @@ from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 OPTIONAL = "–"
-"""Shown instead of the default of an optional key that has no default value."""
+"""Text for the default of an optional key without a default value."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
 @dataclass(frozen=True)
 class Field:
-    """Key of a mapping.
+    """Key of a YAML mapping.
 
-    key:      name
-    kind:     kind of its value, such as "length in m, ≥ 0"
+    key:      name of the key
+    kind:     kind of the value, such as "length in m, ≥ 0"
     default:  default value, or OPTIONAL; "" for a required key
     text:     description
     """
@@ -70,16 +70,16 @@ class Field:
 
 @dataclass(frozen=True)
 class Topic:
-    """Named part of the language that can be explained.
+    """Part of the scenario language with its explanation.
 
-    group:    kind of part, such as "trigger"
-    name:     name in the language, such as "stopped_within"
-    model:    model of its value; None if the topic has no value of its own
+    group:    kind of the part, such as "trigger"
+    name:     name of the part, such as "stopped_within"
+    model:    pydantic model of its value; None without a model
     text:     description
-    example:  YAML text
-    rows:     keys to list instead of the keys of `model`
+    example:  YAML text; "" without an example
+    rows:     keys to list; () for the keys of `model`
     origin:   package that adds the topic, with its version; "" for topics of simscen
-    alias:    other name: the number of an error code
+    alias:    other name, such as the number of an error code; "" without another name
     """
 
     group: str
@@ -93,21 +93,21 @@ class Topic:
 
     @property
     def fields(self) -> list[Field]:
-        """Keys of the value in order; empty if the value is not a mapping."""
+        """Keys of the value in the order of the file; empty if the value is not a mapping."""
         if self.rows:
             return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property
     def value(self) -> str:
-        """Kind of the value, such as "text", if it is not a mapping; otherwise ""."""
+        """Kind of the value, such as "text"; "" if the value is a mapping."""
         if self.model is not None and issubclass(self.model, RootModel):
             return kind_of(self.model)
         return ""
 
 
 def topics(installed: bool = False) -> list[Topic]:
-    """Return all topics in the order of the reference; with the topics of installed packages if `installed`."""
+    """Return all topics of the language reference in order. `installed` adds the topics of installed packages."""
     return [
         *_choices("trigger", AnyCondition),
         *added_topics(AnyCondition, installed),
@@ -208,7 +208,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
-    """Return the keys of a model in order. A choice, which needs exactly one key, lists only its modifiers."""
+    """Return the keys of a model in order; for a Choice (mapping with exactly one main key), only its modifiers."""
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
@@ -219,9 +219,9 @@ def fields_of(model: type[BaseModel]) -> list[Field]:
 
 
 def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """Return the description of a type with unit and range, such as "length in m, ≥ 0".
+    """Return the description of a type or pydantic field, such as "length in m, ≥ 0".
 
-    `metadata` are further annotations of the type.
+    `metadata` are the further arguments of `Annotated`.
     """
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
@@ -265,7 +265,7 @@ def _plural_of_member(kind: str) -> str:
 
 
 def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the value of `type` and the model of each shipped member of a union that is discriminated by `type`."""
+    """Yield the value of `type` and the model of each shipped member of a union with the discriminator `type`."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.shipped_union)[0])
     for member in members:
@@ -295,7 +295,7 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
 
 
 def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
-    """Yield all annotations, including those nested in pydantic's Field."""
+    """Yield all annotations, including those in pydantic's Field."""
     for mark in metadata:
         yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
 
@@ -321,12 +321,12 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
 
 
 def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
-    """Return the topics of the usable choices that installed packages add, or nothing if not `installed`."""
+    """Return the topics of the keys that installed packages add to a choice; none if not `installed`."""
     return _installed_types(choice.group, installed)
 
 
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
-    """Yield the topics of the usable types of a group that installed packages add, or nothing if not `installed`."""
+    """Yield the topics of the types that installed packages add to a group; nothing if not `installed`."""
     if installed:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
         for name, model in registry.installed_specs(group).items():

@@ -1,4 +1,4 @@
-"""Command `simscen bench`: measures the speed of simscen; its subcommands measure suites, worlds, and navigation."""
+"""Command `simscen bench`, which measures speed; its subcommands also measure navigation and localization."""
 
 import json
 import os
@@ -44,7 +44,7 @@ def growth_command(
 
 
 def growth_text(figures: Measurements) -> str:
-    """Return one line per figure, with its ratio to the first figure of its kind."""
+    """Return one line per figure, with its ratio to the first figure of the same quantity."""
     width = max(map(len, figures))
     lines = ["the patrol with                 CPU per simulated second"]
     first: dict[str, float] = {}
@@ -61,9 +61,10 @@ def worlds_command(
 ) -> None:
     """Measure the cost of a simulated second in large worlds.
 
-    Runs the patrol of a house, a run in a generated hall with 40 movable meshes, and a run on a generated ROS map of
-    100 x 100 m with 400 blocks and noise. Each takes at most 60 simulated seconds with all features enabled. Prints the
-    CPU time of one core, also as a multiple of the time for the house.
+    Runs the patrol of a house, a run in a generated hall with 40 movable meshes, a run in a generated warehouse with
+    5000 objects, and a run on a generated ROS map of 100 x 100 m with 400 blocks and noise. Each takes at most 60
+    simulated seconds with all features enabled. Prints the CPU time of one core, also as a multiple of the time for the
+    house.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -75,7 +76,7 @@ def worlds_command(
 
 
 def worlds_text(costs: "Sequence[WorldCost]") -> str:
-    """Return one line per world; ratios are relative to the first one."""
+    """Return one line per world. Ratios are relative to the first world."""
     width = max(len(cost.name) for cost in costs)
     lines = [f"{'':{width}}  triangles  movable  CPU a second   ratio  preparing   memory"]
     lines += [
@@ -126,7 +127,7 @@ def suite_command(
 
 
 def suite_text(suite: "SuiteResult") -> str:
-    """Return the lines about the wall time, the CPU time, and the memory of the runs of a suite."""
+    """Return the printed lines about a suite: wall time, CPU time, and memory."""
     figures, baseline = suite.figures, suite.bare * suite.simulated
     duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([

@@ -1,4 +1,4 @@
-"""Command `simscen compare`: compares the runs of two output folders."""
+"""Command `simscen compare`, which compares the runs of two output folders."""
 
 import json
 import sys
@@ -107,9 +107,9 @@ def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, cha
 
 
 def _links(sessions: dict[str, JournaledSession]) -> Links:
-    """Return the replay or log of each run that did not pass, or the command that repeats it.
+    """Return the replay, log, or repeating command of each run that did not pass.
 
-    The keys are BASELINE or CANDIDATE, the name of the test with its variation and stack, and the seed.
+    A key consists of BASELINE or CANDIDATE, the name of scenario, variation, and stack, and the seed.
     """
     return {
         (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)
@@ -120,7 +120,7 @@ def _links(sessions: dict[str, JournaledSession]) -> Links:
 
 
 def _replay(run: RunFinished) -> str:
-    """Return the existing replay or log of a run, or else the command that repeats it."""
+    """Return the replay or log of a run if it exists, otherwise the command that repeats the run."""
     files = run.artifacts.replay, run.artifacts.mcap
     return next((file for file in files if file and Path(file).is_file()), run.again)
 

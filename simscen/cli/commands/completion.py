@@ -1,4 +1,4 @@
-"""Command `simscen completion`: prints the shell completion script."""
+"""Command `simscen completion`, which prints the shell completion script."""
 
 from enum import Enum
 from typing import Annotated

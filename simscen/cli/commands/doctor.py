@@ -1,4 +1,4 @@
-"""Command `simscen doctor`: checks the installation and prints the result of each check."""
+"""Command `simscen doctor`, which checks the installation."""
 
 import hashlib
 import os
@@ -25,13 +25,13 @@ time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """
 
-INDENT = 15
-"""Column of the result of a check, after its sign and name."""
+RESULT_COLUMN = 15
+"""Column in which the result of a check begins."""
 MIN_REAL_TIME_FACTOR = 1.0
-"""Simulated seconds per second of CPU time that a patrol must reach."""
+"""Minimum number of simulated seconds per second of CPU time."""
 
 Check = tuple[str, Callable[[], str]]
-"""Name of a check, and its function, which returns a text about what it found or raises CheckFailed."""
+"""Name of a check, and its function, which returns the result as text, or raises CheckFailed."""
 
 
 def command() -> None:
@@ -72,15 +72,15 @@ def checks() -> Iterator[Check]:
 
 
 def _line(sign: str, name: str, result: str) -> str:
-    """Return the result of one check, wrapped to the width of the terminal."""
+    """Return the printed lines of one check, wrapped to the width of the terminal. `sign` is ✓ or ✗."""
     width = max(40, shutil.get_terminal_size((80, 24)).columns)
     first = f"  {sign} {name:10} "
-    wrapper = textwrap.TextWrapper(width, first, " " * INDENT, break_long_words=False, break_on_hyphens=False)
+    wrapper = textwrap.TextWrapper(width, first, " " * RESULT_COLUMN, break_long_words=False, break_on_hyphens=False)
     return wrapper.fill(result)
 
 
 def check_cache() -> str:
-    """Check the cache of maps and shortest paths, and return its folder and size."""
+    """Check that the cache of maps and shortest paths is private to the user, and return its folder and size."""
     from simscen.run.scenario_cache import (
         CACHE_DIR_VARIABLE,
         MAX_CACHE_BYTES,
@@ -102,7 +102,7 @@ def check_cache() -> str:
 
 
 def check_stacks() -> str:
-    """Check the external stacks in the user's configuration, and return their commands."""
+    """Check that the user's configuration is valid, and return the commands of its external stacks."""
     from simscen.cli.process import caller_environment, config_file
     from simscen.loading.stacks.userconfig import load_config
 
@@ -133,7 +133,7 @@ def check_speed() -> str:
 
 
 def check_run() -> str:
-    """Simulate one second twice, check that both runs pass with equal logs, and return the hash of the log."""
+    """Check that two runs of one simulated second pass with equal logs, and return the hash of the log."""
     from simscen.cli.session.backends import backend_of
     from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario

@@ -1,4 +1,4 @@
-"""Command `simscen edit`: starts the editor for a scenario or a world."""
+"""Command `simscen edit`, which serves the editor for a scenario or a world."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
-"""End of the name of a new scenario."""
+"""Suffix of a new scenario file."""
 
 
 def command(
@@ -86,7 +86,7 @@ def command(
 
 
 def _backend() -> "Backend":
-    """Return the backend for the button Run. It is created only when the button is first used."""
+    """Create the backend for the button Run."""
     from simscen.cli.session.backends import backend_of
     from simscen.run.sessions.run_session import SessionOptions
 
@@ -101,7 +101,10 @@ def _edited_file(
     world_path: tuple[Path, ...],
     lenient: bool,
 ) -> tuple["EditedFile", str]:
-    """Return the file to edit, and the text of a new file ("" for an existing one). Raises UsageError, InvalidInput."""
+    """Return the file to edit, and the text of a new file ("" for an existing file).
+
+    Raises UsageError and InvalidInput.
+    """
     if new != (map_ is not None):
         raise UsageError("--new and --map belong together: simscen edit --new --map office.yaml [FILE]")
     if map_ is not None:
@@ -118,7 +121,7 @@ def _edited_file(
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
-    """Return a new scenario file for a map, which must not exist yet, and its text. Raises UsageError, InvalidInput."""
+    """Return a new scenario file for a map, and its text. Raises UsageError if the file exists, and InvalidInput."""
     from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
@@ -131,11 +134,11 @@ def _new_file(
         raise UsageError(f"{target.parent} is not a folder; create it first")
     root_folder = root if root is not None else default_root([target, map_])
     text = new_scenario_text(target, map_, root_folder, world_path, lenient)
-    return _inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
+    return _require_inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
 
 
 def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
-    """Return an existing scenario or world file. Raises InvalidInput for a file of another kind."""
+    """Return an existing scenario or world file. Raises InvalidInput for other kinds of files."""
     from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
@@ -145,11 +148,11 @@ def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edi
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return _inside(EditedFile(_real(file), kind, _real_folder(root), world_path), file)
+    return _require_inside(EditedFile(_real(file), kind, _real_folder(root), world_path), file)
 
 
-def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return `edited`. Raises InvalidInput if `file`, its path as the user wrote it, leads out of the root."""
+def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
+    """Return `edited`. Raises InvalidInput if `file`, the path on the command line, is outside of the root."""
     from simscen.loading.files.paths import PathSandbox
 
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
@@ -159,7 +162,7 @@ def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
 
 
 def _real(file: Path) -> Path:
-    """Return the absolute path of a file with the symbolic links of its folder resolved, as the loader names it."""
+    """Return the absolute path of a file. Resolve symbolic links of its folder, but not of the file itself."""
     return Path(os.path.realpath(file.parent)) / file.name
 
 

@@ -1,4 +1,4 @@
-"""Command `simscen explain`: describes names of the scenario language, and codes."""
+"""Command `simscen explain`, which describes names of the scenario language, and codes."""
 
 import shutil
 import textwrap
@@ -42,9 +42,9 @@ def command(
 
 
 def explanation(name: str, width: int = 100) -> str:
-    """Return the text about a problem code, or about all topics with this name. Raises UsageError for an unknown name.
+    """Return the text about a problem code, or about all topics with this name, wrapped at `width` characters.
 
-    `width` is the number of columns.
+    Raises UsageError for an unknown name.
     """
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
@@ -52,7 +52,7 @@ def explanation(name: str, width: int = 100) -> str:
 
 
 def _topics_named(name: str) -> list[Topic]:
-    """Return the topics with a name, in any case, or else the keys with this path. Raises UsageError."""
+    """Return the topics with this name, ignoring case, or else of the keys with this path. Raises UsageError."""
     known = all_topics()
     lowered = name.lower()
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
@@ -66,7 +66,7 @@ def _topics_named(name: str) -> list[Topic]:
 
 
 def _names(topic: Topic) -> tuple[str, ...]:
-    """Return all names by which a topic can be explained."""
+    """Return all names of a topic: name, `group.name`, and alias."""
     return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
 
 
@@ -75,7 +75,7 @@ def _key_names(topics: list[Topic]) -> list[str]:
 
 
 def _overview(width: int) -> str:
-    """Return the list of all names by group."""
+    """Return the text without an argument: all names by group."""
     groups: dict[str, list[str]] = {}
     for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)
@@ -109,7 +109,7 @@ def _paragraphs(text: str, width: int) -> str:
 
 
 def _lines(paragraph: str, width: int) -> str:
-    """Return a wrapped paragraph; headings such as "When it fails:" start a new line."""
+    """Return a wrapped paragraph, with headings such as "When it fails:" on new lines."""
     items: list[str] = []
     for line in paragraph.splitlines():
         if line.startswith(" ") and items:

@@ -1,4 +1,4 @@
-"""Command `simscen falsify`: searches for values with which a scenario fails."""
+"""Command `simscen falsify`, which searches for values with which a scenario fails."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Command `simscen judge`: evaluates criteria on recorded runs."""
+"""Command `simscen judge`, which evaluates criteria on recorded runs."""
 
 import json
 import shlex
@@ -80,11 +80,11 @@ def command(
     sys.exit(exit_code([run for _, run in runs]))
 
 
-def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
-    """Print the results by the path of their log: one in full, several in a table if their criteria are the same."""
+def _print(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> None:
+    """Print results, each with the path of its log: one in full, several in a table if all have the same criteria."""
     if len(runs) == 1:
         lines = list(full_log_lines(runs[0][1], runs[0][0]))
-    elif same_criteria:
+    elif has_same_criteria:
         lines = [*margin_table(runs), summary_line([run for _, run in runs])]
     else:
         width = max(len(name) for name, _ in runs)
@@ -97,7 +97,10 @@ def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
 
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:
-    """Return result.json for one log, results.json for several; `again` is the command that judges the log again."""
+    """Return the JSON text: result.json for one log, results.json for several logs.
+
+    `options` are those of the command that judges a log again, the value of the key `again`.
+    """
     document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]
     for log, data in zip(logs, document.get("runs", [document]), strict=True):
@@ -107,7 +110,7 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
 
 
 def _options(foreign: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
-    """Return the options of this command that affect the result."""
+    """Return the command-line options with which `simscen judge` gives the same result."""
     single = {"--scenario": scenario, "--truth": foreign.truth, "--root": root}
     repeated = [("--topic", f"{name}={topic}") for name, topic in foreign.topics.items()]
     repeated += [("--world-path", str(folder)) for folder in world_path]

@@ -1,4 +1,4 @@
-"""Command `simscen list`: lists the scenarios that a selection matches."""
+"""Command `simscen list`, which lists the scenarios that a selection matches."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,6 +7,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.shared_options import RootOption, WorldPathOption
 from simscen.core.errors import InvalidInput
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.keywords import select
@@ -23,10 +24,8 @@ def command(
         str, typer.Option("-k", help='Select ids by an expression, as in pytest: "faults and not slip".')
     ] = "",
     tag: Annotated[list[str] | None, typer.Option(help="Select scenarios with this tag; repeatable.")] = None,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
 ) -> None:
     """List the scenarios that a selection matches.
 
@@ -45,7 +44,7 @@ def command(
 
 
 def _expectation(scenario: LoadedScenario) -> str:
-    """Return why the scenario is skipped or expected to fail, or ""."""
+    """Return the reason why the scenario is skipped or expected to fail; "" without a reason."""
     spec = scenario.spec
     if spec.skip is not None:
         return f"(skipped: {spec.skip})"
@@ -53,7 +52,7 @@ def _expectation(scenario: LoadedScenario) -> str:
 
 
 def _stack(scenario: LoadedScenario) -> str:
-    """Return the names of the scenario's external stacks, or ""."""
+    """Return the names of the scenario's external stacks; "" without external stacks."""
     stacks = [view.spec.stack for view in scenario.robot_views.values()]
     names = dict.fromkeys(stack.external for stack in stacks if isinstance(stack, ExternalStackSpec))
     return f"({'stack' if len(names) == 1 else 'stacks'} {', '.join(names)})" if names else ""

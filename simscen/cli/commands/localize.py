@@ -1,4 +1,4 @@
-"""Command `simscen localize`: runs a localizer on a recorded drive."""
+"""Command `simscen localize`, which runs a localizer on a recorded drive."""
 
 import json
 import sys
@@ -24,8 +24,8 @@ from simscen.record.localization_logs.read import LocalizationLog, read_localiza
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
-MIN_COMPARED_SHARE = 0.99
-"""Fraction of the beliefs that must have a reference pose. If fewer have one, the output states the fraction."""
+MIN_COMPARED_FRACTION = 0.99
+"""Minimum fraction of the beliefs (pose estimates) with a reference pose. The output states a smaller fraction."""
 
 
 def command(
@@ -120,14 +120,14 @@ def _load_inputs(
 
 
 def _missing_localizer_problem(criteria: LoadedCriteria) -> Problem:
-    """Return the problem for a file whose `stack` is an external stack, which has no simscen localizer."""
+    """Return the problem of a criteria file with an external stack, which has no localizer of simscen."""
     position = value_position(criteria.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
     return criteria.library.with_source([Problem(*position, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
 def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
-    """Return the initial estimate. Raises UsageError if neither the option nor the log gives one."""
+    """Return the initial pose estimate from the option --start, or from the log. Raises UsageError without any."""
     if start == "unknown":
         return Estimate(None)
     if start is None:
@@ -167,12 +167,12 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float
     figures = errors.figures()
     distances = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
     lines += [f"error: {distances}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
-    if errors.compared < MIN_COMPARED_SHARE:
+    if errors.compared < MIN_COMPARED_FRACTION:
         lines.append(f"compared with the reference: {errors.compared:.1%} of the beliefs")
     for interval in errors.lost:
         end = "to the end" if interval.until is None else f"to {interval.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {interval.since:.1f} s {end}")
-    restriction = "" if errors.compared > MIN_COMPARED_SHARE else ", as far as compared"
+    restriction = "" if errors.compared > MIN_COMPARED_FRACTION else ", as far as compared"
     return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
 
 

@@ -1,4 +1,4 @@
-"""Command `simscen log`: recovers damaged logs, and writes layouts for viewers."""
+"""Command `simscen log`, which recovers damaged logs, and writes layouts for viewers."""
 
 import shlex
 import sys

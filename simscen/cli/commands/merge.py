@@ -1,4 +1,4 @@
-"""Command `simscen merge`: merges the output folders of shards."""
+"""Command `simscen merge`, which merges the output folders of shards (parts of a session)."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +8,7 @@ import typer
 from simscen.cli.commands.report import write_reports
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports
 from simscen.cli.session.terminal import Format, FormatOption
+from simscen.cli.shared_options import JunitOption
 from simscen.core.errors import UsageError
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import read_journal
@@ -21,7 +22,7 @@ def command(
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Merge although a shard is missing, because it had no scenarios.")
     ] = False,
-    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
 ) -> None:

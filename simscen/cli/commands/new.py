@@ -1,4 +1,4 @@
-"""Command `simscen new`: writes a scenario to start from, a copy of one, or one reconstructed from a log."""
+"""Command `simscen new`, which writes a commented scenario, a copy of a scenario, or a scenario from a log."""
 
 import os
 from pathlib import Path
@@ -120,7 +120,7 @@ def command(
 
 
 def _target(name: str, out: Path | None, log: Path) -> Path:
-    """Return the file to write for a log, by default with the name of the log. Raises UsageError."""
+    """Return the scenario file for --from-log: NAME, --out, or a file with the name of the log. Raises UsageError."""
     if name and out is not None:
         raise UsageError("give either NAME or --out")
     written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
@@ -137,7 +137,7 @@ def _write_starter(file: Path, kind: str) -> list[Path]:
 
 
 def _schema_comment(file: Path, kind: str) -> str:
-    """Return the comment that points editors to the schema, or "" if no folder `schemas` above the file has it."""
+    """Return the comment with the path of the schema for editors; "" without a folder `schemas` above the file."""
     root_folder = file.absolute().parent
     root = default_root([file])
     ancestors = [folder for folder in (root_folder, *root_folder.parents) if folder.is_relative_to(root)]
@@ -157,7 +157,7 @@ def _copy(like: str, file: Path) -> list[Path]:
 
 
 def _source(like: str) -> Path:
-    """Return the file of the scenario `like`. Raises UsageError."""
+    """Return the file of the scenario `like`, a path or the name of a shipped scenario. Raises UsageError."""
     if Path(like).is_file():
         return Path(like)
     shipped = shipped_scenarios()

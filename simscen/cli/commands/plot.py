@@ -1,4 +1,4 @@
-"""Command `simscen plot`: draws a recorded run as a picture."""
+"""Command `simscen plot`, which draws a recorded run as a picture."""
 
 from pathlib import Path
 from typing import Annotated
@@ -47,6 +47,6 @@ def _draw(log: Log, file: Path, picture: Path) -> None:
 
 
 def _unknown_map(log: Log) -> OccupancyGrid:
-    """Return a map of one unknown cell at the start of the robot, to draw the run of a robot without a map."""
+    """Return a map with one unknown cell at the start of the robot."""
     start = log.header.case.start
     return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))

@@ -1,4 +1,4 @@
-"""Command `simscen plugins`: lists the types that installed packages add."""
+"""Command `simscen plugins`, which lists the types that installed packages add."""
 
 import inspect
 import json
@@ -16,7 +16,7 @@ from simscen.core.errors import Exit
 from simscen.spec.registry import ENTRY_POINT_PREFIX, GROUPS, BrokenPlugin, Entry, installed, unknown_groups
 
 INDENT = 6
-"""Columns before the description of a type."""
+"""Number of spaces before the description of a type."""
 
 
 class Format(str, Enum):
@@ -41,12 +41,13 @@ def command(format_: Annotated[Format, typer.Option("--format", help="Output for
 
 
 def _entries_by_package() -> list[Entry]:
-    """Return the installed entries sorted by package; within a package, in the order of GROUPS."""
+    """Return the entry points of installed packages, sorted by package and then in the order of GROUPS."""
     found = [entry for kind in GROUPS for entry in installed(kind)]
     return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
 
 def _row(entry: Entry) -> dict[str, Any]:
+    """Return the JSON data of one type. `broken` is the reason why it cannot be used; "" for a usable type."""
     text, broken, hint = "", "", ""
     try:
         text = _first_sentence(inspect.cleandoc(entry.load().__doc__ or ""))

@@ -1,4 +1,4 @@
-"""Command `simscen replay`: writes a page that plays recorded runs."""
+"""Command `simscen replay`, which writes a page that plays recorded runs."""
 
 import sys
 import webbrowser

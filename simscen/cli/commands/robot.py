@@ -1,4 +1,4 @@
-"""Command `simscen robot`: checks a robot by test drives."""
+"""Command `simscen robot`, which checks a robot by test drives."""
 
 import math
 import sys
@@ -57,7 +57,10 @@ def check(
 
 
 def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_json: bool) -> int:
-    """Check a robot, print the result, and return the number of failed checks. `argument` is what the user wrote."""
+    """Check a robot, print the result, and return the number of failed checks.
+
+    `argument` is the robot on the command line. `picture` is the file for a picture of the drives, or None.
+    """
     from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings
@@ -85,7 +88,7 @@ def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_js
 
 
 def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
-    """Yield lines of at most 80 columns: the test drives, then every check with its value and limit."""
+    """Yield the lines of the table: the test drives, and then each check with its value and limit."""
     drive = body.drive.type.replace("_", " ")
     yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
     slope, step = checked.climb
@@ -94,9 +97,9 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
     yield ""
     yield f"  {'':9}{'driven in m':^24}{'turned in degrees':^25}  odometry   most"
     yield f"  {'':9}{'command odometry   truth'}  {'command odometry  truth'}  off at end  tilt"
-    yield from map(_row, checked.trials)
+    yield from map(_drive_line, checked.trials)
     yield ""
-    yield from map(_line, checked.checks)
+    yield from map(_check_line, checked.checks)
     yield ""
     yield (
         f"{checked.failed_count} of {len(checked.checks)} checks failed"
@@ -105,7 +108,7 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
     )
 
 
-def _row(trial: "Trial") -> str:
+def _drive_line(trial: "Trial") -> str:
     """Return the line of one test drive."""
     motions = (trial.command, trial.odometry, trial.truth)
     driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
@@ -114,15 +117,15 @@ def _row(trial: "Trial") -> str:
     return f"  {trial.name:9} {driven}  {turned}   {gap:7.3f} m  {math.degrees(trial.tilt):4.1f}"
 
 
-def _line(check: "DriveCheck") -> str:
-    """Return the line of one check, and below it the advice if the check failed."""
+def _check_line(check: "DriveCheck") -> str:
+    """Return the line of one check; after a failed check, also a line with its advice."""
     verdict = "ok" if check.passed else "FAILED"
     line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return line if check.passed or not check.advice else f"{line}\n          {check.advice}"
 
 
 def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
-    """Return all values as JSON data; angles in rad and lengths in m unless a unit is given."""
+    """Return all values as JSON data. Angles are in rad, and lengths in m, unless a unit is given."""
     return {
         "robot": body.name,
         "drive": body.drive.type,

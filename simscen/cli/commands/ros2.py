@@ -1,4 +1,4 @@
-"""Command `simscen ros2`: starts the adapter between a run and a ROS 2 graph, or checks a Nav2 parameter file."""
+"""Command `simscen ros2`, which starts the adapter between a run and a ROS 2 graph, or checks Nav2 parameters."""
 
 import json
 import os
@@ -21,21 +21,21 @@ from simscen.ros2.nav2.parameter_rules import PublishedNames
 from simscen.ros2.options import AdapterError
 
 SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
-"""Environment variable with the file descriptor of the socket to the engine, which is set during a run."""
+"""Environment variable with the file descriptor of the socket to the simulation; set only during a run."""
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
-"""Program of the adapter. It runs with the Python of ROS, which lacks the packages of simscen."""
+"""Program of the adapter, which runs with the Python interpreter of ROS."""
 _BASE = "base_link"
 
 
 class GraphKind(str, Enum):
-    """Kind of the ROS 2 graph: any nodes, or nodes of Nav2, for which additional checks exist."""
+    """Kind of the ROS 2 graph: any nodes, or Nav2, for which there are additional checks."""
 
     ANY = "graph"
     NAV2 = "nav2"
 
 
 class Sync(str, Enum):
-    """Synchronization of the simulation with the graph: wait for the nodes, or run at a fixed pace."""
+    """Synchronization with the graph: the simulation waits for the nodes, or runs at a fixed speed."""
 
     LOCKSTEP = "lockstep"
     PACED = "paced"
@@ -156,7 +156,10 @@ def _read_parameters(params: Path) -> Nav2Parameters:
 
 
 def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases: list[str]) -> None:
-    """Check a parameter file. Raises UsageError if there is none: without a run, there is nothing else to do."""
+    """Check Nav2 parameters. Raises UsageError without parameters, and InvalidInput if Nav2 cannot work with them.
+
+    `bases` are the names of the base frame.
+    """
     if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
@@ -169,7 +172,7 @@ def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases:
 
 
 def _find_python() -> str:
-    """Return the first Python 3 on the PATH that has rclpy, which the environment of simscen usually lacks."""
+    """Return the interpreter in SIMSCEN_ROS_PYTHON, or the first one on the PATH with rclpy. Raises UsageError."""
     configured = os.environ.get("SIMSCEN_ROS_PYTHON")
     if configured:
         return configured
@@ -191,7 +194,7 @@ def _has_rclpy(python: str) -> bool:
 
 
 def _execute_adapter(python: str, options: Mapping[str, object]) -> NoReturn:
-    """Replace this process by the adapter, which inherits the socket to the engine."""
+    """Replace this process by the adapter, which inherits the socket to the simulation. Raises UsageError."""
     try:
         os.execvp(python, [python, str(_ADAPTER_START), json.dumps(options)])
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Command `simscen run`: reads the options of a session, and executes the session or the watch mode."""
+"""Command `simscen run`, which executes a session or the watch mode."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Command `simscen schema`: prints or writes the JSON Schemas for editors."""
+"""Command `simscen schema`, which prints or writes the JSON Schemas for editors."""
 
 from enum import Enum
 from pathlib import Path
@@ -43,10 +43,7 @@ def command(
 
 
 def schema_text(kind: str) -> str:
-    """Return the schema of a kind of file, with the types of installed packages.
-
-    If no package adds types, return the shipped schema: generating a schema imports every model, which takes time.
-    """
+    """Return the schema of a kind of file, with the types of installed packages. `kind` is a value of SchemaKind."""
     if any(installed(group) for group in GROUPS):
         from simscen.cli.catalog.json_schema import as_text, schema_of
 

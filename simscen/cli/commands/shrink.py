@@ -1,4 +1,4 @@
-"""Command `simscen shrink`: writes the smallest scenario that still fails in the same way."""
+"""Command `simscen shrink`, which writes the smallest scenario that still fails in the same way."""
 
 import sys
 from dataclasses import dataclass
@@ -117,7 +117,10 @@ def command(
 
 @dataclass(frozen=True)
 class ChosenRun:
-    """Failed run to start from. None stands for the seed or the stack of the scenario, "" for no variation."""
+    """Failed run to start from: scenario file, seed, variation, and value of --stack.
+
+    None stands for the seed or the stack in the scenario, and "" for no variation.
+    """
 
     file: Path
     seed: int | None
@@ -126,7 +129,7 @@ class ChosenRun:
 
 
 def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
-    """Return the run in a folder, or of a scenario file. Raises UsageError and InvalidInput."""
+    """Return the run that the arguments of the command name. Raises UsageError and InvalidInput."""
     if not run.is_dir():
         return ChosenRun(run, seed, variation, stack)
     if seed is not None or variation or stack is not None:
@@ -136,7 +139,7 @@ def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) 
 
 
 def _planned_run(folder: Path) -> PlannedRun:
-    """Return the run to which a folder in an output folder belongs. Raises UsageError."""
+    """Return the run with this folder from the journal of its session. Raises UsageError."""
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
             inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
@@ -151,7 +154,7 @@ def _folder_name(key: RunKey) -> str:
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
-    """Run the scenario, make it as small as possible, and return the result and the scenario before.
+    """Run the scenario, and make it as small as possible. Return the shrinker, and the scenario before.
 
     Raises UsageError if the scenario is invalid or does not fail.
     """
@@ -179,7 +182,7 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
 
 
 def _show_progress(runs: int, size: int) -> None:
-    """Show the progress in one line of a terminal, which the next call replaces."""
+    """Replace the progress line on stderr."""
     sys.stderr.write(f"\r{runs} runs, {size} values left \x1b[K")
     sys.stderr.flush()
 
@@ -192,7 +195,7 @@ def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
 
 
 def _size(node: Node) -> int:
-    """Return the number of values in a scenario."""
+    """Return the number of scalar values in a YAML tree."""
     plain, count = [node.plain], 0
     while plain:
         value = plain.pop()

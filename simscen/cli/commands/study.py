@@ -1,4 +1,4 @@
-"""Command `simscen study`: runs one scenario many times."""
+"""Command `simscen study`, which runs one scenario many times."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Command `simscen validate`: checks files and prints their problems."""
+"""Command `simscen validate`, which checks files and prints their problems."""
 
 import sys
 from collections import Counter
@@ -69,7 +69,7 @@ def command(
 
 
 def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
-    """Return the problems of a file. If its text has no errors, its world or robot is built and checked as well."""
+    """Return the problems of a file. A world or robot without errors in the text is also built and checked."""
     if kind in ("scenario", "study"):
         numbers = CHECKED_DRAWS if kind == "study" else None
         found = [problem for choice in checker.choices for problem in checker.check_scenario(file, choice, numbers)[1]]

@@ -1,4 +1,4 @@
-"""Command `simscen world`: inspects, exports, and converts worlds."""
+"""Command `simscen world`, which inspects, exports, and converts worlds."""
 
 import json
 import os
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import save
+from simscen.cli.shared_options import LenientOption, WorldPathOption
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.builders import world_from_file
@@ -20,6 +21,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_world_file, world_text
 from simscen.loading.loaded import LoadedWorld
 from simscen.model.world import WorldSpec
+from simscen.report.display_text import number_with_noun
 from simscen.run.sessions.output_folder import write_atomically
 
 if TYPE_CHECKING:
@@ -29,11 +31,9 @@ app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=T
 
 File = Annotated[Path, typer.Argument(metavar="WORLD", help="A *.world.yaml, a ROS map (yaml), an SDF or .world file.")]
 Root = Annotated[Path | None, typer.Option(help="Root folder; the world may only refer to files below it.")]
-WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")]
-Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
 LIDAR_HEIGHT_M = 0.2
-"""Default height of the cross-section of a world: the height of the lidar of a small robot."""
+"""Default height of the lidar, at which the cross-section of a world is taken."""
 
 
 @app.callback()
@@ -49,8 +49,8 @@ def inspect(
     everything: Annotated[bool, typer.Option("--all", help="List all solids instead of the first ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
     root: Root = None,
-    world_path: WorldPath = None,
-    lenient: Lenient = False,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
 ) -> None:
     """Print the content of a world: solids, bodies, extents, triangles, places, regions, and warnings.
 
@@ -82,8 +82,8 @@ def export(
     height: Height = LIDAR_HEIGHT_M,
     resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Cell size in meters.")] = 0.05,
     root: Root = None,
-    world_path: WorldPath = None,
-    lenient: Lenient = False,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
 ) -> None:
     """Write a world as a ROS map for Nav2's map_server, as SLAM with a perfect lidar would have built it.
 
@@ -108,8 +108,8 @@ def convert(
     out: Annotated[Path, typer.Argument(help="*.world.yaml file to write.")],
     height: Height = LIDAR_HEIGHT_M,
     root: Root = None,
-    world_path: WorldPath = None,
-    lenient: Lenient = False,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
 ) -> None:
     """Convert a world to a *.world.yaml file.
 
@@ -134,7 +134,10 @@ def convert(
 def _convert(
     source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool, height: float
 ) -> tuple[WorldSpec, list[str]]:
-    """Return the content of the world file, and a text about each change. Raises InvalidInput."""
+    """Return the content of the world file, and a description of each change. Raises InvalidInput.
+
+    `height` is the height of the lidar in m.
+    """
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
@@ -163,21 +166,21 @@ def _relative(file: Path, out: Path) -> str:
 
 
 MAX_SOLIDS = 20
-"""Number of solids that are listed without --all."""
+"""Maximum number of solids that are listed without --all."""
 MAX_NAME_LENGTH = 44
-"""Number of characters of a name that are printed; a longer name is cut at its start."""
+"""Maximum number of printed characters of a name. Only the end of a longer name is printed."""
 
 
 def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
-    """Yield the lines of an inspection. `height` is the height of the cross-section in m.
+    """Yield the printed lines about a world. `height` is the height of the cross-section in m.
 
-    If `everything`, all solids are listed; otherwise only the first MAX_SOLIDS.
+    All solids are listed if `everything`, otherwise only the first MAX_SOLIDS.
     """
     x0, y0, x1, y1 = summary.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
     kinds = ", ".join(f"{count} {kind}" for kind, count in summary.shapes)
-    yield f"  static    {_count(len(summary.solids), 'solid')}{f': {kinds}' if kinds else ''}"
-    yield f"  moving    {_count(len(summary.bodies), 'object')}"
+    yield f"  static    {number_with_noun(len(summary.solids), 'solid')}{f': {kinds}' if kinds else ''}"
+    yield f"  moving    {number_with_noun(len(summary.bodies), 'object')}"
     yield f"  triangles {summary.triangles}"
     rows, columns = summary.map_size
     occupied, free, unknown = (f"{100 * share:.1f} %" for share in summary.map_shares)
@@ -207,7 +210,3 @@ def _item(item: "WorldItem", width: int) -> str:
     where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
     mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"
     return f"{short_name:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""Backends that execute the runs of a session (local processes or a Ray cluster), and their reaction to signals."""
+"""Selection of the backend that executes runs (local processes or a Ray cluster), and handling of signals."""
 
 import os
 import signal
@@ -17,17 +17,16 @@ from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions
 
 REPEATED_SIGNAL_S = 0.5
-"""Signals within this time count as one: wrappers forward a signal that the process has already received."""
+"""Time after the first signal in which further signals are ignored."""
 SHOW_CURSOR = b"\x1b[?25h"
 """Terminal sequence that shows the cursor again."""
 
 
 @contextmanager
 def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """Raise Interrupted on the first SIGINT, SIGTERM, or SIGHUP, so that reports are written; exit on a later one.
+    """Within the context, raise Interrupted on the first SIGINT, SIGTERM, or SIGHUP, and exit on a later one.
 
-    Worker processes end with this process. The journal is complete at any time, so `simscen report` can still write the
-    reports. A SIGHUP that is ignored, as under nohup, stays ignored.
+    A second signal within REPEATED_SIGNAL_S is ignored, as is SIGHUP if it was ignored before, for example by nohup.
     """
     first: list[float] = []
 
@@ -53,7 +52,7 @@ def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterato
 
 
 def exit_at_once(number: int) -> None:
-    """Restore the cursor and exit immediately with the exit code for signal `number`."""
+    """Show the cursor of the terminal, and exit immediately with the exit code of signal `number`."""
     if os.isatty(1):
         os.write(1, SHOW_CURSOR + b"\n")
     os.write(2, b"simscen: stopped without reports; run `simscen report` to write them from the journal\n")
@@ -61,10 +60,10 @@ def exit_at_once(number: int) -> None:
 
 
 FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
-"""Python arguments that start the fork server."""
+"""Arguments of Python that start the fork server, the process from which runs are forked."""
 
 DEFAULT_CLUSTER = "auto"
-"""Address for which Ray uses RAY_ADDRESS, or else the cluster that was started on this machine."""
+"""Address with which Ray uses the environment variable RAY_ADDRESS, or else the cluster of this machine."""
 
 
 class BackendName(str, Enum):
@@ -89,7 +88,8 @@ AddressOption = Annotated[
 def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | None) -> tuple[int, str]:
     """Return the number of parallel runs, and the address of the Ray cluster ("" for local processes).
 
-    The parameters are the values of --jobs, --backend, and --address. Raises UsageError.
+    The parameters are the values of --jobs, --backend, and --address. Raises UsageError if they contradict each other,
+    or if Ray is not installed.
     """
     if backend is BackendName.LOCAL:
         if address is not None:
@@ -104,7 +104,7 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
 
 
 def backend_of(options: SessionOptions) -> Backend:
-    """Return the backend that the options select. Its processes start with the first run."""
+    """Return the backend that the options select, before its processes are started."""
     if not options.cluster:
         return Supervisor(options.workers, FORK_SERVER)
     from simscen.run.process.ray_backend import RayBackend

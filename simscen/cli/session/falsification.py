@@ -1,4 +1,4 @@
-"""Executes `simscen falsify`: searches the ranges of a scenario for values with which it fails."""
+"""Implementation of `simscen falsify`, which searches the ranges of a scenario for values with which it fails."""
 
 import math
 import time
@@ -38,19 +38,19 @@ from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions, run_session
 from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 
-BATCH = 8
-"""Runs between two updates of the search. Fixed, so that a search does not depend on the number of workers."""
+BATCH_SIZE = 8
+"""Number of runs between two updates of the search, independent of the number of workers."""
 MAX_EMPTY_BATCHES = 50
-"""Number of batches in a row without any valid values after which the search gives up."""
+"""Maximum number of consecutive batches without valid values."""
 SQUARE_SIZE_M = 1.0
-"""Side of a square. Failures in the same criterion count as different if they are in different squares."""
+"""Side of the squares into which the floor is divided to distinguish failures by their place."""
 CONFIDENCE = 0.95
-"""Confidence of the bound on the rate of failures."""
+"""Confidence of the upper bound of the failure rate."""
 
 
 @dataclass(frozen=True)
 class FalsifyRequest:
-    """Options of `simscen falsify`; each field has the meaning of the option with its name."""
+    """Options of `simscen falsify`. Each field is the value of the option with its name."""
 
     file: Path
     method: SearchMethod = SearchMethod.AUTO
@@ -71,11 +71,11 @@ class FalsifyRequest:
 
 @dataclass(frozen=True)
 class FoundFailure:
-    """Failure that differs from the failures found before.
+    """Failure that differs from all failures found before.
 
-    file:    scenario that reproduces it
-    run:     result of the run that failed
-    values:  values of the sampled keys, by their path in the scenario
+    file:    scenario file that reproduces the failure
+    run:     failed run
+    values:  values of the varied keys, by path in the scenario
     """
 
     file: Path
@@ -84,14 +84,14 @@ class FoundFailure:
 
 
 Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
-"""Failed criteria, names of the events and faults that had happened, and (x, y) of the square of the first failure.
+"""Failed criteria, names of the disturbances that took place, and (x, y) index of the square of the first failure.
 
-Failures with equal signatures count as the same failure.
+Failures with equal signatures count as the same failure. The square is None for a failure without a place.
 """
 
 
 def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
-    """Run a search, and write its reports and the failures that it finds. Return the exit code and the search.
+    """Run a search, write its reports and failures, and return the exit code and the search.
 
     Raises InvalidInput and UsageError.
     """
@@ -105,7 +105,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
 
 
 class Falsification:
-    """Search that proposes values, runs the scenario with them, and saves each new kind of failure."""
+    """Search that runs a scenario with proposed values, and saves a scenario for each different failure."""
 
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
@@ -129,7 +129,7 @@ class Falsification:
         self.found: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
-        """Search until enough failures are found or no more runs are allowed. Return the exit code."""
+        """Search until enough failures are found or the maximum number of runs is reached. Return the exit code."""
         start, stopped, empty_batches = time.monotonic(), None, 0
 
         def listen(event: SessionEvent) -> None:
@@ -139,7 +139,7 @@ class Falsification:
         workers = self._request.options.workers
         output(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
         while stopped is None and not self._is_done() and empty_batches < MAX_EMPTY_BATCHES:
-            points = self._search.ask(min(BATCH, self._request.runs - len(self.finished_runs)))
+            points = self._search.ask(min(BATCH_SIZE, self._request.runs - len(self.finished_runs)))
             jobs = self._make_jobs(points, reports.folder)
             valid = [job for job in jobs if job is not None]
             empty_batches = 0 if valid else empty_batches + 1
@@ -172,7 +172,7 @@ class Falsification:
         return self._request.method is SearchMethod.RANDOM
 
     def max_failure_rate(self) -> float | None:
-        """Return the upper bound of the rate of failures with 95 % confidence; None if the values are not random."""
+        """Return the upper bound of the failure rate, with CONFIDENCE; None without random runs."""
         counted = [finished for finished in self.finished_runs if is_counted(finished.result)]
         if not self.is_random or not counted:
             return None
@@ -187,7 +187,7 @@ class Falsification:
         return bound is not None and largest is not None and largest <= bound
 
     def _make_jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
-        """Return a job for each point, or None if its values violate the conditions or make the scenario invalid."""
+        """Return a job for each point (proposed values); None for values with which the scenario is invalid."""
         jobs: list[Job | None] = []
         options = self._request.options
         for point in points:
@@ -234,7 +234,7 @@ class Falsification:
         return StudyPlan(name, self.is_random, None, values, stops_early=True)
 
     def _save_failure(self, finished: RunFinished) -> None:
-        """Write the scenario of a run that failed in a way that was not found before."""
+        """Write a scenario that reproduces the run, if the run failed with a new signature."""
         result = finished.result
         if result.outcome.good or not is_counted(result) or (new := signature(result)) in self._signatures:
             return
@@ -266,12 +266,12 @@ def signature(result: RunResult) -> Signature:
 
 
 def new_failure_file(scenario: Path) -> Path:
-    """Return a file NAME.failure-N.scenario.yaml beside the scenario that does not exist yet."""
+    """Return the first free path NAME.failure-N.scenario.yaml in the folder of the scenario."""
     return next(file for number in count(1) if not (file := sibling(scenario, f"failure-{number}")).exists())
 
 
 def summary_lines(falsification: Falsification) -> list[str]:
-    """Return the lines that list the failures, or state that none was found."""
+    """Return the lines that the command prints at its end: the failures, or that there was no failure."""
     runs = len(falsification.finished_runs)
     lines = []
     for failure in falsification.found:
@@ -291,5 +291,5 @@ def summary_lines(falsification: Falsification) -> list[str]:
 
 
 def _margin(finished: RunFinished | None) -> float:
-    """Return the smallest margin of a run relative to its limit; NaN if there was no run, or it does not count."""
+    """Return the smallest relative margin of a run, negative for a failure; NaN without a run and after an error."""
     return math.nan if finished is None or not is_counted(finished.result) else run_margin(finished.result)

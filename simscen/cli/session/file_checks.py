@@ -1,4 +1,4 @@
-"""Validation of scenario, world, and robot files: loads each file and checks it in its built world."""
+"""Validation of scenario, world, and robot files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -23,12 +23,14 @@ from simscen.loading.world_cache import WorldCache
 class FileChecker:
     """Loads and validates files.
 
-    root:               folder that all files must lie in
+    root:               folder that must contain all files
     world_path:         further folders with worlds and models
-    lenient:            unsupported parts of SDF worlds are warnings instead of errors
-    fast:               skip the checks that need the world or the robot to be built
-    pictures:           folder for pictures of scenarios with geometric problems; None to draw none
-    requires_commands:  an external stack without a command is an error instead of a warning
+    lenient:            whether unsupported parts of SDF worlds are warnings instead of errors
+    fast:               whether to skip checks for which the world or the robot must be built
+    pictures:           folder for pictures of scenarios with geometric problems; None for no pictures
+    cache:              cache of built worlds
+    stacks:             stacks of --stack
+    requires_commands:  whether an external stack without a command is an error instead of a warning
     """
 
     root: Path
@@ -42,15 +44,15 @@ class FileChecker:
 
     @property
     def choices(self) -> Sequence[StackChoice | None]:
-        """Stacks with which each scenario is checked; None stands for the scenario's own stack."""
+        """Stacks with which each scenario is checked; None stands for the stack in the scenario."""
         return self.stacks.chosen or (None,)
 
     def check_scenario(
         self, file: Path, choice: StackChoice | None = None, numbers: Sequence[int] | None = None
     ) -> tuple[Sequence[LoadedScenario], list[Problem]]:
-        """Return the variations of a scenario and their problems. If a variation has an error, return no variations.
+        """Return the variations of a scenario and their problems. If a problem is an error, return no variations.
 
-        `choice` is one of `choices`. `numbers` are the numbers of the variations to check; None checks all.
+        `choice` is one of `choices`. `numbers` are the numbers of the variations to check; None for all variations.
         """
         loaded = try_variations(file, self.root, self.world_path, choice, numbers)
         if isinstance(loaded, list):
@@ -66,9 +68,9 @@ class FileChecker:
         return (usable if len(usable) == len(checked) else ()), problems
 
     def check_variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
-        """Return a variation with the commands of its stacks and the list of files it read, and its problems.
+        """Return a checked variation and its problems. The variation is None if a problem is an error.
 
-        Return None instead of the variation if one of the problems is an error.
+        The returned variation has the commands of its external stacks, and the list of files that it uses.
         """
         loaded, undefined = self.stacks.with_command(loaded.with_changes(lenient=self.lenient))
         if undefined and self.requires_commands:
@@ -81,7 +83,7 @@ class FileChecker:
         return (loaded if usable else None), list(dict.fromkeys(problems))
 
     def check_world(self, file: Path) -> list[Problem]:
-        """Return the problems that are found by building a world."""
+        """Return the problems of a world file."""
         try:
             source = load_world_file(file, self.root, self.world_path)
             notes = list(source.map.notes) if source.map else []
@@ -93,7 +95,7 @@ class FileChecker:
             return error.problems
 
     def check_robot(self, file: Path) -> list[Problem]:
-        """Return the problems that are found by building a robot."""
+        """Return the problems of a robot file."""
         if self.fast:
             return []
         try:
@@ -105,7 +107,10 @@ class FileChecker:
 def world_problems(
     scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
 ) -> list[Problem]:
-    """Return the problems that are found by building the world of a scenario."""
+    """Return the problems of a scenario in its built world, such as a blocked start.
+
+    `pictures` is the folder for pictures of the problems; None for no pictures.
+    """
     try:
         return check_in_world(scenario, cache, pictures)
     except InvalidInput as error:

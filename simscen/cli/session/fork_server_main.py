@@ -41,8 +41,13 @@ from simscen.worlds.raycasting import ray_scene
 
 
 def import_components(prepared: PreparedScenario) -> None:
+<<<<<<< HEAD
     """Import the shipped components of the scenario's stacks and sensors, so that the workers need not."""
     for part in prepared.by_robot.values():
+=======
+    """Import the shipped components of the scenario's stacks and sensors, so that all workers share them."""
+    for part in prepared.each.values():
+>>>>>>> d4fc2c7a (Say what each command and session function does in one plain sentence)
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
         if isinstance(part.stack, StackSpec):
@@ -52,7 +57,7 @@ def import_components(prepared: PreparedScenario) -> None:
 
 
 def precompute(prepared: PreparedScenario) -> None:
-    """Compute the data structures of world and map that each worker would otherwise compute itself."""
+    """Compute the data structures of world and map that all workers share."""
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import layered_costmap
 
@@ -67,14 +72,14 @@ def precompute(prepared: PreparedScenario) -> None:
 
 
 def precompute_localizer(spec: LocalizerSpec, grid: OccupancyGrid) -> None:
-    """Compute the data that a shipped localizer derives from its map, so that all runs use the same memory."""
+    """Compute the data that a shipped localizer derives from its map, such as a likelihood field."""
     module, _, name = spec.precomputation.partition(":")
     if module.startswith("simscen."):
         getattr(import_module(module), name)(spec, grid)
 
 
 def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
-    """Yield the modules of the shipped components. Components of other packages are imported only in the worker."""
+    """Yield the modules of those components that are part of simscen."""
     for component in components:
         module = component.component.partition(":")[0]
         if module.startswith("simscen."):
@@ -82,7 +87,7 @@ def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
 
 
 def _components(value: object) -> Iterator[Component]:
-    """Yield all component specifications that a specification contains."""
+    """Yield all specifications of components that a specification contains."""
     if isinstance(value, Component):
         yield value
     inner: Iterable[object] = ()
@@ -112,9 +117,9 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario, import the modules of its runs, and compute what all of them share.
+    """Prepare the scenario of a job, and everything that its workers share.
 
-    Clears the caches first if they use more than half of the allowed memory.
+    Clear the caches first if this process uses more than half of the allowed memory.
     """
     if _used_memory() > MAX_MEMORY_BYTES / 2:
         _SCENARIOS.clear()
@@ -126,17 +131,19 @@ def _warm_up(job: Job) -> None:
 
 
 def _used_memory() -> int:
-    """Return the size of the address space of this process in bytes, which Linux states in /proc/self/statm."""
+    """Return the size of the address space of this process in bytes."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, Any]:
+    """Execute the run of a job in a worker, and return its result as JSON data."""
     prepared = _SCENARIOS.get_or_prepare(job.scenario)
     progress = ProgressReporter(prepared.spec.physics.tick_rate, report_progress)
     return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, replay=job.replay))
 
 
 def _write_outputs(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
+    """Write the picture of a run, and its replay page if the mode includes the outcome."""
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(scene_with_robots(scene, robots), folder / "map.png")

@@ -1,4 +1,4 @@
-"""Reconstructs a scenario from a recorded drive for `simscen new --from-log`."""
+"""Implementation of `simscen new --from-log`, which reconstructs a scenario from a recorded drive."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class FromLogOptions:
 
     log:     recorded drive: an MCAP file or a rosbag2 folder
     out:     scenario file to write
-    map:     map for the robot, instead of the one in the log
-    world:   world file, instead of a world made from the log
-    robot:   robot model or file, instead of the one in the log
-    truth:   topic of the true pose, or `none`
-    topics:  entries NAME=TOPIC for standard topics that have another name in the log
-    root:    root folder of the recorded scenario, to find its world
+    map:     map of the robot; None for the map in the log
+    world:   world file; None for a world made from the log
+    robot:   robot model or file; "" for the robot in the log
+    truth:   topic of the true pose, or "none"; None to find the topic
+    topics:  entries NAME=TOPIC for standard topics with another name in the log
+    root:    root folder of the recorded scenario; None if unknown
     """
 
     log: Path
@@ -42,7 +42,7 @@ class FromLogOptions:
 
 
 def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
-    """Write the scenario and print a summary. With `verify`, also run the scenario and compare the run with the log.
+    """Write the scenario and print a summary. With `verify`, also run the scenario, and compare the run with the log.
 
     Raises InvalidInput if the log or another file is unusable, and UsageError if the scenario cannot be written.
     """

@@ -1,4 +1,4 @@
-"""Evaluates recorded logs with the criteria that they contain, or with those of a criteria file."""
+"""Evaluation of recorded logs with the criteria in the log, or with the criteria of a criteria file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,15 +31,18 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 class LogJudge:
-    """Evaluates logs with their own criteria or, if `scenario` is given, with those of this criteria file.
+    """Evaluates logs. `notes` are messages about the logs, `foreign_count` is the number of foreign logs so far.
 
-    `options` say how to read logs that simscen did not write. `root` and `world_path` apply to the files of `scenario`.
-    `notes` collects remarks about the logs; `foreign_count` is the number of logs that simscen did not write.
+    A foreign log is a log that simscen did not write.
     """
 
     def __init__(
         self, options: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
     ) -> None:
+        """Take the criteria file `scenario`, or None to use the criteria in each log.
+
+        `options` are for reading foreign logs. `root` and `world_path` are for the criteria file. Raises InvalidInput.
+        """
         self.notes: list[str] = []
         self.foreign_count = 0
         self._options, self._scenario, self._world_path = options, scenario, world_path
@@ -56,8 +59,7 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        An unusable log raises InvalidInput if it is the only one. If it is one of several, its result is an error, so
-        that the other logs are still evaluated.
+        If the log is unusable, raise InvalidInput if it is the only log, otherwise return an error as its result.
         """
         try:
             return (
@@ -77,7 +79,7 @@ class LogJudge:
             return _not_judged(log, RunFailure("internal", reason))
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
-        """Return a log with its sensor data, and its result. Raises InvalidInput if it is unusable."""
+        """Return a log with its sensor data, and its result. Raises InvalidInput if the log is unusable."""
         if _may_be_simscen_log(log) and is_simscen_log(log):
             read = read_run(log, with_sensors=True)
             return read, recorded_result(read, log) if self._criteria is None else self._judge_simscen_log(log).result
@@ -108,7 +110,7 @@ class LogJudge:
         return replace(next(iter(runs.values())), result=result)
 
     def _judge_robot(self, log: Path, read: Log, robot: str) -> RunFinished:
-        """Evaluate the log of the only robot, or of one of several."""
+        """Evaluate the part of a log about one robot. `robot` is its name; "" for the only robot."""
         header, case = read.header, read.header.case
         key = header.key
         if self._criteria is None:
@@ -133,7 +135,7 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
     def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
-        """Read a log that simscen did not write, and return it with its result by the criteria file."""
+        """Return a foreign log, and its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot("")
@@ -147,7 +149,7 @@ class LogJudge:
         return read, self._judge_by_file(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
-        """Return the costmap filter masks that the criteria use. The masks of the criteria file are read only once."""
+        """Return the costmap filter masks that the criteria use, by file."""
         if criteria is self._criteria and self._file_masks is not None:
             return self._file_masks
         from simscen.run.preparation import masks_from_criteria
@@ -158,7 +160,7 @@ class LogJudge:
         return masks
 
     def _foreign_case(self) -> Case:
-        """Return the world, goals, and robot of the criteria file. They are read only once."""
+        """Return the world, goals, and robot of the criteria file."""
         assert self._criteria is not None
         if self._case is None:
             from simscen.run.preparation import case_from_criteria
@@ -170,7 +172,7 @@ class LogJudge:
     def _judge_by_file(
         self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: LogCoverage, criteria: LoadedCriteria
     ) -> RunFinished:
-        """Evaluate a log with the criteria file."""
+        """Evaluate a trace (the recorded states of a run) with criteria of the criteria file."""
         file, spec = str(self._scenario), criteria.spec
         expected = expected_failure(spec)
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
@@ -188,12 +190,12 @@ def _may_be_simscen_log(log: Path) -> bool:
 
 
 class UnusableScenario(InvalidInput):
-    """The criteria file is invalid. This concerns all logs, so the evaluation ends."""
+    """The criteria file is invalid, so that no log can be evaluated."""
 
 
 @contextmanager
 def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
-    """Convert InvalidInput that the body of the `with` statement raises to UnusableScenario."""
+    """Convert InvalidInput to UnusableScenario within the context."""
     try:
         yield
     except InvalidInput as error:
@@ -201,10 +203,9 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return each run that left no log, so that it is counted as well, as a pair of its folder and its result.
+    """Return the folder and the result of each run without a log. `folders` are output folders of sessions.
 
-    `folders` are output folders of sessions, whose journals list the runs. The result is an error, unless the run was
-    skipped.
+    The result is an error, except for skipped runs.
     """
     return [
         (str(run_folder(folder, run.key)), _as_error(run))

@@ -1,4 +1,4 @@
-"""Finds the logs in files and folders that the user names, and the result in a log."""
+"""Search for logs in files and folders, and recorded results of logs."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -16,9 +16,9 @@ from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
-"""Names of the log in the folder of a run that was completed, and of one that was aborted."""
+"""Names of the log of a completed run, and of the log of an aborted run, in the folder of the run."""
 BAG_METADATA = "metadata.yaml"
-"""Name of the file that every rosbag2 folder contains."""
+"""Name of a file in every rosbag2 folder."""
 LOG_SUFFIXES = (".mcap", ".db3", ".bag")
 
 
@@ -56,12 +56,12 @@ def _logs(path: Path) -> Iterator[Path]:
 
 
 def is_bag(names: Sequence[str]) -> bool:
-    """Return whether a folder with files of these names is a rosbag2."""
+    """Return whether a folder with these file names is a rosbag2 folder."""
     return BAG_METADATA in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
 def log_file(run: Path) -> Path:
-    """Return the log in the folder of a run; if `run` is a file, return it. Raises InvalidInput if there is no log."""
+    """Return the log in the folder of a run, or `run` itself if it is a file. Raises InvalidInput without a log."""
     if not run.is_dir():
         return run
     found = [run / name for name in (COMPLETE_LOG, PARTIAL_LOG) if (run / name).is_file()]
@@ -72,7 +72,7 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result that a log contains. For an incomplete log, evaluate its criteria on the recorded part."""
+    """Return the result in a log. If the log is incomplete, evaluate its criteria on the recorded part instead."""
     if log.result:
         return from_json(log.result)
     results = {name: _evaluate(robot_log, file, name) for name, robot_log in (log.robots or {"": log}).items()}

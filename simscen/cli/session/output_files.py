@@ -1,4 +1,4 @@
-"""Writes the output files of a session (results.json, junit.xml, report.html, run.json), and returns its exit code."""
+"""Output files of a session (results.json, junit.xml, report.html, run.json), and its exit code."""
 
 import errno
 import json
@@ -36,7 +36,7 @@ from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, writ
 PAGE = "report.html"
 """Name of the HTML report in the output folder."""
 RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
-"""Names in the output folder that `--junit` must not use. junit.xml is not among them: it is the JUnit report."""
+"""Names in the output folder that `--junit` must not use."""
 
 
 class JunitFamily(str, Enum):
@@ -55,10 +55,10 @@ class Reports:
     """Writes the reports of a session to its output folder.
 
     folder:      output folder
-    junit:       further file for the JUnit report, or None
+    junit:       further file for the JUnit report; None for no further file
     family:      dialect of JUnit XML
-    junit_only:  write only the file `junit`
-    used:        entries for run.json: the installed packages and the external stacks of the runs
+    junit_only:  whether to write only the file `junit`
+    used:        further entries of run.json, such as the installed packages that the runs use
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Reports:
         self._family: Family = family
 
     def begin(self) -> None:
-        """Write run.json before the first run, so that it exists even if the session is killed. Raises UsageError."""
+        """Write run.json before the first run. Raises UsageError if the folder is not writable."""
         try:
             write_atomically(self.folder / "run.json", session_info_json(self._used))
         except OSError as error:
@@ -84,7 +84,7 @@ class Reports:
     def write(
         self, finished_runs: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
     ) -> bool:
-        """Write the reports, and return whether all were written. If one cannot be written, its old file remains."""
+        """Write the reports, and return whether all were written. A report that cannot be written is left unchanged."""
         results = map(str.encode, json_parts(finished_runs, str(self.folder), comparison, study))
         documents: dict[Path, bytes | Iterable[bytes]] = {}
         if not self._junit_only:
@@ -122,7 +122,10 @@ class Reports:
         comparison: Comparison | None = None,
         study: Study | None = None,
     ) -> SessionFinished:
-        """Return the last event of a session. The path of a report that could not be written is empty."""
+        """Return the last event of a session. `wall` is its wall-clock duration in s.
+
+        The path of a report is empty if the report could not be written.
+        """
         count, simulated = Counter[Outcome](), 0.0
         for finished in finished_runs:
             count[finished.outcome] += 1
@@ -150,12 +153,13 @@ CLAIM_EXIT_CODES = {
     ClaimStatus.UNDECIDED: Exit.UNDECIDED,
     ClaimStatus.BLOCKED: Exit.INCOMPLETE,
 }
+"""Exit code of a study by the status of its claim (the pass rate to be tested)."""
 
 
 def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) -> Exit:
     """Return the exit code of a session that was not interrupted.
 
-    If the session is a study with a claim, the status of the claim determines it; otherwise, the outcomes of the runs.
+    It depends on the status of the claim in a study with a claim, otherwise on the outcomes of the runs.
     """
     if study is not None and study.claim is not None:
         return CLAIM_EXIT_CODES[study.claim.status]
@@ -169,9 +173,9 @@ def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) 
 
 
 def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
-    """Raise UsageError if the file of --junit cannot be written. None is a session without --junit.
+    """Raise UsageError if the file `junit` of --junit cannot be written. Do nothing if `junit` is None.
 
-    The file must not be one of the `inputs`, nor another file that simscen writes in the output `folder`.
+    The file must not be one of the `inputs`, and not have one of RESERVED_NAMES in the output `folder`.
     """
     if junit is None:
         return
@@ -185,7 +189,7 @@ def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iter
 
 
 def _require_free_name(junit: Path, folder: Path | None) -> None:
-    """Raise OSError if simscen writes another file with this name in the folder of this or another session."""
+    """Raise OSError if the file has one of RESERVED_NAMES in the output folder of this or another session."""
     real = Path(os.path.realpath(junit))
     for parent in real.parents:
         is_output = parent == (folder and Path(os.path.realpath(folder))) or (parent / JOURNAL_FILE).exists()
@@ -203,9 +207,9 @@ def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
 
 
 def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
-    """Return the content of run.json.
+    """Return the content of run.json with the further entries `used`.
 
-    `used` are further entries. `wall` is the wall-clock duration of the session in seconds, or None while it runs.
+    `wall` is the wall-clock duration of the session in s; None while the session runs.
     """
     return json.dumps(
         {
@@ -225,13 +229,13 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
 
 
 MIN_UPDATE_INTERVAL_S = 1.0
-"""Minimum time between two updates of the page, in seconds; the page itself reloads every two seconds."""
+"""Minimum time between two updates of the page."""
 UPDATE_INTERVAL_FACTOR = 10
-"""Minimum time between two updates as a multiple of the time that an update takes, so that updates stay cheap."""
+"""Minimum time between two updates of the page, as a multiple of the duration of an update."""
 
 
 class LivePage:
-    """Listener that shows the HTML report of a running session in a browser, and updates it when runs finish."""
+    """Listener that opens the HTML report of a running session in a browser, and updates it."""
 
     def __init__(self, reports: Reports) -> None:
         self._reports = reports
@@ -240,7 +244,7 @@ class LivePage:
         self._running: dict[RunKey, None] = {}
 
     def __call__(self, event: SessionEvent) -> None:
-        """Write and open the page when the session starts. Update it after a run, but not too often."""
+        """Write and open the page at the start of the session, and update it after runs."""
         match event:
             case SessionStarted():
                 self._total = event.total
@@ -264,6 +268,6 @@ class LivePage:
 
 
 def open_page(page: Path) -> None:
-    """Open a page in the browser of $BROWSER or of the system. If there is no browser, print the path of the page."""
+    """Open a page in the browser of $BROWSER or of the system. Without a browser, print the path of the page."""
     if not webbrowser.open(page.absolute().as_uri()):
         print_text(f"simscen: no browser found; open {page} in a browser", sys.stderr)

@@ -1,4 +1,4 @@
-"""Determines which planned runs a session must execute, and which results of earlier sessions it can reuse."""
+"""Division of planned runs into runs that a session must execute, and runs with reusable results."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -22,16 +22,16 @@ from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
-"""Keys of a result that are compared between journal and log. If values differ, the log is from another run."""
+"""Keys of a result with equal values in journal and log, unless the log is from another run."""
 
 
 @dataclass(frozen=True)
 class PendingRuns:
-    """Runs that a session must still execute.
+    """Runs of a session before their execution.
 
     journal:  journal of the session
     jobs:     runs to execute
-    reused:   results of an earlier session in the same folder
+    reused:   results of other runs, from an earlier session in the same folder
     workers:  number of parallel runs
     stacks:   names of the stacks of --stack
     """
@@ -49,10 +49,10 @@ class PendingRuns:
 
 
 def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
-    """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
+    """Write the planned runs to the journal, and return the pending runs. Raises UsageError if that fails.
 
-    A result of an earlier session is reused if its scenario has not changed and it is not an error. The two runs that
-    --check-determinism compares are reused together or not at all. `shard` (i, n): `jobs` are part i of n (from 1).
+    A result of an earlier session is reused if it is not an error and its scenario has not changed. `shard` is the
+    number of this shard (from 1) and the count of shards.
     """
     planned = plan_runs(jobs)
     remaining, reused = divide_runs(jobs, planned, previous_results(journal))
@@ -64,7 +64,7 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
 
 
 def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
-    """Return the runs of these jobs as the journal lists them."""
+    """Return the runs of these jobs in the form of the journal."""
     scenarios = {_job_identity(job): job.scenario for job in jobs}
     digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
     return [_planned_run(job, digests[_job_identity(job)]) for job in jobs]
@@ -73,9 +73,10 @@ def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
 def divide_runs(
     jobs: Sequence[Job], planned: Sequence[PlannedRun], earlier: Mapping[PlannedRun, RunFinished]
 ) -> tuple[list[Job], list[RunFinished]]:
-    """Return the jobs that must be executed, and the earlier results of the other jobs.
+    """Return the jobs to execute, and the earlier results of all other jobs.
 
-    `planned` are the runs of the jobs, in the same order.
+    `planned` are the runs of the jobs in the same order. The two runs that --check-determinism compares are either both
+    executed or both reused.
     """
     results = [earlier.get(run) for run in planned]
     reused: list[RunFinished] = []
@@ -89,7 +90,7 @@ def divide_runs(
 
 
 def write_reused(journal: Journal, reused: Sequence[RunFinished]) -> None:
-    """Write reused results to the journal. Raises UsageError if the journal cannot be written."""
+    """Write reused results to the journal. Raises UsageError if that fails."""
     for finished in reused:
         journal(finished)
     if journal.error:
@@ -106,9 +107,9 @@ def _planned_run(job: Job, digests: ScenarioDigests) -> PlannedRun:
 
 
 def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
-    """Return the results that the journal of an earlier session in the same folder contains, by planned run.
+    """Return the reusable results of an earlier session in the folder of the journal, by planned run.
 
-    Results that are errors are left out, as are results that differ from those in their log.
+    A result is reusable if it is not an error and equals the result in its log.
     """
     try:
         past = read_journal(journal.folder)
@@ -123,7 +124,7 @@ def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
 
 
 def _has_matching_log(finished: RunFinished) -> bool:
-    """Return whether the log of the run still exists and contains this result; True if the run wrote no log."""
+    """Return whether the log of the run exists and contains this result; True for a run without a log."""
     if not finished.artifacts.mcap:
         return True
     from simscen.record.mcap_reader import attached_result  # only a resumed session needs the library
@@ -135,7 +136,7 @@ def _has_matching_log(finished: RunFinished) -> bool:
 
 
 def _compared_index(jobs: Sequence[Job], number: int) -> int:
-    """Return the index of the run with which --check-determinism compares a run, or `number` if there is none."""
+    """Return the index of the run with which --check-determinism compares run `number`; without one, `number`."""
     twin = number ^ 1
     if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
         return twin
@@ -143,12 +144,12 @@ def _compared_index(jobs: Sequence[Job], number: int) -> int:
 
 
 def _job_identity(job: Job) -> tuple[str, str, str]:
-    """Return the scenario, the variation, and the stack of a job."""
+    """Return scenario id, variation, and stack name of a job."""
     return job.scenario.id, job.scenario.variation, job.scenario.stack_name
 
 
 RUN_ALL = "all selected scenarios run"
-"""End of a message about why --last-failed selects everything."""
+"""End of the messages if --last-failed selects all runs."""
 
 
 def failed_runs(
@@ -156,9 +157,8 @@ def failed_runs(
 ) -> tuple[frozenset[RunKey] | None, str]:
     """Return the runs of these scenarios that failed in the last session, and a message for the user.
 
-    Returns None instead of runs if there is no such session or nothing failed: then all runs are executed, as with
-    `pytest --last-failed`. The session is searched in the parent of `out`, or in simscen-out if `out` is None. If the
-    options set seeds, only failed runs with one of these seeds are returned.
+    The runs are None if there is no last session or no such run. The last session is searched in the parent of the
+    output folder `out`; None for simscen-out. If the options set seeds, only runs with these seeds are returned.
     """
     sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(sessions_folder)

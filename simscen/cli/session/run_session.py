@@ -1,4 +1,4 @@
-"""Executes `simscen run`: loads the scenarios, simulates their runs, and writes the reports."""
+"""Implementation of `simscen run`: loads scenarios, simulates their runs, and writes the reports."""
 
 import sys
 import time
@@ -29,10 +29,10 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_sess
 
 
 class Observer(Protocol):
-    """Receiver of the scenarios and the events of a session."""
+    """Object that receives the scenarios and the events of a session."""
 
     def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
-        """Receive the selected scenarios, which are all valid."""
+        """Receive the selected scenarios, before the first event."""
         ...
 
     def __call__(self, event: SessionEvent) -> None:
@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Options of `simscen run`; each field has the meaning of the option with its name."""
+    """Options of `simscen run`. Each field is the value of the option with its name."""
 
     paths: Sequence[Path]
     selection: Selection = field(default_factory=Selection)
@@ -62,10 +62,9 @@ class SessionRequest:
 
 
 def execute_session(request: SessionRequest, observer: Observer | None = None) -> Exit:
-    """Run the session, write its reports, and return the exit code.
+    """Run a session, write its reports, and return the exit code.
 
-    `observer` also receives the scenarios and events. Raises InvalidInput, UsageError, and NothingSelected before any
-    run.
+    Raises InvalidInput, UsageError, and NothingSelected before the first run.
     """
     options = request.options
     scenarios, warnings = load_selection(
@@ -95,7 +94,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
 
 
 def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:
-    """Return the runs that --last-failed selects, or None for all runs, and print which these are."""
+    """Return the runs that --last-failed selects, None for all runs, and print a message about the selection."""
     if request.resume is not None:
         raise UsageError("--last-failed and --resume exclude each other")
     only, message = failed_runs(scenarios, request.options, request.out)
@@ -108,7 +107,7 @@ def _run(
 ) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
-    Every event goes to the journal, the screen, and the listeners.
+    `output` and `listeners` receive all events, including those of reused results.
     """
     start = time.monotonic()
 
@@ -141,7 +140,7 @@ def _run(
 
 
 def _check_journal(journal: Journal) -> bool:
-    """Return whether the journal is complete; print a message if it is not."""
+    """Return whether the journal is complete, and print a message if not."""
     if journal.error is not None:
         reason = journal.error.strerror
         print_text(f"simscen: the journal in {journal.folder} is incomplete: {reason}", sys.stderr)
@@ -149,10 +148,10 @@ def _check_journal(journal: Journal) -> bool:
 
 
 def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
-    """Return the output folder and its journal, which is locked so that no other process can use the folder.
+    """Return the output folder and its journal. The journal locks the folder against other processes.
 
-    The folder is that of --out or --resume, or a new one in simscen-out. Raises InvalidInput and UsageError before
-    anything in the folder changes.
+    The folder is that of --out or --resume, or a new folder in simscen-out. Raises InvalidInput and UsageError before
+    the folder is changed.
     """
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")

@@ -1,4 +1,4 @@
-"""Loads the scenarios that the options of a session select, including those of one shard (--shard)."""
+"""Selection of scenarios by the options of a session, such as tags and shards (parts of a session for CI jobs)."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,12 @@ from simscen.loading.variations.naming import number_of
 
 
 class _ParallelJob(NamedTuple):
-    """Environment variables with which a CI system numbers the jobs that run in parallel.
+    """Environment variables of a CI system that number parallel jobs.
 
-    index_variable:  number of this job
-    count_variable:  number of jobs
-    first_variable:  number of the first job; "" if the system has no such variable
-    first:           number of the first job in a system without such a variable
+    index_variable:  variable with the number of this job
+    count_variable:  variable with the count of jobs
+    first_variable:  variable with the number of the first job; "" without such a variable
+    first:           number of the first job if `first_variable` is ""
     """
 
     index_variable: str
@@ -47,9 +47,9 @@ PARALLEL_JOBS = (
 
 
 def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
-    """Return the number and the count of a shard from the value of --shard, such as "2/4". Raises UsageError.
+    """Return the number of this shard and the count of shards from the value of --shard, such as "2/4".
 
-    For `auto`, both come from the variables of the CI system in `environ`.
+    The value "auto" stands for the variables of the CI system in `environ`. Raises UsageError.
     """
     text = _parallel_job(environ) if text == "auto" else text
     number, slash, count = text.partition("/")
@@ -59,7 +59,7 @@ def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
 
 
 def _parallel_job(environ: Mapping[str, str]) -> str:
-    """Return "i/n" from the variables of a CI system. Raises UsageError if none are set."""
+    """Return number and count of this job, such as "2/4", from the variables of a CI system. Raises UsageError."""
     for job in PARALLEL_JOBS:
         index, count = environ.get(job.index_variable, ""), environ.get(job.count_variable, "")
         first = environ.get(job.first_variable, str(job.first))
@@ -72,12 +72,11 @@ def _parallel_job(environ: Mapping[str, str]) -> str:
 def scenarios_of_shard(
     scenarios: list[LoadedScenario], number: int, count: int, times: Mapping[str, float]
 ) -> list[LoadedScenario]:
-    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected if there are none.
+    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected without scenarios.
 
-    `times` are the durations of earlier runs in seconds, by scenario title. If there are none, each shard gets every
-    n-th scenario, which spreads the slow scenarios of a folder over the shards. Otherwise, the scenarios are assigned
-    from the longest to the shortest, each to the shard with the shortest total time. A scenario without a time counts
-    as the median.
+    `times` are durations of scenarios in s by title. From the longest to the shortest, each scenario is assigned to the
+    shard with the least total time. A missing duration counts as the median. If `times` is empty, each shard has every
+    `count`-th scenario.
     """
     if times and count > 1:
         default = median(times.values())
@@ -95,9 +94,9 @@ def scenarios_of_shard(
 
 
 def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
-    """Return the mean wall-clock time of the runs of each scenario in seconds, by title, from earlier output folders.
+    """Return the mean wall-clock time of each scenario's runs in s, by title of the scenario.
 
-    Raises InvalidInput if a folder has no journal.
+    `folders` are output folders of earlier sessions. Raises InvalidInput if a folder has no journal.
     """
     from simscen.report.journal_reader import (
         read_journal,  # light commands, which also select scenarios, do not need it
@@ -114,11 +113,11 @@ def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
 class Selection:
     """Filter of scenarios.
 
-    keyword:     expression about ids, as with `pytest -k`; "" selects all
-    tags:        a scenario must have one of these tags; () selects all
-    shard:       (i, n) with 1 <= i <= n: selects the i-th of n parts
-    variations:  names of variations; () selects all
-    times:       durations of scenarios in earlier runs in seconds, by title, with which shards are balanced
+    keyword:     expression about ids, as with `pytest -k`; "" selects all scenarios
+    tags:        tags of which a scenario has at least one; () selects all scenarios
+    shard:       number of this shard (from 1), and count of shards
+    variations:  names of variations; () selects all variations
+    times:       durations of scenarios in s by title, to balance shards
     """
 
     keyword: str = ""
@@ -129,7 +128,7 @@ class Selection:
 
     @property
     def variation_numbers(self) -> list[int] | None:
-        """Numbers of the selected variations if all have names such as `variation-7`; otherwise None."""
+        """Numbers of the selected variations if all have names such as "variation-7"; otherwise None."""
         numbers = [number for name in self.variations if (number := number_of(name)) is not None]
         return numbers if numbers and len(numbers) == len(self.variations) else None
 
@@ -142,12 +141,11 @@ def load_selection(
     selection: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """Return the selected scenarios below `paths`, each variation with each of `stacks`, and warnings about them.
+    """Return the selected scenarios below `paths`, each with each of `stacks`, and warnings about these scenarios.
 
-    `stacks` are values of --stack; without any, each scenario has its own stack. If a stack cannot run a scenario that
-    was found in a folder, that scenario is marked as skipped; if the scenario is one of `paths`, it is invalid. Raises
-    InvalidInput with the problems of all files, including files that are not selected, and NothingSelected if no
-    scenario is selected.
+    `stacks` are values of --stack; () keeps the stack of each scenario. A scenario that a stack cannot run is skipped
+    if it was found in a folder, and invalid if it is one of `paths`. Raises InvalidInput if any file below `paths` is
+    invalid, and NothingSelected if no scenario is selected.
     """
     root_folder = root if root is not None else default_root(paths)
     checker = FileChecker(root_folder, world_path, lenient, stacks=parse_stacks(stacks, root_folder, world_path))
@@ -176,7 +174,7 @@ def load_selection(
 
 
 def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
-    """Return why a scenario with these problems cannot run with the stack; "" if the stack is not the reason."""
+    """Return the reason why a stack cannot run a scenario with these problems; "" if other problems are the reason."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != STACK_CANNOT for problem in errors):
         return ""
@@ -185,7 +183,7 @@ def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
 
 
 def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
-    """Return the variations with one of these names; all if there are no names. Raises NothingSelected."""
+    """Return the scenarios with one of these variation names; all for (). Raises NothingSelected for unknown names."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
         if number_of(missing[0]) is not None:

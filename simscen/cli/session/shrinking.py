@@ -1,4 +1,4 @@
-"""Searches for the smallest scenario that still fails in the same criterion, for `simscen shrink`."""
+"""Search for the smallest scenario with the same failure, for `simscen shrink`."""
 
 import hashlib
 import json
@@ -33,15 +33,14 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 
 Part = TypeVar("Part")
 FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
-"""Function that returns the index of the first of several candidates that still fails, or None."""
+"""Function that takes several lists of parts, and returns the index of the first list that fails; None if none does."""
 
 
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
-    """Return a subset of the parts that still fails, but passes if any single part is removed.
+    """Return a minimal list of parts that fails, by delta debugging (Zeller and Hildebrandt 2002).
 
-    All parts together must fail. `first_failing` receives candidates, each a subset of the parts in their original
-    order. (Delta debugging, with complements only: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing
-    Input, 2002.)
+    All parts together must fail. If any single part of the result is removed, the rest passes. Candidates keep the
+    order of the parts.
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:
@@ -61,12 +60,12 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
     return remaining
 
 
-BATCH = 8
-"""Number of candidates that run together. Fixed, so that the result does not depend on the number of workers."""
+BATCH_SIZE = 8
+"""Number of candidates that run together, independent of the number of workers."""
 
 
 class Stopped(Exception):
-    """A signal interrupted the runs; `exit` is the exit code for it."""
+    """A signal interrupted the runs. `exit` is the exit code for the signal."""
 
     def __init__(self, code: Exit) -> None:
         super().__init__(str(code))
@@ -79,10 +78,10 @@ class BudgetSpent(Exception):
 
 @dataclass
 class CandidateRuns:
-    """Runs candidates: changed versions of `scenario`, each given as its YAML tree.
+    """Runs of candidates, which are changed versions of a scenario in the form of YAML trees.
 
-    All candidates run with the same seed. Results are cached by content, so that no candidate runs twice. `max_runs`
-    limits the number of runs, and `runs` counts them. `report` is called after each batch.
+    All candidates run with the same seed, and equal candidates only once. `report` is called after each batch. `runs`
+    is the number of runs so far, and `max_runs` its maximum.
     """
 
     scenario: ChangedScenario
@@ -96,19 +95,19 @@ class CandidateRuns:
     _results: dict[str, RunResult | None] = field(default_factory=dict)
 
     def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
-        """Return the index of the first candidate whose result `accepts` accepts, or None.
+        """Return the index of the first candidate for whose result `accepts` is true; None if there is no such one.
 
-        Invalid candidates are never accepted. Raises BudgetSpent and Stopped.
+        Invalid candidates are not accepted. Raises BudgetSpent and Stopped.
         """
-        for start in range(0, len(trees), BATCH):
-            results = self.results(trees[start : start + BATCH])
+        for start in range(0, len(trees), BATCH_SIZE):
+            results = self.results(trees[start : start + BATCH_SIZE])
             accepted = [result is not None and accepts(result) for result in results]
             if True in accepted:
                 return start + accepted.index(True)
         return None
 
     def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
-        """Run candidates and return their results, None for an invalid candidate. Raises BudgetSpent and Stopped."""
+        """Run candidates, and return their results; None for an invalid candidate. Raises BudgetSpent and Stopped."""
         keys = [_content_key(tree) for tree in trees]
         new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
         loaded = {key: self.load(tree) for key, tree in new.items()}
@@ -123,7 +122,7 @@ class CandidateRuns:
         return [self._results[key] for key in keys]
 
     def load(self, tree: MappingNode) -> LoadedScenario | None:
-        """Load and check a candidate. Return None if it is invalid."""
+        """Load and check a candidate. Return None for an invalid candidate."""
         found = self.scenario.load(tree)
         return None if isinstance(found, list) else self.checker.check_variation(found)[0]
 
@@ -147,16 +146,16 @@ def _content_key(tree: MappingNode) -> str:
 
 
 MAX_ROUNDS = 3
-"""Maximum number of repetitions of removing and rounding: rounded numbers may make further parts unnecessary."""
+"""Maximum number of rounds, in each of which parts are removed and numbers are rounded."""
 
 
 @dataclass(frozen=True)
 class Failure:
     """Failure of a run that a smaller scenario must reproduce.
 
-    criterion:   kind of the failed criterion, such as "collisions"; "" for an error of the stack under test
-    verdict_id:  id of the verdict of this criterion
-    max_margin:  largest margin, below 0, that counts as the same failure; None if the criterion has no margins
+    criterion:   kind of the failed criterion, such as "collisions"; "" for an error of the stack
+    verdict_id:  id of the criterion's verdict
+    max_margin:  largest margin (distance to the limit, below 0) of the same failure; None without margins
     """
 
     criterion: str
@@ -182,9 +181,9 @@ class Failure:
 
 @dataclass
 class Shrinker:
-    """Makes a scenario smaller as long as its runs reproduce a failure.
+    """Reduces a scenario while its runs reproduce a failure.
 
-    `tree` is the smallest scenario so far. `is_complete` is False if the allowed number of runs did not suffice.
+    `tree` is the smallest scenario so far. `is_complete` is false if the maximum number of runs ended the search.
     """
 
     runs: CandidateRuns
@@ -193,10 +192,9 @@ class Shrinker:
     is_complete: bool = True
 
     def shrink(self, nominal: Mapping[Keys, Node | None]) -> None:
-        """Make the scenario as small as possible.
+        """Make the scenario as small as possible within the maximum number of runs.
 
-        `nominal` are the values without the variation, for all keys that the variation sets; None if a key does not
-        exist without the variation. Stops early if the allowed number of runs is reached.
+        `nominal` are the values of the varied keys in the scenario without variation; None for a missing key.
         """
         try:
             self._restore_nominal(nominal)
@@ -210,7 +208,7 @@ class Shrinker:
             self.is_complete = False
 
     def _restore_nominal(self, nominal: Mapping[Keys, Node | None]) -> None:
-        """Undo the changes of the variation that the failure does not need."""
+        """Set the varied keys that the failure does not need to their values without variation."""
         parts = list(nominal)
 
         def build(varied: Sequence[Keys]) -> MappingNode:
@@ -219,7 +217,7 @@ class Shrinker:
         self.tree = build(self._minimize(parts, build))
 
     def _remove_parts(self) -> None:
-        """Remove parts that the failure does not need, from the top of the tree down: parts at the top are larger."""
+        """Remove parts of the YAML tree that the failure does not need, from the top down."""
         depth = 1
         while depth <= max_depth(self.tree):
             before, parts = self.tree, removable_parts(self.tree, depth)
@@ -253,10 +251,10 @@ class Shrinker:
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
-    """Return the failure of a run in a criterion, given by its id or kind; "" stands for the first failed criterion.
+    """Return the failure of a run in a criterion. `criterion` is an id or kind; "" for the first failed criterion.
 
-    `share` is the fraction of the violation, from 0 to 1, that a smaller scenario must keep. Raises UsageError if the
-    run did not fail in the criterion.
+    `share` (0 to 1) is the fraction of the violation that a smaller scenario must still have. Raises UsageError if the
+    run did not fail in this criterion.
     """
     if result.error is not None and result.error.by_stack and not criterion:
         return Failure("", "")
@@ -271,7 +269,7 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
 
 
 def smallest_margin(verdict: Verdict) -> float | None:
-    """Return the smallest margin of the failed findings of a verdict; None if they have no margins."""
+    """Return the smallest margin of a verdict's failed findings (checked bounds); None without margins."""
     margins = [
         finding.margin for finding in verdict.findings if finding.status is Status.FAIL and finding.margin is not None
     ]
@@ -279,7 +277,7 @@ def smallest_margin(verdict: Verdict) -> float | None:
 
 
 def with_only_failed_criterion(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
-    """Return the scenario with this seed, with only the failed criterion, and without keys that do not affect a run."""
+    """Return the scenario with this seed, only the failed criterion, and only keys that affect the run."""
     entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")
     if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
@@ -292,10 +290,7 @@ def with_only_failed_criterion(tree: MappingNode, failure: Failure, seed: int) -
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
-    """Return the scenario with its world inline instead of in a file, so that the world can be reduced, too.
-
-    Return None if the world is not in a file.
-    """
+    """Return the scenario with its world inline instead of in a file; None if the world is not in a file."""
     entry = tree.entries.get("world")
     if world is None or entry is None or not isinstance(entry.value, ScalarNode):
         return None

@@ -1,7 +1,4 @@
-"""Stacks that are chosen with `--stack NAME=VALUE`, and the commands of external stacks.
-
-Light commands import this module, so it imports the readers of stack files and configurations inside functions.
-"""
+"""Stacks that are chosen with `--stack NAME=VALUE`, and the commands that start external stacks."""
 
 from __future__ import annotations
 
@@ -43,8 +40,7 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 class Stacks:
     """Stacks `chosen` with --stack, in order, and the commands of external stacks.
 
-    The user's configuration is read only when a name needs it. The files of a project never define a command, so that
-    a scenario cannot start programs of its choice.
+    Commands come from --stack or the user's configuration, and never from a scenario or another file of a project.
     """
 
     chosen: Sequence[StackChoice] = ()
@@ -52,7 +48,7 @@ class Stacks:
 
     @cached_property
     def config(self) -> UserConfig:
-        """The user's configuration. Raises InvalidInput."""
+        """Configuration of the user, which is read on first use. Raises InvalidInput."""
         from simscen.loading.stacks.userconfig import load_config
 
         return load_config(config_file())
@@ -81,7 +77,7 @@ class Stacks:
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
-        """Return the command of an external stack from --stack, else from the configuration, else None."""
+        """Return the command of an external stack from --stack or the configuration; None without a command."""
         if name not in self._commands:
             given = next(
                 (choice.external_command for choice in self.chosen if choice.name == name and choice.external_command),
@@ -94,7 +90,7 @@ class Stacks:
 def external_commands(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
     """Return the commands of the scenarios' external stacks by name, as JSON data for run.json.
 
-    Environment variables are left out, because they can contain secrets.
+    Environment variables are not included, because they can contain secrets.
     """
     stacks = ((view.spec.stack, view.external_command) for loaded in scenarios for view in loaded.robot_views.values())
     found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
@@ -107,10 +103,10 @@ def external_commands(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str
 def load_with_stack(
     stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
 ) -> LoadedScenario:
-    """Load a scenario, or one of its variations, and replace its stack.
+    """Load a scenario or one of its variations with another stack.
 
-    `stack` is a value of --stack, or None to keep the stack of the scenario. Raises InvalidInput, and UsageError if
-    the variation does not exist, or if none is given although the scenario has variations.
+    `stack` is a value of --stack; None keeps the stack of the scenario. Raises InvalidInput, and UsageError for a
+    missing or unknown `variation`.
     """
     root_folder = root or default_root([file])
     stacks = parse_stacks([] if stack is None else [stack], root_folder, world_path)
@@ -138,7 +134,7 @@ def parse_stacks(arguments: Sequence[str], root: Path, world_path: Sequence[Path
 
 
 def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
-    """Parse one value of --stack. `stacks` finds commands in the user's configuration."""
+    """Parse one value of --stack. `stacks` has the user's configuration."""
     name, equals, value = text.partition("=")
     if not _NAME.fullmatch(name):
         hint = "a name consists of letters, digits, `_`, `.`, and `-`"
@@ -159,7 +155,10 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
 
 
 def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> ExternalCommand:
-    """Return the command of a name in the configuration, or the command written in the option."""
+    """Return the command with the name `value` in the configuration, or parse `value` as a command.
+
+    `text` is the value of --stack for messages. Raises UsageError.
+    """
     if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
         return known
     if not may_be_command:

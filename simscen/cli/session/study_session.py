@@ -1,4 +1,4 @@
-"""Executes `simscen study`: simulates runs in batches until the claim is decided or all runs are done."""
+"""Implementation of `simscen study`: simulates runs of one scenario until its claim (a pass rate) is decided."""
 
 import sys
 import time
@@ -39,15 +39,15 @@ from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
-SEQUENTIAL_BATCH = 32
-"""Runs between two evaluations of a sequential claim. Fixed, so that runs do not depend on the number of workers."""
-BATCH = 256
-"""Runs of a batch without a sequential claim. It limits how many scenarios are in memory."""
+SEQUENTIAL_BATCH_SIZE = 32
+"""Number of runs between two evaluations of a sequential claim, independent of the number of workers."""
+BATCH_SIZE = 256
+"""Number of runs of a batch without a sequential claim. It limits the number of scenarios in memory."""
 
 
 @dataclass(frozen=True)
 class StudyRequest:
-    """Options of `simscen study`; each field has the meaning of the option with its name."""
+    """Options of `simscen study`. Each field is the value of the option with its name."""
 
     file: Path
     runs: int | None = None
@@ -68,10 +68,9 @@ class StudyRequest:
 class StudyRun(NamedTuple):
     """Run of a study.
 
-    number:      number of its variation; None for a scenario without variations
-    seed_index:  its seed is the first seed of the study plus this index
-    drawn:       number of variations that were drawn up to this run, including those that violate the conditions;
-                 0 if nothing is drawn or there are no conditions
+    number:      number of the variation; None for a scenario without variations
+    seed_index:  seed of the run minus first seed of the study
+    drawn:       number of variations drawn up to this run, including rejected draws; 0 without draws or conditions
     """
 
     number: int | None
@@ -80,7 +79,7 @@ class StudyRun(NamedTuple):
 
 
 def execute_study(request: StudyRequest) -> Exit:
-    """Run a study, write its reports, and return the exit code. Raises InvalidInput and UsageError before any run."""
+    """Run a study, write its reports, and return the exit code. Raises InvalidInput and UsageError."""
     study = _StudySession(request)
     first = study.load_first_batch()
     require_writable_junit(request.junit, request.out or request.resume, study.inputs)
@@ -93,7 +92,7 @@ def execute_study(request: StudyRequest) -> Exit:
 
 
 class _StudySession:
-    """Session that chooses, loads, and executes the runs of a study in batches."""
+    """Session of a study. Runs are chosen, loaded, and executed in batches."""
 
     def __init__(self, request: StudyRequest) -> None:
         self._request = request
@@ -112,7 +111,7 @@ class _StudySession:
         self.inputs: set[Path] = set()
 
     def load_first_batch(self) -> list[LoadedScenario]:
-        """Determine the number of runs, and load the scenarios of the first runs.
+        """Determine the number of runs, and return the scenarios of the first batch.
 
         Raises InvalidInput, UsageError, and NothingSelected.
         """
@@ -182,10 +181,10 @@ class _StudySession:
 
     @property
     def _batch_size(self) -> int:
-        return BATCH if self._claim is None or self._claim.method == "fixed" else SEQUENTIAL_BATCH
+        return BATCH_SIZE if self._claim is None or self._claim.method == "fixed" else SEQUENTIAL_BATCH_SIZE
 
     def _count_runs(self) -> int:
-        """Return the number of runs; for a sequential claim, the maximum. Raises UsageError."""
+        """Return the number of runs; for a sequential claim, the maximum number. Raises UsageError."""
         request, space = self._request, self._space
         if not self._is_random:
             assert space is not None
@@ -203,7 +202,7 @@ class _StudySession:
         raise UsageError("the number of runs is missing; set it with --runs, or with `acceptance` in the scenario")
 
     def _all_runs(self) -> Iterator[StudyRun]:
-        """Yield the runs. Each random run has a seed of its own; chosen values all run with the same seeds."""
+        """Yield the runs in order. Random runs have different seeds; listed values are all run with the same seeds."""
         space = self._space
         if space is None:
             yield from (StudyRun(None, index, 0) for index in range(self.total))
@@ -216,7 +215,7 @@ class _StudySession:
                 yield from (StudyRun(number, index, 0) for index in range(self._request.repeat))
 
     def _load(self, numbers: Sequence[int | None]) -> list[LoadedScenario]:
-        """Load the variations with these numbers, in this order. Raises InvalidInput."""
+        """Return the loaded variations with these numbers, in this order. Raises InvalidInput and UsageError."""
         request = self._request
         names = [f"variation-{number}" for number in dict.fromkeys(numbers) if number is not None]
         missing = [number for number in dict.fromkeys(numbers) if number not in self._loaded]
@@ -239,7 +238,7 @@ class _StudySession:
         return [self._loaded[number] for number in numbers]
 
     def _jobs(self, first: int, folder: Path) -> list[Job]:
-        """Return the jobs of the batch, numbered from `first` on."""
+        """Return the jobs of the current batch. `first` is the number of the first job."""
         options, jobs = self._request.options, []
         for index, run in enumerate(self._batch):
             scenario = self._loaded[run.number]
@@ -250,7 +249,7 @@ class _StudySession:
     def _plan(
         self, journal: Journal, jobs: Sequence[Job], earlier: Mapping[PlannedRun, RunFinished]
     ) -> tuple[list[Job], list[RunFinished]]:
-        """Write the runs of a batch to the journal. Return the jobs to execute, and the results that can be reused."""
+        """Write the runs of a batch to the journal, and return the jobs to execute, and the reused results."""
         planned = plan_runs(jobs)
         remaining, reused = divide_runs(jobs, planned, earlier)
         is_first = not self._planned
@@ -277,9 +276,9 @@ class _StudySession:
 
 
 def _allowed_numbers(space: VariationSpace, file: Path) -> Iterator[int]:
-    """Yield the numbers of the variations that meet the conditions in `require`, without end for random draws.
+    """Yield the numbers of the variations that meet the conditions in `require`; endlessly for random variations.
 
-    Raises InvalidInput if no variation, or none of many draws in a row, meets the conditions.
+    Raises InvalidInput if no variation meets the conditions, or none of MAX_REJECTED_DRAWS consecutive draws.
     """
     numbers = count(1) if space.is_random else range(1, space.count + 1)
     rejected, found = 0, False

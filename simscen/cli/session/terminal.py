@@ -1,4 +1,4 @@
-"""Prints a session to stdout. If printing fails (closed pipe, full disk), the session and its output files go on."""
+"""Output of a session on stdout. An error of stdout, such as a closed pipe, does not end the session."""
 
 import os
 import sys
@@ -22,9 +22,9 @@ from simscen.report.text_reporters import Reporter
 from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
-"""Environment variable with the file that GitHub Actions shows as the summary of a step."""
+"""Environment variable with the path of the file for the job summary of GitHub Actions."""
 PICTURES_URL = "SIMSCEN_PICTURES_URL"
-"""Environment variable with the URL of the uploaded output folder, from which the job summary shows pictures."""
+"""Environment variable with the URL of the uploaded output folder, for the pictures in the job summary."""
 
 
 class Format(str, Enum):
@@ -39,10 +39,10 @@ FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")
 
 
 class Screen:
-    """Prints the events of a session until printing fails.
+    """Prints the events of a session until an error of stdout.
 
-    `stdout_error` is the first error of writing to stdout, `summary_error` that of writing the job summary; None if
-    there was none.
+    `stdout_error` is the first error of writing to stdout, and `summary_error` is the error of writing the job summary.
+    Both are None without an error.
     """
 
     def __init__(self, printer: Reporter) -> None:
@@ -58,10 +58,7 @@ class Screen:
 
     @contextmanager
     def suppress_errors(self) -> Iterator[None]:
-        """Record an error of stdout, and discard all further output.
-
-        Otherwise the interpreter would fail when it flushes stdout at its exit.
-        """
+        """Within the context, record an error of stdout, and discard all further output."""
         try:
             yield
         except OSError as error:
@@ -69,7 +66,7 @@ class Screen:
             discard_output(sys.stdout.fileno())
 
     def append_summary(self, text: str) -> None:
-        """Append to the file that GitHub Actions shows as the summary of a step."""
+        """Append text to the job summary of GitHub Actions."""
         try:
             with Path(os.environ[STEP_SUMMARY]).open("a", encoding="utf-8") as file:
                 file.write(text)
@@ -77,7 +74,10 @@ class Screen:
             self.summary_error = error
 
     def exit(self, code: Exit) -> Exit:
-        """Return the exit code of the session, or INCOMPLETE if output was lost. A closed pipe is not an error."""
+        """Return the exit code of the session, at least INCOMPLETE if output was lost, and print the reason.
+
+        A closed pipe does not count as lost output.
+        """
         errors = {STEP_SUMMARY: self.summary_error}
         if not isinstance(self.stdout_error, BrokenPipeError):
             errors["to stdout"] = self.stdout_error
@@ -90,10 +90,10 @@ class Screen:
 
 @contextmanager
 def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
-    """Provide a Screen for the body of the `with` statement, and print the end of the session after it.
+    """Provide a Screen within the context, and print the end of the session afterwards.
 
-    On GitHub, the session is also written as the summary of the step; UsageError is raised if that is not possible.
-    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none.
+    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none. The format GITHUB also writes
+    the job summary. Raises UsageError if the file of the summary is not writable.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
     printer = _printer(format_, summary, slow)
@@ -119,9 +119,9 @@ def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Repor
 
 
 def _step_summary() -> StringIO | None:
-    """Return a buffer for the summary of the step, or None outside of GitHub Actions.
+    """Return a buffer for the job summary; None outside of GitHub Actions.
 
-    Raises UsageError if the file of the summary cannot be written.
+    Raises UsageError if the file of the summary is not writable.
     """
     path = os.environ.get(STEP_SUMMARY)
     if not path:

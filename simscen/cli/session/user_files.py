@@ -1,4 +1,4 @@
-"""Writes files that the user has named on the command line, and reports errors as UsageError."""
+"""Creation of files that the user named on the command line. Errors are raised as UsageError."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,10 +11,9 @@ from simscen.loading.yaml.textfile import os_error_reason
 
 @contextmanager
 def create_file(file: Path, name: str) -> Iterator[None]:
-    """Create an empty file and its folder, for the body of the `with` statement to fill.
+    """Create an empty file and its folder, and remove the file again if the body of the `with` statement fails.
 
-    If the body fails, the file is removed. `name` is the file as the user wrote it. Raises UsageError if the file
-    exists or cannot be written.
+    `name` is the name of the file in messages. Raises UsageError if the file exists or cannot be written.
     """
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -37,7 +36,7 @@ def create_file(file: Path, name: str) -> Iterator[None]:
 def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
     """Create or replace a file by calling `write` with its path.
 
-    Raises UsageError if that fails or if the file is one of the `inputs`.
+    Raises UsageError if that fails, and if the file is one of the `inputs`.
     """
     try:
         require_regular_file(path)

@@ -1,4 +1,4 @@
-"""Runs a reconstructed scenario and compares the run with the log, for `simscen new --from-log --verify`."""
+"""Comparison of a run of a reconstructed scenario with the log, for `simscen new --from-log --verify`."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from simscen.reconstruction.verifying.comparison import Verification, compare_wi
 from simscen.reconstruction.verifying.page import verification_page
 
 PAGE_SUFFIX = ".verified.html"
-"""End of the name of the page, after the name of the scenario."""
+"""Suffix of the page. Its stem is the name of the scenario."""
 MAX_COLUMNS = 100
 """Width of the table in characters if stdout is not a terminal."""
 
 
 def verify_reconstruction(reconstruction: Reconstruction) -> None:
-    """Run the scenario, print a table of the differences between run and log, and write a page that shows both.
+    """Run the scenario, print a table of the differences between run and log, and write a page with both drives.
 
     Exits with code 1 if an incident of the log, such as a collision, does not happen in the run.
     """
@@ -58,7 +58,7 @@ def verify_reconstruction(reconstruction: Reconstruction) -> None:
 
 
 def _run(scenario: Path, log: Path) -> None:
-    """Run a scenario in a process of its own and keep its log. Raises RunError if the run is not completed."""
+    """Run a scenario in another process, and copy its log to `log`. Raises RunError if the run is not completed."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         command = [sys.executable, "-m", "simscen", "run", str(scenario), "--out", str(out), "-j", "1"]

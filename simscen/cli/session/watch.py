@@ -1,4 +1,7 @@
-"""Watch mode of `simscen run`: reruns scenarios when one of their files changes."""
+"""Watch mode of `simscen run`, which reruns scenarios when one of their files changes.
+
+Each session runs in a child process, which reports files and outcomes to the watching process through a pipe.
+"""
 
 import json
 import os
@@ -26,7 +29,7 @@ FileStamps = dict[Path, tuple[int, int, int] | None]
 
 
 def file_stamps(files: Iterable[Path]) -> FileStamps:
-    """Return the stamps of the files. The stamp of a file changes when the file is saved."""
+    """Return the stamps of the files."""
     return {file: _stamp(file) for file in files}
 
 
@@ -39,14 +42,14 @@ def _stamp(file: Path) -> tuple[int, int, int] | None:
 
 
 class WatchReporter:
-    """Observer of a session that tells the watching process, as JSON lines, the files and outcomes of scenarios."""
+    """Observer of a session that writes the files and the outcomes of scenarios to a pipe, as lines of JSON."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._files: dict[str, str] = {}
 
     def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
-        """Report the files of each scenario."""
+        """Write the files of each scenario."""
         files_of: dict[str, set[Path]] = {}
         for scenario in scenarios:
             self._files[scenario.id] = str(scenario.file)
@@ -55,11 +58,11 @@ class WatchReporter:
             self._write({"scenario": file, "files": sorted(map(str, others))})
 
     def invalid_files(self, problems: Iterable[Problem]) -> None:
-        """Report the files that prevent the session from running."""
+        """Write the files with these problems, because of which the session did not run."""
         self._write({"invalid": sorted({str(Path(problem.path).absolute()) for problem in problems})})
 
     def __call__(self, event: SessionEvent) -> None:
-        """Report the outcome of a run."""
+        """Write the outcome of a finished run. Ignore other events."""
         if isinstance(event, RunFinished):
             self._write({"scenario": self._files[event.key.scenario], "good": event.outcome.good})
 
@@ -69,13 +72,10 @@ class WatchReporter:
 
 
 class WatchState:
-    """Watched scenarios with the files that each depends on, and the scenarios that did not pass.
-
-    `find_scenarios` returns the scenarios below `paths`. If an invalid file prevents a session from running, the change
-    of any file starts that session again.
-    """
+    """Watched scenarios, the files of each scenario, and the scenarios that did not pass."""
 
     def __init__(self, find_scenarios: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
+        """Take the paths to watch, and a function that returns the scenarios below these paths."""
         self._find_scenarios = find_scenarios
         self._folders = {path.absolute() for path in paths if path.is_dir()}
         self._files: dict[Path, set[Path]] = {file: {file} for file in self._discovered()}
@@ -91,21 +91,21 @@ class WatchState:
 
     @property
     def failed(self) -> list[Path]:
-        """Scenarios of which a run did not pass in their last session."""
+        """Scenarios with a run that did not pass in their last session."""
         return sorted(self._not_passed & self._files.keys())
 
     @property
     def files(self) -> list[Path]:
-        """Files to watch, and folders in which new scenarios may appear."""
+        """Files and folders to watch. A folder changes when a scenario is added."""
         return sorted({*self._folders, *self._invalid, *(file for files in self._files.values() for file in files)})
 
     def begin(self, paths: Sequence[Path]) -> None:
-        """Record that a session with these scenarios or folders begins."""
+        """Record the start of a session with these scenarios or folders."""
         self._requested, self._invalid = paths, set()
         self._not_passed -= {file for path in paths for file in self._below(path)}
 
     def update(self, line: str) -> None:
-        """Process a line that the WatchReporter of the session has written."""
+        """Process a line from the WatchReporter of the session."""
         message = json.loads(line)
         if "invalid" in message:
             self._invalid = set(map(Path, message["invalid"]))
@@ -118,11 +118,11 @@ class WatchState:
             self._not_passed.add(scenario)
 
     def end(self, code: int) -> None:
-        """Record that the session ended with an exit code. After an invalid file, the next change runs it again."""
+        """Record the exit code of the session. After an invalid file, the session is to be repeated."""
         self._unfinished = self._requested if code == Exit.USAGE else ()
 
     def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
-        """Return the scenarios to run after these files have changed."""
+        """Return the scenarios to run after a change of these files: affected, new, and those to be repeated."""
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
         existing = set(self._discovered()) if changed & self._folders else known
@@ -135,7 +135,7 @@ class WatchState:
         return [file for file in self._files if file.is_relative_to(path.absolute())]
 
     def _discovered(self) -> Sequence[Path]:
-        """Return the existing scenarios; none if the search fails, because the next session reports the error."""
+        """Return the existing scenarios; none if the search fails."""
         try:
             return self._find_scenarios()
         except SimscenError:
@@ -143,16 +143,15 @@ class WatchState:
 
 
 POLL_INTERVAL_S = 0.25
-"""Time between two checks of the files, in seconds. A burst of changes ends when two checks find no difference."""
+"""Time between two checks of the files."""
 INTERRUPTED_CODES = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)
-"""Exit codes of an interrupted session, which also ends the watch mode."""
+"""Exit codes of a session that end the watch mode."""
 
 
 def watch_session(request: SessionRequest) -> int:
-    """Run a session, rerun affected scenarios until q or Ctrl-C is pressed, and return the last exit code.
+    """Run a session, and then sessions with the affected scenarios after each change, until q or Ctrl-C is pressed.
 
-    Each session runs in a fork of this process, which loads no scenarios and plug-ins itself, so that every session
-    loads the current files. Raises UsageError for options that exclude --watch.
+    Return the last exit code. Raises UsageError for options that exclude --watch.
     """
     for name, value in (("--out", request.out), ("--resume", request.resume)):
         if value is not None:
@@ -175,7 +174,7 @@ def watch_session(request: SessionRequest) -> int:
 
 
 def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, FileStamps]:
-    """Run a session in a child process. Return its exit code, and the stamps that the files had before it began."""
+    """Run a session in a child process. Return its exit code, and the stamps of the files before the session."""
     stamps_before = file_stamps(state.files)
     reading, writing = os.pipe()
     sys.stdout.flush()
@@ -203,7 +202,7 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
 
 @contextmanager
 def _ignore_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C in this process, because the session receives it, too, and reports it by its exit code."""
+    """Ignore Ctrl-C in this process within the context. The child process handles Ctrl-C."""
     previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
@@ -219,7 +218,10 @@ def _print_status(state: WatchState) -> None:
 
 
 def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | None:
-    """Wait for a key or a change of a file, and return the scenarios to run next; None to quit."""
+    """Wait for a key or a change of a file, and return the scenarios to run; None to quit.
+
+    `seen` are the stamps of the files before the last session.
+    """
     with _keys() as keys:
         while True:
             key = keys()
@@ -248,7 +250,7 @@ def _stamps_after_pause(state: WatchState) -> FileStamps:
 
 @contextmanager
 def _keys() -> Iterator["_Keys"]:
-    """Provide a reader of single keys without echo, and restore the terminal at the end."""
+    """Provide a reader of single keys without echo within the context, and restore the terminal afterwards."""
     if not os.isatty(0):
         yield _Keys()
         return
@@ -261,7 +263,7 @@ def _keys() -> Iterator["_Keys"]:
 
 
 class _Keys:
-    """Reader of single keys: a call waits briefly and returns the key, or "" if there is none."""
+    """Reader of single keys. A call waits up to POLL_INTERVAL_S, and returns the key, or "" without a key."""
 
     _ended = False
 
