@@ -66,7 +66,7 @@ class FakeStage:
         return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the entry of an object in `motions`: its path, and the tick at which it started."""
+        """Return the entry of an object in `motions`: its path, and the time in s since its start."""
         return self.motions.get(name)
 
     def mass(self, name: str) -> float:

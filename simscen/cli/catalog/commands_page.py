@@ -48,7 +48,7 @@ class Parameter:
 
 
 def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield name and function of a command, or of each of its subcommands, such as "world export"."""
+    """Yield the name, such as "world export", and the function of a command and of each of its subcommands."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)
     if app is None:

@@ -27,7 +27,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "config": UserConfigSpec,
     "base": ScenarioSpec,
 }
-"""Pydantic model of each kind of file. A base file is a scenario file from which scenarios extend."""
+"""Pydantic model of each kind of file. A base file is an incomplete scenario that scenarios extend."""
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """Version of JSON Schema."""
 

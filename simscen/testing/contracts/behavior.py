@@ -61,7 +61,7 @@ class BehaviorContract(ComponentContract):
 
     @promise
     def it_ends(self) -> None:
-        """Given free space then it is done or fails within MAX_DURATION_S, also when it is started again."""
+        """Given free space then it is done or fails within two simulated minutes, also when it is started again."""
         behavior, view = self.build(), self.view()
         for _ in range(2):
             self.simulate(behavior, view)

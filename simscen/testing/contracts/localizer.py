@@ -101,7 +101,7 @@ class LocalizerContract(Contract):
 
     @promise
     def invalid_ranges_never_make_the_belief_invalid(self) -> None:
-        """Given ranges that are nan, infinite, negative, or huge then the belief stays valid (see valid_belief)."""
+        """Given ranges that are nan, infinite, negative, or huge then the belief stays finite and semidefinite."""
         for start in (start_estimate(), Estimate(None)):
             subject = self.build_at(start)
             for k in range(30):
@@ -111,7 +111,7 @@ class LocalizerContract(Contract):
 
     @promise
     def invalid_odometry_never_makes_the_belief_invalid(self) -> None:
-        """Given odometry and yaw rates that are nan, infinite, or huge then the belief stays valid."""
+        """Given odometry and yaw rates of nan, infinity, or huge values then the belief stays finite and semidefinite."""
         subject, rng = self.build_at(start_estimate()), np.random.default_rng(5)
         for k in range(40):
             x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
@@ -124,7 +124,7 @@ class LocalizerContract(Contract):
 
     @promise
     def scans_of_any_size_range_and_mount_are_accepted(self) -> None:
-        """Given a scan with 0 to 4096 beams, any maximum range, and any mount then the belief stays valid."""
+        """Given a scan with 0 to 4096 beams and any maximum range then the belief stays finite and semidefinite."""
         subject = self.build_at(start_estimate())
         for k, size in enumerate((0, 1, 2, 3, 59, 60, 61, 4096)):
             send_odometry(subject, k, Pose2(0.3 * k, 0, 0))

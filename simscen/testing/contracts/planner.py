@@ -103,7 +103,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def an_impossible_request_fails_with_its_error_code(self) -> None:
-        """Given one of IMPOSSIBLE_REQUESTS then it fails with the expected error code."""
+        """Given a start or goal outside the map or in an obstacle, or no path, then it fails with the error code."""
         for start, goal, code in IMPOSSIBLE_REQUESTS:
             try:
                 self.plan(self.build(), self.view(), 1, (start, goal))

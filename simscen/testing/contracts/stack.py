@@ -162,7 +162,7 @@ class StackContract(Contract):
 
     @promise
     def invalid_scans_never_make_a_decision_invalid(self) -> None:
-        """Given scans without any return, and then with ranges of nan, then all decisions are valid."""
+        """Given scans without any return, and then with ranges of nan, then all decisions are finite."""
         d = self.new_drive(FAR)
         d.run(1, until="")
         d.range_max = -1.0  # no beam has a return
