@@ -39,7 +39,7 @@ def check_python() -> str:
 
 
 def check_packages() -> str:
-    """Check that all required packages have supported versions, and return the versions that affect logs."""
+    """Check that all required packages have supported versions, and return the versions of PACKAGES."""
     if problems := unmet_requirements():
         raise CheckFailed("; ".join(problems))
     return ", ".join(f"{name} {_version(name)}" for name in PACKAGES)

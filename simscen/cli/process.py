@@ -92,7 +92,7 @@ def engine_output_on_stderr() -> Iterator[None]:
 
 
 def caller_environment() -> dict[str, str]:
-    """Return the environment variables that the process had at its start, for programs that simscen starts."""
+    """Return the environment variables of this process at its start, for programs that simscen starts."""
     changed = {PYDANTIC_PLUGINS_VARIABLE, *pinned_variables()}
     variables = {name: value for name, value in os.environ.items() if name not in changed}
     if _PYDANTIC_PLUGINS_AT_START is not None:

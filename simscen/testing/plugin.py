@@ -96,7 +96,7 @@ class PromiseItem(pytest.Item):
         self._promise.check(self._limit)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return what was observed, what is promised, and the traceback if the component raised an exception."""
+        """Return the observation, the promise, and the traceback if the component raised an exception."""
         from simscen.testing.contracts.base import PromiseBroken
 
         if not isinstance(excinfo.value, PromiseBroken):

@@ -1,4 +1,4 @@
-"""Traces (recorded states of a run) and cases (what the scenario tells criteria), built from short descriptions."""
+"""Traces (recorded states of a run) and cases (goals, robot, and world of a run), built from short descriptions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

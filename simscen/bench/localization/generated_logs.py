@@ -100,7 +100,7 @@ UNCHANGED_WORLD = ("clean", "slipping")
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Generated log of a drive, and what a localizer gets before the drive.
+    """Generated log of a drive, with the map and the initial pose estimate for a localizer.
 
     building:     number of the building
     number:       number of the drive in the building

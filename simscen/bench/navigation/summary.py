@@ -1,4 +1,4 @@
-"""Summary of the runs of `simscen bench nav` with the scores of published benchmarks, and comparison of two stacks.
+"""Summary of runs of `simscen bench nav` with the scores of published benchmarks, and comparison of two stacks.
 
 An experiment has several drives (scenarios). Each drive is run with several seeds. A trial is one of these runs.
 """

@@ -64,12 +64,12 @@ def command(
 ) -> None:
     """Measure the navigation of the reference stack, and print one line per experiment.
 
-    The experiments are BARN and similar fields, narrow fields, fields of moving cylinders, random goals in shipped
-    worlds and generated buildings, degraded sensing, ramps, two robots in a corridor, Nav2's system test, corner cases,
+    The experiments are: BARN and similar fields; narrow fields; fields of moving cylinders; random goals in shipped
+    worlds and generated buildings; degraded sensing; ramps; two robots in a corridor; Nav2's system test; corner cases;
     and localization. Intervals are by bootstrap over worlds. The worlds of BARN and Nav2 are not included; pass their
-    folders as options. Experiments without data are skipped with a message. Each run that does not pass is printed on
-    standard error with the command that repeats it. An interrupted session prints the results that it has; use --resume
-    with the same options to continue it.
+    folders as options. Experiments without data are skipped with a message. Failed runs are printed on standard error,
+    each with a command to repeat the run. An interrupted session prints its results so far; use --resume with the same
+    options to continue.
 
     Exit code 0: all runs were completed; 3: a run could not be completed.
     """

@@ -141,7 +141,7 @@ def repeat_command(job: Job) -> str:
 
 
 class _Progress:
-    """Listener that prints the number of finished runs and each run that did not pass to stderr."""
+    """Listener that prints the number of finished runs and all failed runs to stderr."""
 
     def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
         self._total, self._jobs, self._done = total, jobs, done

@@ -61,10 +61,9 @@ def worlds_command(
 ) -> None:
     """Measure the cost of a simulated second in large worlds.
 
-    Runs the patrol of a house, a run in a generated hall with 40 movable meshes, a run in a generated warehouse with
-    5000 objects, and a run on a generated ROS map of 100 x 100 m with 400 blocks and noise. Each takes at most 60
-    simulated seconds with all features enabled. Prints the CPU time of one core, also as a multiple of the time for the
-    house.
+    The worlds are a house, a generated hall with 40 movable meshes, a generated warehouse with 5000 objects, and a
+    generated ROS map of 100 x 100 m with 400 blocks and noise. Each run takes at most 60 simulated seconds with all
+    features enabled. Prints the CPU time of one core, also as a multiple of the time for the house.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -104,8 +103,8 @@ def suite_command(
     """Measure the speed of a suite of scenarios on all cores.
 
     Runs each scenario once with all steps of `simscen run` except reports. Prints the runs per minute, the wall time of
-    the session, and the memory of the workers. The wall time is also a multiple of the time that PyBullet alone needs
-    on one core for the same steps and scans, measured before and after the session.
+    the session, and the memory of the workers. The wall time is also printed as a multiple of a baseline: the time of
+    PyBullet alone on one core for the same steps and scans, measured before and after the session.
 
     Exit code 0: all runs were completed; 3: a run was aborted.
     """
@@ -167,10 +166,10 @@ def command(
 
     - the overhead of a run: set-up and verdicts, its process, the start of a session, and the memory of a worker
 
-    - the time of a scan of 720 beams and of a physics step in two fields of obstacles, compared to PyBullet with one
-      body for each obstacle
+    - the time of a scan of 720 beams and of a physics step among obstacles, compared to PyBullet with one body for each
+      obstacle
 
-    - the wall time per cycle for which the engine waits for the stack, if the stack is an external process
+    - the wall time per cycle for which a run waits for an external stack
 
     All other times are CPU times. Takes less than a minute on an idle machine; the subcommands take longer. --compare
     compares the result with an earlier result of --format json, and the subcommand `compare` compares two such results.

@@ -81,9 +81,9 @@ def command(
     Existing files are never overwritten.
 
     With --from-log, the scenario is reconstructed from a recorded drive of simscen or of a real robot (MCAP, or a
-    rosbag2 folder). It contains the goals, objects that are not on the map, faults of sensors, and criteria that the
-    drive met or violated. A comment gives the evidence for each part, and the first lines list what the log does not
-    show. --verify runs the scenario, compares the run with the log, and writes a page that shows both.
+    rosbag2 folder). It contains the goals, unmapped objects, faults of sensors, and criteria that the drive met or
+    violated. A comment gives the evidence for each part, and the first lines list facts that the log does not show.
+    --verify runs the scenario, compares the run with the log, and writes a page that shows both.
 
     Exit code 0: written; 1: with --verify, an incident of the log does not happen again; 2: an input is unusable, or a
     file cannot be written; 3: with --verify, the run could not be completed.

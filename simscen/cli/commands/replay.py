@@ -53,9 +53,10 @@ def command(
 ) -> None:
     """Write a page that plays a recorded run, or two runs side by side.
 
-    The page shows what the robot saw, believed, and did at any time, the events, the signals, the verdicts, and the
-    text of the scenario. It starts at the time of the failure, or at 0 s without one. It is a single file that needs no
-    network. The page of a real robot's log lacks what was not recorded, such as the true pose.
+    The page shows the sensor readings, pose estimates, and motions of the robot over time, the events, the signals, the
+    verdicts, and the text of the scenario. It starts at the time of the failure, or at 0 s without a failure. The page
+    is a single file that needs no network. For the log of a real robot, the page lacks data that were not recorded,
+    such as the true pose.
 
     Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """

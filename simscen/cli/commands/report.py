@@ -30,9 +30,9 @@ def command(
 ) -> None:
     """Write the reports of an output folder again from its journal.
 
-    The reports contain every planned run, even if simscen was killed. A run that was not finished is then an error of
-    type `interrupted`, and a run that was not started is an error of type `not-run`. Nothing is simulated or judged
-    again. With --junit, the folder is not changed.
+    The reports contain every planned run, even if simscen was killed. An unfinished run is then an error of type
+    `interrupted`, and a run without a start is an error of type `not-run`. Nothing is simulated or judged again. With
+    --junit, the folder is not changed.
 
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
     run was not completed.

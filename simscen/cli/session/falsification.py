@@ -39,7 +39,7 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 
 BATCH_SIZE = 8
-"""Number of runs between two updates of the search, independent of the number of workers."""
+"""Number of runs between two updates of the search."""
 MAX_EMPTY_BATCHES = 50
 """Maximum number of consecutive batches without valid values."""
 SQUARE_SIZE_M = 1.0

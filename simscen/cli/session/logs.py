@@ -16,7 +16,7 @@ from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
-"""Names of the log of a completed run, and of the log of an aborted run, in the folder of the run."""
+"""Names of the log in the folder of a run: of a completed run, and of an aborted run."""
 BAG_METADATA = "metadata.yaml"
 """Name of a file in every rosbag2 folder."""
 LOG_SUFFIXES = (".mcap", ".db3", ".bag")

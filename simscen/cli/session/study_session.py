@@ -40,7 +40,7 @@ from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 SEQUENTIAL_BATCH_SIZE = 32
-"""Number of runs between two evaluations of a sequential claim, independent of the number of workers."""
+"""Number of runs between two evaluations of a sequential claim."""
 BATCH_SIZE = 256
 """Number of runs of a batch without a sequential claim. It limits the number of scenarios in memory."""
 

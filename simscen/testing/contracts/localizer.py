@@ -111,7 +111,7 @@ class LocalizerContract(Contract):
 
     @promise
     def invalid_odometry_never_makes_the_belief_invalid(self) -> None:
-        """Given odometry and yaw rates of nan, infinity, or huge values then the belief stays finite and semidefinite."""
+        """Given odometry and yaw rates of nan, infinity, or 1e300 then the belief stays finite and semidefinite."""
         subject, rng = self.build_at(start_estimate()), np.random.default_rng(5)
         for k in range(40):
             x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
