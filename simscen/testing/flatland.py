@@ -62,7 +62,7 @@ def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: Occup
 
 @dataclass
 class Flatland:
-    """World of boxes (min x, min y, max x, max y) and discs (x, y, radius) in m. A drive can change both."""
+    """World of boxes (min x, min y, max x, max y) and discs (x, y, radius) in m."""
 
     boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
     discs: list[tuple[float, float, float]] = field(default_factory=list)

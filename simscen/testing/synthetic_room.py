@@ -112,11 +112,13 @@ class Noise:
     """Standard deviations of sensor errors.
 
     lidar:                 ranges in m
-    translation:           odometry distance in m per root meter driven
-    rotation:              odometry yaw in rad per root radian turned
-    drift:                 odometry yaw in rad per root meter driven
+    translation:           odometry distance in m, after 1 m
+    rotation:              odometry yaw in rad, after a turn by 1 rad
+    drift:                 odometry yaw in rad, after 1 m
     gyro:                  yaw rate in rad/s
     gyro_bias:             constant error of the yaw rate in rad/s
+
+    Odometry errors grow with the square root of the distance or turn.
     """
 
     lidar: float = 0.01

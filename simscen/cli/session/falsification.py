@@ -50,7 +50,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class FalsifyRequest:
-    """Options of `simscen falsify`. Each field is the value of the option with its name."""
+    """Arguments of `simscen falsify`. Each field has the name of an option; `options` are options for the runs."""
 
     file: Path
     method: SearchMethod = SearchMethod.AUTO

@@ -29,7 +29,7 @@ SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_
 class PendingRuns:
     """Runs of a session before their execution.
 
-    journal:  journal of the session
+    journal:  journal of the session, a file that lists planned and finished runs
     jobs:     runs to execute
     reused:   results of other runs, from an earlier session in the same folder
     workers:  number of parallel runs

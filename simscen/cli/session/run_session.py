@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Options of `simscen run`. Each field is the value of the option with its name."""
+    """Arguments of `simscen run`. Each field has the name of an option; `options` are options for the runs."""
 
     paths: Sequence[Path]
     selection: Selection = field(default_factory=Selection)

@@ -95,7 +95,7 @@ class CandidateRuns:
     _results: dict[str, RunResult | None] = field(default_factory=dict)
 
     def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
-        """Return the index of the first candidate for whose result `accepts` is true; None if there is no such one.
+        """Return the index of the first candidate with a result that `accepts` accepts; None without any.
 
         Invalid candidates are not accepted. Raises BudgetSpent and Stopped.
         """

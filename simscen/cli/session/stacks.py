@@ -1,4 +1,4 @@
-"""Stacks that are chosen with `--stack NAME=VALUE`, and the commands that start external stacks."""
+"""Stacks chosen with `--stack NAME=VALUE`, and the commands of external stacks (programs outside of simscen)."""
 
 from __future__ import annotations
 

@@ -40,14 +40,14 @@ from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 SEQUENTIAL_BATCH_SIZE = 32
-"""Number of runs between two evaluations of a sequential claim."""
+"""Number of runs between two evaluations of a sequential claim, which ends the study as soon as it is decided."""
 BATCH_SIZE = 256
 """Number of runs of a batch without a sequential claim. It limits the number of scenarios in memory."""
 
 
 @dataclass(frozen=True)
 class StudyRequest:
-    """Options of `simscen study`. Each field is the value of the option with its name."""
+    """Arguments of `simscen study`. Each field has the name of an option; `options` are options for the runs."""
 
     file: Path
     runs: int | None = None
