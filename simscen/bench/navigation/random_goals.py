@@ -61,7 +61,7 @@ def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
 ROBOT_RADIUS_M = 0.22
 """Radius of the default robot, a TurtleBot."""
 MIN_AVERAGE_SPEED_M_S = 0.2
-"""Average speed with which the robot reaches the goal before the time limit."""
+"""Average speed on the shortest path from which the time limit is computed."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
     "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),

@@ -29,7 +29,7 @@ class Sizes:
 
     first:    number of the first field, building, drive, and seed
     seeds:    number of seeds of each scenario; None for the default of each experiment
-    fields:   number of generated obstacle fields, and twice the number of narrow fields
+    fields:   number of generated obstacle fields; there are half as many narrow fields
     dynamic:  number of fields of moving cylinders at each speed
     goals:    number of random goals in each world, of ramps, and of corridors
     lost:     number of drives with an unknown start
@@ -185,7 +185,7 @@ def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Exper
 
 
 def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    """Write the experiments with sensor faults, in a quarter of `sizes.goals` worlds."""
+    """Write the experiments with sensor faults. The number of worlds is a quarter of `sizes.goals`."""
     folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)
     buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))

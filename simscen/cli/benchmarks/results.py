@@ -1,4 +1,4 @@
-"""Results of `simscen bench speed` and similar commands: JSON files, printed output, and comparison of two results."""
+"""Results of the speed benchmarks of `simscen bench`: JSON files, printed output, and comparison of two results."""
 
 import json
 import sys
