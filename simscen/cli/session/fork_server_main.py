@@ -41,13 +41,8 @@ from simscen.worlds.raycasting import ray_scene
 
 
 def import_components(prepared: PreparedScenario) -> None:
-<<<<<<< HEAD
-    """Import the shipped components of the scenario's stacks and sensors, so that the workers need not."""
-    for part in prepared.by_robot.values():
-=======
     """Import the shipped components of the scenario's stacks and sensors, so that all workers share them."""
-    for part in prepared.each.values():
->>>>>>> d4fc2c7a (Say what each command and session function does in one plain sentence)
+    for part in prepared.by_robot.values():
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
         if isinstance(part.stack, StackSpec):
