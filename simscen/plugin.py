@@ -4,7 +4,7 @@ All quantities have SI units: meters, seconds, radians, m/s, rad/s. Frames follo
 and `base_link` with x forward and y to the left. Arrays are numpy arrays of float64 unless stated otherwise.
 
 Each name is imported on first use, so that a specification does not import the physics engine. Names that are not
-listed in `__all__` can change without notice.
+listed here can change without notice.
 """
 
 from __future__ import annotations
