@@ -96,7 +96,7 @@ class SlipEkfLocalizer:
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate, with unknown bias of the gyroscope."""
-        from filterpy.kalman import ExtendedKalmanFilter
+        from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
 
         pose, covariance = initial_pose(estimate)
         bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias

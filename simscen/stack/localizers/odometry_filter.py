@@ -3,14 +3,11 @@
 Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014), in its
 planar mode (`two_d_mode`). filterpy's KalmanFilter (Labbe) predicts and updates the velocity. The pose is predicted
 from the velocity as in an extended Kalman filter.
-
-Import this module only if a filter is used: filterpy imports scipy.stats, which takes half a second.
 """
 
 import math
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from scipy.linalg import lapack
 
 from simscen.core.geometry import Array, Pose2, wrap
@@ -20,6 +17,7 @@ from simscen.model import localizers as model
 from simscen.stack.frames import is_plausible
 from simscen.stack.kinematics import mean_velocity
 from simscen.stack.localizers.ekf import MAX_YAW_RATE_RADPS
+from simscen.stack.localizers.kalman_filters import KalmanFilter
 
 VX, VY, VYAW, BIAS = range(4)
 """Indices of the state: velocity in the base frame (m/s, m/s, rad/s), and bias of the gyroscope (rad/s)."""
