@@ -21,19 +21,19 @@ SpeedLimit = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
 TurnRateLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
 
 
-def side_speeds(motion: Twist, separation: float) -> tuple[float, float]:
-    """Return the speeds (left, right) in m/s at which the wheels of each side roll over the ground."""
-    half = separation / 2
+def side_speeds(motion: Twist, wheel_separation: float) -> tuple[float, float]:
+    """Return the rolling speeds (left, right) in m/s of the wheels of a differential drive."""
+    half = wheel_separation / 2
     return motion.vx - half * motion.wz, motion.vx + half * motion.wz
 
 
-def twist_from_sides(left: float, right: float, lateral: float, separation: float) -> Twist:
-    """Return the velocity of a base from wheel speeds in m/s and the distance between left and right wheels in m."""
-    return Twist((left + right) / 2, lateral, (right - left) / separation)
+def twist_from_sides(left: float, right: float, lateral: float, wheel_separation: float) -> Twist:
+    """Return the velocity of the base from the rolling speeds `left` and `right` and the `lateral` speed in m/s."""
+    return Twist((left + right) / 2, lateral, (right - left) / wheel_separation)
 
 
 def inapplicable_side(target: FaultTarget, key: str) -> tuple[str, str] | None:
-    """Return `key`, which belongs to one side, and the reason if the target has no left and right wheels, or None."""
+    """Return (`key`, reason) if the target has no left and right wheels, otherwise None."""
     if target.kind != "Wheels":
         return key, f"`{key}` does not apply there: a command has no sides; set it on `wheels`"
     if target.spec is not None and not getattr(target.spec, "wheel_separation", 0.0):
@@ -44,9 +44,9 @@ def inapplicable_side(target: FaultTarget, key: str) -> tuple[str, str] | None:
 class Slip(Spec, Fault):
     """Wheels slip: the robot moves less than its wheels roll, but the odometry counts the full roll of the wheels.
 
-    The slip ratio is that of vehicle dynamics for driving wheels, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
-    ch. 2). With different values for left and right, the robot also turns without measuring it. On `wheels`, all wheel
-    odometry is affected; on an odometry sensor, only that sensor.
+    The slip ratio is s = 1 - v / (ω r), as in vehicle dynamics (Wong, Theory of Ground Vehicles, ch. 2). With different
+    ratios for left and right, the robot also turns, and the odometry does not measure this turn. On `wheels`, the fault
+    affects all wheel odometry. On an odometry sensor, it affects only that sensor.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """
@@ -59,7 +59,7 @@ class Slip(Spec, Fault):
     """Slip ratio of the right wheels."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to reduce the motion of the robot and to increase the reported increments."""
+        """Start to reduce the motion of the robot and to enlarge the increments of the odometry."""
         return _SlippingWheels(self, setting.separation)
 
 
@@ -77,7 +77,7 @@ class _SlippingWheels(OdometryDistortion):
         return command if self._ended else self._scaled(command, self._left, self._right)
 
     def _scaled(self, motion: Twist, left: float, right: float) -> Twist:
-        """Return the motion with each side scaled by its factor."""
+        """Return the motion with the speeds of the left and right wheels multiplied by `left` and `right`."""
         left_speed, right_speed = side_speeds(motion, self._separation)
         left_speed, right_speed = left_speed * left, right_speed * right
         lateral = motion.vy * (left + right) / 2
@@ -89,8 +89,8 @@ class _SlippingWheels(OdometryDistortion):
 class Gain(Spec, Fault):
     """The base drives a multiple of the commanded velocity: wrong scaling in the driver, worn motor brushes.
 
-    On `cmd_vel` the command is scaled; on `wheels` each side can be scaled separately, so that the robot pulls to the
-    weaker side. Odometry measures the actual motion. A negative gain is a motor with reversed polarity.
+    On `wheels`, each side can be scaled separately, so that the robot pulls to the weaker side. Odometry measures the
+    actual motion. A negative gain is a motor with reversed polarity.
 
     Example: `{sensor: wheels, gain: {left: 80 %}}`
     """
@@ -98,23 +98,23 @@ class Gain(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Command", "Wheels"})
     neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("linear", "angular", "left", "right"), 1.0)
     linear: GainFactor = 1.0
-    """Driven over commanded linear velocity, forward and lateral."""
+    """Ratio of driven to commanded linear velocity, forward and lateral."""
     angular: GainFactor = 1.0
-    """Driven over commanded angular velocity."""
+    """Ratio of driven to commanded angular velocity."""
     left: GainFactor = 1.0
-    """Driven over commanded speed of the left wheels; only on `wheels`."""
+    """Ratio of driven to commanded speed of the left wheels; only on `wheels`."""
     right: GainFactor = 1.0
-    """Driven over commanded speed of the right wheels; only on `wheels`."""
+    """Ratio of driven to commanded speed of the right wheels; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `left` or `right` and the reason if it is given but the target has no sides, or None."""
+        """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
         for key in ("left", "right"):
             if key in self.model_fields_set and (finding := inapplicable_side(target, key)):
                 return finding
         return None
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to scale commands."""
+        """Start to scale velocity commands."""
         return _ScaledCommands(self, setting.separation)
 
 
@@ -134,8 +134,8 @@ class _ScaledCommands(FaultEffect):
 class Saturation(Spec, Fault):
     """Speeds and accelerations have lower limits than normal: a motor that is too weak or too hot.
 
-    On `cmd_vel` the commands are limited; on `wheels` each side can be limited separately, so that the robot turns
-    towards the weaker side at high speed. Odometry measures the actual motion.
+    On `wheels`, each side can be limited separately, so that the robot turns towards the weaker side at high speed.
+    Odometry measures the actual motion.
 
     Example: `{sensor: wheels, saturation: {left: 0.2 m/s}}`
     """
@@ -158,14 +158,14 @@ class Saturation(Spec, Fault):
     """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `left` or `right` and the reason if it is given but the target has no sides, or None."""
+        """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
         for key in ("left", "right"):
             if getattr(self, key) is not None and (finding := inapplicable_side(target, key)):
                 return finding
         return None
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to limit commands."""
+        """Start to limit velocity commands."""
         return _LimitedCommands(self, setting)
 
 
@@ -201,7 +201,7 @@ class _LimitedCommands(FaultEffect):
 
 
 def _limit_length(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:
-    """Return the vector with its length limited to `limit * seconds`."""
+    """Return the vector, shortened to at most `limit * seconds`. A limit of None is no limit."""
     length = math.hypot(*vector)
     if limit is None or length <= limit * seconds:
         return vector
@@ -211,9 +211,9 @@ def _limit_length(vector: tuple[float, ...], limit: float | None, seconds: float
 class LowBattery(Spec, Fault):
     """The maximum speed falls as the battery drains and the motor voltage drops; the stack is not informed.
 
-    The limit falls linearly from `start` to `end` within `drain` and then stays there. Faster commands are scaled down
-    including the angular velocity, so that the robot drives the same curves more slowly. Odometry measures the actual
-    motion.
+    The maximum speed falls linearly from `start` to `end` during `drain` and then stays constant. Linear and angular
+    velocity of faster commands are reduced by the same factor, so that the robot drives the same curves more slowly.
+    Odometry measures the actual motion.
 
     Example: `{sensor: cmd_vel, low_battery: {start: 0.4 m/s, end: 0.15 m/s, drain: 20 s}}`
     """
@@ -222,18 +222,18 @@ class LowBattery(Spec, Fault):
     start: PositiveSpeed
     """Maximum speed when the fault begins."""
     end: PositiveSpeed
-    """Maximum speed when the battery is nearly empty."""
+    """Maximum speed after the time `drain`."""
     drain: Duration = Field(default=0.0)
     """Time until the maximum speed has fallen to `end`; 0 = at once."""
 
     @model_validator(mode="after")
-    def _check_order(self) -> LowBattery:
+    def _require_end_at_most_start(self) -> LowBattery:
         if self.end > self.start:
             raise ValueError("`end` is above `start`: a battery does not charge itself")
         return self
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to drain the battery."""
+        """Start to reduce the maximum speed."""
         return _DrainingBattery(self, setting)
 
 

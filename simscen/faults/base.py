@@ -1,4 +1,4 @@
-"""Base classes of faults: the specification in YAML (`Fault`), and what it does while it is active (`FaultEffect`)."""
+"""Base classes of faults: the specification in YAML (`Fault`), and the effect of an active fault (`FaultEffect`)."""
 
 from __future__ import annotations
 
@@ -26,39 +26,37 @@ if TYPE_CHECKING:
 
 
 class SensorSimulator(Protocol):
-    """Simulates what the lidar or camera of a fault would measure from another pose or without some objects."""
+    """Simulator of the faulty lidar or camera, with another sensor pose or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the true distances (n,) in meters along the beams of the current scan; inf beyond twice its range.
+        """Return the true distances (n,) in meters along the beams of a scan of the current tick.
 
-        `error` is the true pose of the lidar in the frame of its nominal pose; beams that point down end at the floor.
-        Beams pass through the objects named in `without`.
+        Distances above twice the maximum range of the scan are inf. Beams that point down end at the floor.
+
+        error:    true pose of the lidar in the frame of its nominal pose; None if both are equal
+        without:  names of objects that the beams pass through
         """
         ...
 
     def image(self, error: Pose3) -> Image:
-        """Return the current image if the true pose of the camera, in the frame of its nominal pose, is `error`."""
+        """Return the current image of a camera with the true pose `error` in the frame of its nominal pose."""
         ...
-
-
-def _tick_zero() -> int:
-    return 0
 
 
 @dataclass(frozen=True, eq=False)
 class FaultSetting:
-    """Everything that a running fault may know besides its specification.
+    """Information for an active fault.
 
-    separation:  distance between left and right wheels in meters (0 for a drive without sides)
-    clock:       conversion between ticks and seconds
+    separation:  distance between left and right wheels in meters; 0 for a drive without left and right wheels
+    clock:       conversion between ticks (physics steps) and seconds
     now:         returns the current tick
     kind:        kind of the target, one of the fault's `affects`
-    simulator:   simulates readings of the sensor under other conditions; None if the target is no sensor
+    simulator:   simulator of the target; None if the target is not a lidar or camera
     """
 
     separation: float = 0.0
     clock: Clock = field(default_factory=Clock)
-    now: Callable[[], int] = _tick_zero
+    now: Callable[[], int] = lambda: 0
     kind: str = ""
     simulator: SensorSimulator | None = None
 
@@ -69,9 +67,9 @@ class FaultSetting:
 
 @dataclass(frozen=True)
 class FaultTarget:
-    """Target of a fault (a sensor, cmd_vel, the wheels, the localizer, or the map), as it is known before the run.
+    """Target of a fault: a sensor, cmd_vel, the wheels, the localizer, or the map.
 
-    kind:  one of the fault's `affects`
+    kind:  kind of the target, one of the fault's `affects`
     rate:  messages per second; 0 if unknown
     spec:  specification of the sensor, or of the drive for `wheels`; None for other targets
     """
@@ -82,68 +80,65 @@ class FaultTarget:
 
 
 class FaultEffect:
-    """What a fault changes from its start to its end. The default implementation changes nothing.
+    """Effect of an active fault on readings, commands, beliefs, and the map. The default changes nothing.
 
-    *Given* the same readings and generator *then* the results are the same. An effect never modifies a reading; it
-    returns another one.
+    The effect must be deterministic for a given random generator, and it must not modify its arguments.
     """
 
     changes_motion: ClassVar[bool] = False
-    """Whether a fault on a sensor also changes the motion of the robot; then `command` is called at each beat."""
+    """Whether a fault on a sensor also changes the motion of the robot. If so, `command` is called as well."""
 
     def reading(self, reading: Reading) -> Reading | None:
-        """Return the reading that the stack receives instead; None to drop or hold it back."""
+        """Return the reading that the stack receives instead; None to drop or delay the reading."""
         return reading
 
     def arriving_readings(self) -> Sequence[Reading]:
-        """Remove and return the held readings that arrive at this beat, oldest first; called before `reading`."""
+        """Remove and return the delayed readings that arrive now, oldest first. Called before `reading`."""
         return ()
 
     def command(self, command: Twist) -> Twist | None:
-        """Return the command that the wheels follow instead; None to drop or hold it back (cmd_vel only)."""
+        """Return the command that the wheels follow instead; None (only on cmd_vel) to drop or delay the command."""
         return command
 
     def arriving_command(self) -> Twist | None:
-        """Remove the held commands that arrive at this beat. Return the newest, or None; called before `command`."""
+        """Remove the delayed commands that arrive now, and return the newest or None. Called before `command`."""
         return None
 
     def belief(self, belief: Belief) -> Belief:
-        """Return the belief that the navigator receives; called for each new belief and at each beat."""
+        """Return the belief (estimated pose) that the navigator receives instead."""
         return belief
 
     def map(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """Return the map that the stack receives; called before the stack starts."""
+        """Return the map that the stack receives instead. Called once, before the stack starts."""
         return grid
 
     def end(self) -> FaultEffect | None:
-        """Return what remains in effect after the fault has ended, or None."""
+        """End the fault. Return the effect that remains active afterwards, or None."""
         return None
 
 
 class Fault(ABC):
-    """Specification of a fault in a scenario; `affects` are the kinds of target that it can be applied to.
-
-    Kinds are the class names of readings ("Scan", "Odometry", …), "Command" for cmd_vel, "Wheels" for wheels, "Belief"
-    for the localizer, and "Map" for the map. If some keys only apply to some kinds, `keys_by_kind` maps each kind to
-    its keys.
-    """
+    """Specification of a fault in a scenario."""
 
     affects: ClassVar[frozenset[str]]
+    """Kinds of targets that the fault can be applied to: class names of readings ("Scan", "Odometry", …), "Command" for
+    cmd_vel, "Wheels" for the wheels, "Belief" for the localizer, and "Map" for the map."""
     keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Keys that apply to each kind of target; all keys for kinds that are not listed."""
     neutral_values: ClassVar[Mapping[str, object]] = {}
-    """Values of the keys with which the fault has no effect; {} if it always has one."""
+    """Values of the keys with which the fault has no effect; {} if the fault always has an effect."""
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Return why the class is not a valid fault specification, or ""."""
+        """Return the reason why `affects` of this class is invalid, or ""."""
         affects: object = getattr(cls, "affects", None)
         is_valid = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)
         return "" if is_valid else f"its `affects` is not a set of {', '.join(FAULT_TARGET_KINDS)}"
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return a key that does not apply to the target ("" for the whole fault) and the reason, or None.
+        """Return (key, reason) for a key that does not apply to the target; None if all keys apply.
 
-        The default finds keys that were set but are not among the `keys_by_kind` of the target.
+        The key "" stands for the whole fault. The default checks the keys that are set against `keys_by_kind`.
         """
         applicable = self.keys_by_kind.get(target.kind)
         if applicable is None:
@@ -156,11 +151,11 @@ class Fault(ABC):
 
     @abstractmethod
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start the fault and return its effect. No other fault uses the generator `rng`."""
+        """Start the fault and return its effect. `rng` is reserved for this fault."""
 
 
 class AnyFault(Choice):
-    """One fault, selected by its key."""
+    """YAML entry of one fault: its name as the only key, with its specification as the value."""
 
     group: ClassVar[str] = "fault"
 

@@ -1,4 +1,4 @@
-"""Parts that several faults share: changed lidar and camera distances, late localizer corrections, odometry errors."""
+"""Helpers of several faults: change lidar and camera distances, localizer corrections, and odometry."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -14,18 +14,19 @@ from simscen.faults.base import FaultEffect
 
 
 def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
-    """Return the belief with an older correction of the localizer, `map_from_odom`, instead of its own.
+    """Return the belief with the transform `map_from_odom` instead of its own.
 
-    The new pose is this correction applied to the odometry pose of the belief (the base in the odom frame).
+    The pose in the map frame changes accordingly; the pose in the odom frame stays the same.
     """
     odometry = belief.map_from_odom.between(belief.pose)
     return replace(belief, pose=map_from_odom.compose(odometry), map_from_odom=map_from_odom)
 
 
 def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:
-    """Return the reading with changed ranges or depths; beams and pixels without a hit keep their value.
+    """Return a scan or image with its finite ranges or depths changed. Other readings are returned unchanged.
 
-    A lidar reports inf for ranges beyond its maximum and -inf for ranges below its minimum (REP 117).
+    `change` maps an array of distances in m to the changed distances. Ranges outside the limits of the lidar become inf
+    or -inf (REP 117).
     """
     match reading:
         case Scan(ranges=ranges):
@@ -42,7 +43,7 @@ def _change_finite(distances: Array, change: Callable[[Array], Array]) -> Array:
 
 
 def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
-    """Return the ranges as the lidar reports them: inf beyond its maximum, -inf below its minimum (REP 117)."""
+    """Return the ranges with inf above the maximum range of the scan and -inf below its minimum range (REP 117)."""
     with np.errstate(invalid="ignore"):
         ranges = np.where(ranges > scan.range_max, np.inf, ranges)
         return np.where(ranges < scan.range_min, -np.inf, ranges)
@@ -51,20 +52,20 @@ def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
 def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Array) -> Array:
     """Return the ranges (n,) that the lidar would report if the true distances were `new_distances` (n,).
 
-    The ranges have the noise of this scan, whose true distances were `scan_distances` (n,). They are rounded to whole
-    millimeters, so that rounding errors in the last bits have no effect on the run.
+    Each beam keeps the measurement error of the scan, relative to the scan's true distances `scan_distances` (n,). The
+    ranges are rounded to whole millimeters.
     """
     with np.errstate(invalid="ignore"):
         errors = scan.ranges - scan_distances
+    # Rounded, so that rounding errors in the last bits have no effect on the run.
     ranges = np.round(new_distances + np.where(np.isfinite(errors), errors, 0.0), 3)
     return clip_to_sensor_range(scan, ranges)
 
 
 class OdometryDistortion(FaultEffect):
-    """Base class of odometry errors: distorts each increment and integrates the increments again, for each sensor.
+    """Base class of odometry faults. Distorts each increment and integrates the distorted increments to a pose.
 
-    The reported pose starts at the sensor's own pose, so that it does not jump when the fault begins. When the fault
-    ends, the accumulated error remains, as on a real robot; only new increments are correct again.
+    The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends.
     """
 
     def __init__(self) -> None:
@@ -77,14 +78,11 @@ class OdometryDistortion(FaultEffect):
         """Return the distorted value of a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
 
     def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        """Return the distorted increment over `ticks`, and the distorted velocity at its end.
-
-        The default distorts both with `distort_twist`.
-        """
+        """Return the distorted increment `step` over `ticks`, and the distorted `velocity` at its end."""
         return self.distort_twist(step), self.distort_twist(velocity)
 
     def reading(self, reading: Reading) -> Reading:
-        """Return the odometry with distorted increments. Other readings are returned unchanged."""
+        """Return the distorted odometry. Other readings are returned unchanged."""
         if not isinstance(reading, Odometry):
             return reading
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
@@ -96,6 +94,6 @@ class OdometryDistortion(FaultEffect):
         return replace(reading, pose=pose, twist=velocity)
 
     def end(self) -> FaultEffect:
-        """Return this effect, which remains active to keep the accumulated error in all later readings."""
+        """Return this effect, which keeps the accumulated error in all later readings."""
         self._ended = True
         return self

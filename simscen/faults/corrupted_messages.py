@@ -20,9 +20,10 @@ from simscen.spec.quantities import Probability
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-VALUES = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
-"""Number that fills a garbage message, by the keyword in `value`."""
+GARBAGE_NUMBERS = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+"""Number that replaces all values of a message, by the keyword of `Garbage.value`."""
 WRONG_SIZES = ("empty", "short")
+"""Keywords of `Garbage.value` that change the number of values of a message."""
 T = TypeVar("T", bound="np.generic")
 
 
@@ -38,19 +39,19 @@ class Garbage(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     value: Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"] = "anything"
-    """Content of all values of such a message: nan, inf, zero, negative (-1), or huge (1e30). A scan or image can also
-    be empty (no values) or short (half of the values). `anything` draws one of these for each message."""
+    """Value of all numbers of the message: nan, inf, zero, negative (-1), or huge (1e30). A scan or image can also be
+    empty (no numbers) or short (half of the numbers). `anything` draws one of these for each message."""
     probability: Probability = 1.0
     """Probability that a message is garbage."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `value` and the reason if messages of the target have a fixed size and cannot be empty or short."""
+        """Return (`value`, reason) if it is empty or short, but messages of the target have a fixed size."""
         if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw for each message whether it is garbage, and its content."""
+        """Start to replace messages at random."""
         return _RandomGarbage(rng, self)
 
 
@@ -60,7 +61,7 @@ class _RandomGarbage(FaultEffect):
 
     def reading(self, reading: Reading) -> Reading | None:
         has_size = isinstance(reading, Scan | Image)
-        contents = (*VALUES, *(WRONG_SIZES if has_size else ()))
+        contents = (*GARBAGE_NUMBERS, *(WRONG_SIZES if has_size else ()))
         draw, random_content = self._rng.random(), contents[int(self._rng.integers(len(contents)))]
         if draw >= self._garbage.probability:
             return reading
@@ -69,32 +70,35 @@ class _RandomGarbage(FaultEffect):
             case Scan(ranges=ranges):
                 return replace(reading, ranges=_garbage_values(ranges, content))
             case Image(rgb=rgb, depth=depth):
-                colors = rgb if content in VALUES else _garbage_values(rgb, content)
+                colors = rgb if content in GARBAGE_NUMBERS else _garbage_values(rgb, content)
                 return replace(reading, rgb=colors, depth=_garbage_values(depth, content))
             case Odometry():
-                value = VALUES[content]
+                value = GARBAGE_NUMBERS[content]
                 return replace(reading, pose=Pose2(value, value, value), twist=Twist(value, value, value))
             case Imu():
-                vector = (VALUES[content],) * 3
+                vector = (GARBAGE_NUMBERS[content],) * 3
                 return replace(reading, angular_velocity=vector, linear_acceleration=vector)
             case _:
                 return reading
 
 
 def _garbage_values(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
-    """Return an array of the same dtype with the `content` of Garbage.value: filled, empty, or half as long."""
+    """Return an array of the same dtype that is empty, half as long, or filled with one number.
+
+    `content` is a keyword of `Garbage.value`.
+    """
     if content == "empty":
         return values[:0]
     if content == "short":
         return values[: len(values) // 2]
-    return np.full_like(values, VALUES[content])
+    return np.full_like(values, GARBAGE_NUMBERS[content])
 
 
 class Stuck(Spec, Fault):
     """The same message is repeated with a fresh time stamp: a driver that hangs and sends its last buffer again.
 
-    The repeated message is the first one after the fault began. On `cmd_vel` the base keeps that command whatever the
-    stack sends; on `localizer` the navigator always receives the same pose; `wheels` are blocked.
+    The repeated message is the first one after the start of the fault. On `cmd_vel`, the base keeps that command. On
+    `localizer`, the navigator always receives the same pose. On `wheels`, the wheels are blocked.
 
     Example: `{sensor: lidar, stuck: {}, when: {time: 5 s}, for: 2 s}`
     """
@@ -105,11 +109,11 @@ class Stuck(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to repeat the next message."""
-        return _Repeated(STOP if setting.kind == "Wheels" else None)
+        return _RepeatedMessage(STOP if setting.kind == "Wheels" else None)
 
 
-class _Repeated(FaultEffect):
-    """Repeats the first message that it receives, or the given command."""
+class _RepeatedMessage(FaultEffect):
+    """Repeats the first message that it receives or, if `command` is given, that command."""
 
     def __init__(self, command: Twist | None) -> None:
         self._command = command

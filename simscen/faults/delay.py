@@ -23,9 +23,9 @@ T = TypeVar("T")
 class Delay(Spec, Fault):
     """Messages arrive late and in order: a slow driver, or a busy bus or network.
 
-    A message arrives at the first beat at or after its due time, with the time stamp of its measurement. The delay is
-    `latency` plus a random part of `jitter`, but no message overtakes an earlier one. Messages in transit when the
-    fault ends still arrive, and delay those that follow. On `localizer`, the correction of the odometry is late.
+    Messages keep the time stamp of their measurement. The delay is `latency` plus a random part of `jitter`, but no
+    message overtakes an earlier one. Messages in transit at the end of the fault still arrive, and later messages wait
+    for them. On `localizer`, the transform from map to odom is late.
 
     Example: `{sensor: lidar, delay: {latency: 200 ms, jitter: 50 ms}}`
     """
@@ -77,13 +77,13 @@ class _DelayedMessages(FaultEffect):
         return apply_correction(belief, self._correction)
 
     def end(self) -> FaultEffect | None:
-        """Return this effect if it still has to deliver messages in transit, otherwise None."""
+        """Return this effect if messages are still in transit, otherwise None."""
         self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 
 
 class _LatencyQueue(Generic[T]):
-    """Queue of messages in transit, in their order of arrival."""
+    """Queue of messages in transit, oldest first. All times are ticks."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[int, T]] = deque()
@@ -92,7 +92,7 @@ class _LatencyQueue(Generic[T]):
         return len(self._waiting)
 
     def pass_or_hold(self, message: T, due: int, now: int) -> T | None:
-        """Return the message if its tick `due` has come and no other waits; otherwise hold it and return None."""
+        """Return the message if it is due and the queue is empty; otherwise add it to the queue and return None."""
         if not self._waiting and due <= now:
             return message
         self._waiting.append((max(due, self._waiting[-1][0]) if self._waiting else due, message))

@@ -28,7 +28,7 @@ class BeamDropout(Spec, Fault):
     """Probability that a beam returns nothing."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw for each beam of each scan whether it is lost."""
+        """Start to remove beams at random."""
         return _LostBeams(rng, self.probability)
 
 
@@ -44,7 +44,7 @@ class _LostBeams(FaultEffect):
 
 
 class Sector(Spec, Fault):
-    """Beams in a range of directions return nothing (nan): dirt on the cover, a cable or a load in front of it.
+    """Beams in a range of directions return nothing (nan): dirt on the lidar, a cable or a load in front of it.
 
     Example: `{sensor: lidar, sector: {from: -30 deg, to: 30 deg}}`
     """
@@ -57,16 +57,16 @@ class Sector(Spec, Fault):
 
     @property
     def width(self) -> float:
-        """Angle from the first to the last direction in rad, counterclockwise; 2 pi for a whole turn."""
+        """Counterclockwise angle from the first to the last direction in rad; 2 pi for a whole turn."""
         turn = 2 * math.pi
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `to` and the reason if the sector has no width, or None."""
+        """Return (`to`, reason) if the sector has no width."""
         return ("to", "the sector ends where it begins") if not self.width else None
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to drop the same beams of each scan."""
+        """Start to remove the beams of the sector from each scan."""
         return _BlindSector(self.from_, self.width)
 
 
@@ -92,7 +92,7 @@ class RangeLimit(Spec, Fault):
     """Largest range or depth that is still measured."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `max` and the reason if it is not below the maximum range of the sensor, or None."""
+        """Return (`max`, reason) if it is not below the maximum range of the sensor."""
         own = getattr(target.spec, "max_range", None)
         if own is None or self.max < own:
             return None
@@ -119,7 +119,7 @@ class _LimitedRange(FaultEffect):
 
 
 class Ghost(Spec, Fault):
-    """Beams in a window of directions hit an object that does not exist: a reflection, a reflective vest, the cover.
+    """Beams in a window of directions hit an object that does not exist, for example because of a reflection.
 
     The ghost is fixed in the lidar's frame and therefore moves with the robot.
 
@@ -129,7 +129,7 @@ class Ghost(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     range: PositiveLength
-    """Distance of the ghost; beams that hit something nearer report that instead."""
+    """Distance of the ghost. Beams that hit a nearer object report the nearer object."""
     direction: Angle = 0.0
     """Center of the window in the lidar's frame."""
     width: PositiveAngle = 0.17453292519943295
@@ -138,14 +138,14 @@ class Ghost(Spec, Fault):
     """Probability that a beam of the window hits the ghost, drawn again for each scan."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `range` and the reason if the ghost is outside the range limits of the lidar, or None."""
+        """Return (`range`, reason) if the ghost is outside the range limits of the lidar."""
         nearest, farthest = (getattr(target.spec, key, None) for key in ("min_range", "max_range"))
         if nearest is None or farthest is None or nearest <= self.range <= farthest:
             return None
         return "range", f"the sensor measures from {nearest:g} m to {farthest:g} m"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw for each beam of the window whether it hits the ghost."""
+        """Start to add the ghost to scans at random."""
         return _GhostHits(rng, self)
 
 

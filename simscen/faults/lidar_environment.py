@@ -20,15 +20,15 @@ from simscen.spec.quantities import PositiveLength, Probability, Quantity
 MM_PER_HOUR = 0.001 / 3600
 """1 mm/h in m/s."""
 REFERENCE_REFLECTIVITY = 0.9
-"""Reflectivity of a surface that a lidar just detects at its maximum range in clear air."""
+"""Lowest reflectivity of a surface that a lidar detects at its maximum range in clear air."""
 
 
 class Glass(Spec, Fault):
-    """Beams pass through the named objects and return what is behind: glass doors and walls, polished steel, water.
+    """Beams pass through the named objects and measure the surfaces behind: glass doors and walls.
 
-    A laser passes through a pane except within a few degrees of its normal (Foster, Sun, Park and Kuipers, VisAGGE:
-    Visible angle grid for glass environments, 2013); `probability` is the fraction of beams that pass. The robot still
-    collides with the object, and its map still shows it.
+    A laser beam passes through a pane unless it is nearly perpendicular (Foster, Sun, Park and Kuipers, VisAGGE:
+    Visible angle grid for glass environments, 2013). The robot still collides with the objects, and its map still shows
+    them.
 
     Example: `{sensor: lidar, glass: {of: [east wall]}}`
     """
@@ -38,10 +38,10 @@ class Glass(Spec, Fault):
     of: Annotated[list[ObjectName], Field(min_length=1, max_length=100)]
     """Walls, obstacles, objects, and doors of the world, or objects that an event spawns."""
     probability: Probability = 1.0
-    """Probability that a beam passes through."""
+    """Probability that a beam passes through the objects."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to cast each scan again without the named objects."""
+        """Start to make the named objects transparent."""
         return _TransparentObjects(rng, self, setting)
 
 
@@ -62,11 +62,11 @@ class _TransparentObjects(FaultEffect):
 class Rain(Spec, Fault):
     """Rain weakens the returned light and adds range noise: distant or dark objects disappear (inf).
 
-    At a rain rate of R mm/h the extinction is α = 0.01 R^0.6 per meter. A range z returns ρ exp(-2 α z) / z² of the
-    light; it is lost if that is less than a surface of 90 % reflectivity returns at the lidar's maximum range in clear
-    air. Range errors have the standard deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson,
-    Predicting the influence of rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use
-    `dust`.
+    At a rain rate of R mm/h, the extinction coefficient is α = 0.01 R^0.6 per meter. A surface with reflectivity ρ at
+    range z returns the fraction ρ exp(-2 α z) / z² of the light. The lidar detects the surface if this fraction is at
+    least that of a surface with 90 % reflectivity at its maximum range in clear air. Range errors have the standard
+    deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson, Predicting the influence of rain on
+    lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use `dust`.
 
     Example: `{sensor: lidar, rain: {rate: 25 mm/h, reflectivity: 50 %}}`
     """
@@ -78,7 +78,7 @@ class Rain(Spec, Fault):
     """Reflectivity of all surfaces: 90 % is white, 10 % black."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to attenuate beams and to draw a range error for each."""
+        """Start to attenuate beams and to add range errors."""
         return _RainAttenuation(rng, self)
 
     @property
@@ -112,9 +112,9 @@ class _RainAttenuation(FaultEffect):
 class Dust(Spec, Fault):
     """Beams end early at dust, smoke, steam, fog, or snow.
 
-    Particles along a beam form a Poisson process, so that the distance to the first one is exponentially distributed
-    with the mean `mean_free_path` L: a beam to an object at range r ends early with probability 1 - exp(-r / L). These
-    are the short readings of Thrun, Burgard and Fox, Probabilistic Robotics, section 6.3 (with λ = 1 / L).
+    The distance to the first particle is exponentially distributed with the mean L = `mean_free_path`. A beam to an
+    object at range r therefore ends early with probability 1 - exp(-r / L). Source: the short readings of Thrun,
+    Burgard and Fox, Probabilistic Robotics, section 6.3, with λ = 1 / L.
 
     Example: `{sensor: lidar, dust: {mean_free_path: 20 m}}`
     """
@@ -124,7 +124,7 @@ class Dust(Spec, Fault):
     """Mean distance that a beam travels in free space before it hits a particle."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw for each beam of each scan the distance to the first particle."""
+        """Start to shorten beams at random."""
         return _Particles(rng, self.mean_free_path)
 
 

@@ -40,7 +40,7 @@ class Jump(Spec, Fault):
     """Counterclockwise."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to shift the belief, from the next one on."""
+        """Start to shift each belief."""
         return _ShiftedBelief(Pose2(self.x, self.y, self.yaw))
 
 

@@ -22,14 +22,14 @@ MESSAGE_KINDS = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"
 
 
 class _MessageLoss(FaultEffect):
-    """Base class: drops lost readings and commands. Without a new correction, the belief follows the odometry."""
+    """Base class of effects that drop readings and commands."""
 
     def __init__(self) -> None:
         self._correction: Pose2 | None = None
 
     @abstractmethod
     def is_lost(self) -> bool:
-        """Decide whether the current message is lost; called once for each message."""
+        """Return whether the current message is lost. Called once for each message."""
 
     def reading(self, reading: Reading) -> Reading | None:
         return None if self.is_lost() else reading
@@ -78,7 +78,7 @@ class Dropout(Spec, Fault):
     """Probability that a message is lost."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw for each message whether it is lost."""
+        """Start to drop messages at random."""
         return _RandomLoss(rng, self.probability)
 
 
@@ -92,10 +92,10 @@ class _RandomLoss(_MessageLoss):
 
 
 class Intermittent(Spec, Fault):
-    """Messages arrive and fail in bursts of random length, as with a loose contact or a fading radio link.
+    """Periods in which messages arrive alternate with gaps, as with a loose contact or a fading radio link.
 
-    The bursts have exponentially distributed lengths (a Gilbert channel: Gilbert, Capacity of a burst-noise channel,
-    1960), so that on average the fraction down / (up + down) of all messages is lost. The fault begins with a gap.
+    The lengths of periods and gaps are exponentially distributed (Gilbert, Capacity of a burst-noise channel, 1960). On
+    average, the fraction down / (up + down) of all messages is lost. The fault begins with a gap.
 
     Example: `{sensor: lidar, intermittent: {up: 1 s, down: 0.5 s}}`
     """
@@ -104,7 +104,7 @@ class Intermittent(Spec, Fault):
     up: PositiveDuration
     """Mean length of the periods in which messages arrive."""
     down: PositiveDuration
-    """Mean length of the gaps."""
+    """Mean length of the gaps, in which all messages are lost."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start with a gap of random length."""
@@ -134,8 +134,8 @@ class _GilbertChannel(_MessageLoss):
 class Slow(Spec, Fault):
     """Messages arrive at a lower rate than normal: an overloaded computer, a sensor in its energy-saving mode.
 
-    Only the first message of each period of 1 / `rate` arrives; all others are lost. The base keeps the last
-    velocity command and stops after its `command_timeout`; the localizer corrects the odometry less often.
+    Only the first message in each period of 1 / `rate` arrives. All other messages are lost. Without a new velocity
+    command, the base keeps the last one and stops after its `command_timeout`.
 
     Example: `{sensor: lidar, slow: {rate: 2 Hz}}`
     """
@@ -145,13 +145,13 @@ class Slow(Spec, Fault):
     """Messages per second that arrive."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return `rate` and the reason if it is not below the rate of the target, or None."""
+        """Return (`rate`, reason) if it is not below the normal rate of the target."""
         if not target.rate or self.rate < target.rate:
             return None
         return "rate", f"{self.rate:g} Hz is not slower than its normal rate of {target.rate:g} messages per second"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start a period; its first message, the next one, arrives."""
+        """Start to drop messages, except the first message in each period."""
         return _RateLimit(self.rate, setting)
 
 

@@ -28,9 +28,9 @@ from simscen.spec.quantities import (
 class Noise(Spec, Fault):
     """Gaussian noise in addition to that of the sensor: a failing or badly shielded sensor, vibration, poor light.
 
-    On a lidar and on the depths of a camera, `std` applies to each range; a range stays within the limits of the lidar.
-    `colour` applies to each pixel. On odometry, the errors of `linear` and `angular` grow with the square root of the
-    distance, so that they do not depend on the rate. On the localizer, each belief has an independent error.
+    Noisy ranges stay within the range limits of the lidar. Odometry errors grow with the square root of the driven
+    distance and turn, and therefore do not depend on the message rate. On the localizer, each estimated pose has an
+    independent error.
 
     Example: `{sensor: lidar, noise: {std: 10 cm}}`
     """
@@ -47,13 +47,13 @@ class Noise(Spec, Fault):
         "Belief": ("linear", "angular"),
     }
     std: NonNegativeLength = 0.0
-    """Standard deviation of a range or depth."""
+    """Standard deviation of each range or depth."""
     colour: Probability = 0.0
     """Standard deviation of red, green, and blue of each pixel, relative to full scale."""
     linear: NonNegativeLength = 0.0
-    """Standard deviation of the odometry distance after one meter; for the localizer, in x and in y."""
+    """Standard deviation of the odometry distance after one meter. For the localizer, standard deviation of x and y."""
     angular: NonNegativeAngle = 0.0
-    """Standard deviation of the odometry heading after a turn of one radian; for the localizer, of the heading."""
+    """Standard deviation of the odometry heading after a turn of one radian. For the localizer, of the heading."""
     gyro: NonNegativeAngularSpeed = 0.0
     """Standard deviation of the angular velocity about each axis."""
     accelerometer: NonNegativeAcceleration = 0.0

@@ -31,9 +31,7 @@ from simscen.spec.quantities import (
 class Bias(Spec, Fault):
     """A constant error: wrong wheel radii, a gyroscope that was not zeroed, a lidar that is too warm.
 
-    Odometry reports a scaled distance and turn, plus a turn for each meter driven; ranges are too long or too short; a
-    gyroscope reports a rotation at rest; a picture is too bright or too dark. To scale all values of a sensor by one
-    factor, use `scale`.
+    To scale all values of a sensor by one factor, use `scale`.
 
     Example: `{sensor: odom, bias: {linear_scale: 1.1, turn_per_metre: 0.05}}`
     """
@@ -50,11 +48,11 @@ class Bias(Spec, Fault):
         "Image": ("range", "brightness"),
     }
     linear_scale: Ratio = 1.0
-    """Reported distance over driven distance: a wheel worn to 95 % of its radius reports 1.05."""
+    """Ratio of reported to driven distance. A wheel worn to 95 % of its radius has the ratio 1.05."""
     angular_scale: Ratio = 1.0
-    """Reported turn over true turn."""
+    """Ratio of reported to true turn."""
     turn_per_metre: Angle = 0.0
-    """Turn reported for each meter driven forward, in rad: unequal wheel radii."""
+    """Additional turn that the odometry reports for each meter driven forward: unequal wheel radii."""
     range: Length = 0.0
     """Added to each range or depth."""
     gyro: AngularSpeed = 0.0
@@ -100,8 +98,8 @@ class _BiasedReadings(FaultEffect):
 class Scale(Spec, Fault):
     """All values of a sensor are too large or too small by a factor.
 
-    For ranges and depths: the clock that times the echoes runs fast or slow. For odometry, distances and turns: low
-    tire pressure, or a wrong gear ratio in the driver. For an IMU, gravity included: a wrong full-scale setting.
+    Possible causes are a lidar clock that runs fast or slow, low tire pressure (odometry), and a wrong full-scale
+    setting of an IMU. The factor also applies to gravity in the acceleration of an IMU.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`
     """
@@ -109,7 +107,7 @@ class Scale(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
     neutral_values: ClassVar[Mapping[str, object]] = {"factor": 1.0}
     factor: Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
-    """Reported value over true value."""
+    """Ratio of reported to true value."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to scale each value or each odometry increment."""
@@ -140,8 +138,8 @@ class _ScaledReadings(FaultEffect):
 class Drift(Spec, Fault):
     """An error that starts at zero and grows with time: electronics that warm up, a gyroscope bias that drifts.
 
-    Odometry reports motion while the robot stands still. The estimated pose moves along the heading that the robot had
-    when the fault began, as with a scan matcher in a corridor without features.
+    Odometry reports motion while the robot stands still. On the localizer, the estimated pose moves along the heading
+    at the start of the fault, as with a scan matcher in a corridor without features.
 
     Example: `{sensor: imu, drift: {gyro: 0.01 rad/s^2}, when: {time: 2 s}, for: 10 s}`
     """
@@ -156,13 +154,13 @@ class Drift(Spec, Fault):
         "Belief": ("linear", "angular"),
     }
     range: Speed = 0.0
-    """Growth of the error of each range or depth."""
+    """Growth rate of the error of each range or depth."""
     linear: Speed = 0.0
-    """Forward velocity that the odometry adds, or with which the estimated pose moves."""
+    """Forward velocity error of the odometry or of the estimated pose."""
     angular: AngularSpeed = 0.0
-    """Angular velocity that the odometry adds, or with which the estimated pose turns."""
+    """Angular velocity error of the odometry or of the estimated pose."""
     gyro: AngularAcceleration = 0.0
-    """Growth of the bias of the angular velocity about the vertical axis."""
+    """Growth rate of the error of the angular velocity about the vertical axis."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start with an error of zero."""
@@ -207,24 +205,24 @@ class _DriftingValues(FaultEffect):
         return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
 
 
-ANGLES = ("roll", "pitch", "yaw")
+ROTATION_KEYS = ("roll", "pitch", "yaw")
 
 
 class Extrinsic(Spec, Fault):
     """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated.
 
-    The stack assumes the nominal pose. The error is the true pose of the sensor in the frame of its nominal pose. A
-    lidar that is pitched down sees the floor as a wall; a tilted IMU measures a part of gravity as acceleration.
+    The keys are the true pose of the sensor in the frame of its nominal pose; the stack assumes the nominal pose. A
+    lidar that is pitched down sees the floor as a wall. A tilted IMU measures a part of gravity as acceleration.
 
     Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image", "Imu"})
-    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ANGLES), 0.0)
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ROTATION_KEYS), 0.0)
     keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "Scan": ("x", "y", "z", *ANGLES),
-        "Image": ("x", "y", "z", *ANGLES),
-        "Imu": ANGLES,
+        "Scan": ("x", "y", "z", *ROTATION_KEYS),
+        "Image": ("x", "y", "z", *ROTATION_KEYS),
+        "Imu": ROTATION_KEYS,
     }
     x: Length = 0.0
     """Forward."""

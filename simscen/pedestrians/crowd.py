@@ -1,4 +1,4 @@
-"""Move all pedestrians of a world together, step by step, with the social force model."""
+"""Simulation of all pedestrians of a world with the social force model."""
 
 import math
 from collections.abc import Callable
@@ -27,11 +27,11 @@ INTERACTION_RANGE_M = 10.0
 MIN_SOCIAL_FORCE_M_S2 = 0.05
 """Weaker social forces count as 0, so that a new pedestrian does not change the motion of others far away."""
 VIEW_CHECK_STEPS = 20
-"""Number of steps between two checks whether the next corner of a path is still in view."""
+"""Number of steps between two checks of whether the pedestrian still sees the next corner of its path."""
 MIN_SPEED_M_S = 0.01
-"""Pedestrians that would walk more slowly stand still."""
+"""Speed below which a pedestrian stands still."""
 REFERENCE_RADIUS_M = 0.25
-"""Radius of the pedestrians for whom the parameters of the model were determined."""
+"""Body radius for which the parameters of the social force model were determined."""
 
 Point = tuple[float, float]
 """(x, y) in m in the world frame."""
@@ -45,9 +45,11 @@ def plan_straight_path(_start: Point, goal: Point, _radius: float) -> list[Point
 
 
 class _Neighbors(NamedTuple):
-    """Everyone whom a pedestrian may evade: all pedestrians, then all robots.
+    """All pedestrians, followed by all robots.
 
-    positions (n, 2) in m, velocities (n, 2) in m/s, extra_radii (n,): radius in m minus REFERENCE_RADIUS_M
+    positions (n, 2):   in m
+    velocities (n, 2):  in m/s
+    extra_radii (n,):   radius in m minus REFERENCE_RADIUS_M
     """
 
     positions: Array
@@ -56,7 +58,7 @@ class _Neighbors(NamedTuple):
 
 
 class Crowd:
-    """All pedestrians of a world, sorted by name. Their motion is deterministic: it uses no random numbers."""
+    """All pedestrians of a world, sorted by name. Their motion uses no random numbers."""
 
     def __init__(self, walls: WallMap, plan_path: PathPlanner = plan_straight_path) -> None:
         self._walls, self._plan_path = walls, plan_path
@@ -89,9 +91,9 @@ class Crowd:
         return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 
     def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
-        """Move all pedestrians by one step of `seconds`, each in a straight line.
+        """Move all pedestrians by one step of `seconds`.
 
-        Returns what they did: started or ended a reaction, or reached a goal.
+        Returns their actions in this step: they began or ended a reaction, or reached a goal.
         """
         people = list(self._people.values())
         if not people:
@@ -117,7 +119,7 @@ class Crowd:
     def _reactions(
         self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
-        """Update all reactions. Return the robot that each pedestrian reacts to (or None), and the actions."""
+        """Begin and end reactions to robots. Return the robot that each pedestrian reacts to (or None), and actions."""
         reacting: list[ObservedRobot | None] = []
         actions: list[PedestrianAction] = []
         for person in people:
@@ -133,16 +135,16 @@ class Crowd:
         return bool(self._walls.visible(np.array([person.position]), np.array([robot.pose[:2]]))[0])
 
     def _update_path(self, person: Pedestrian, number: int) -> None:
-        """Plan a path to the goal if the goal is new, or if others have pushed the pedestrian out of view of its path.
+        """Plan a path if the goal is new or if the pedestrian no longer sees the next corner of its path.
 
-        `number` is the index of the pedestrian, so that not all check their view in the same step.
+        `number` is the index of the pedestrian. Pedestrians check their view in different steps.
         """
         goal = person.destination
-        is_outdated = person.planned_for != goal
+        is_outdated = person.planned_goal != goal
         if not is_outdated and person.path and (self._steps + number) % VIEW_CHECK_STEPS == 0:
             is_outdated = not self._walls.visible(np.array([person.position]), np.array([person.path[0]]))[0]
         if is_outdated:
-            person.path, person.planned_for = self._plan_path(person.position, goal, person.spec.radius), goal
+            person.path, person.planned_goal = self._plan_path(person.position, goal, person.spec.radius), goal
 
     def _external_forces(
         self,
@@ -154,7 +156,7 @@ class Crowd:
         surroundings: Surroundings,
         walls: NearestPoints,
     ) -> Array:
-        """Return the external forces (n, 2) in m/s² on all pedestrians: all but their own driving force."""
+        """Return all forces (n, 2) in m/s² on pedestrians except their driving forces."""
         force = self._social_forces(people, reacting, positions, velocities, surroundings)
         force += self._obstacle_forces(people, positions, surroundings, walls)
         for members in _groups(people):
@@ -176,7 +178,7 @@ class Crowd:
         velocities: Array,
         surroundings: Surroundings,
     ) -> Array:
-        """Return the forces (n, 2) in m/s² by which pedestrians evade each other and robots."""
+        """Return the forces (n, 2) in m/s² with which pedestrians evade each other and robots."""
         others = _neighbors(people, positions, velocities, surroundings)
         towards = others.positions[np.newaxis] - positions[:, np.newaxis]
         interacts = np.hypot(towards[..., 0], towards[..., 1]) <= INTERACTION_RANGE_M
@@ -194,12 +196,12 @@ class Crowd:
     def _obstacle_forces(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> Array:
-        """Return the forces (n, 2) in m/s² of walls, of objects, and of robots on those who treat them as objects.
+        """Return the forces (n, 2) in m/s² of walls and objects, which act at their point nearest to the pedestrian.
 
-        Each wall, object, and robot acts at the point that is nearest to the pedestrian.
+        Robots act as objects on pedestrians with the behavior `impassive`.
         """
-        person, owner, nearest = walls
-        first = _nearest_by_owner(person, owner, np.hypot(*(nearest - positions[person]).T))
+        person, solid, nearest = walls
+        first = _nearest_by_solid(person, solid, np.hypot(*(nearest - positions[person]).T))
         contacts = [(person[first], nearest[first])]
         for item in surroundings.objects:
             aware = np.array([k for k, p in enumerate(people) if "objects" not in p.spec.blind_to], np.int64)
@@ -218,9 +220,9 @@ class Crowd:
     def _limits(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> list[MoveLimits]:
-        """Return limits of the moves of one step that keep pedestrians apart from obstacles and from each other.
+        """Return limits of the moves of one step that prevent contact.
 
-        A pedestrian may use the entire gap to a wall, but only half of the gap to what can move as well.
+        A pedestrian may use the entire gap to a wall, but only half of the gap to an object, robot, or pedestrian.
         """
         radii = np.array([person.spec.radius for person in people])
         indices, _, nearest = walls
@@ -241,7 +243,7 @@ class Crowd:
 
 
 def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, surroundings: Surroundings) -> _Neighbors:
-    """Return the pedestrians at `positions` with `velocities`, and the robots."""
+    """Return the positions, velocities, and radii of all pedestrians and robots."""
     robots = surroundings.robots
     radii = [*(p.spec.radius - REFERENCE_RADIUS_M for p in people), *(r.radius - REFERENCE_RADIUS_M for r in robots)]
     return _Neighbors(
@@ -254,9 +256,9 @@ def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, su
 def _interactions(
     people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings
 ) -> npt.NDArray[np.bool_]:
-    """Return a matrix: whether each pedestrian (rows) evades each pedestrian and each robot (columns) like a person.
+    """Return a matrix of whether a pedestrian (row) evades a pedestrian or robot (column) by social forces.
 
-    Columns are in the order of `_Neighbors`.
+    The columns are all pedestrians, followed by all robots.
     """
     evades = np.ones((len(people), len(people) + len(surroundings.robots)), dtype=np.bool_)
     for number, (person, reacts_to) in enumerate(zip(people, reacting, strict=True)):
@@ -270,9 +272,9 @@ def _interactions(
 
 
 def _groups(people: list[Pedestrian]) -> list[Indices]:
-    """Return the indices of the members of each group; groups of one are left out.
+    """Return the indices of the members of each group of at least two pedestrians.
 
-    A pedestrian that reacts to a robot does not belong to its group during the reaction.
+    Pedestrians that react to a robot are left out.
     """
     names = sorted({person.spec.group for person in people if person.spec.group is not None})
     groups = [[k for k, p in enumerate(people) if p.spec.group == name and p.reacts_to is None] for name in names]
@@ -284,7 +286,7 @@ def _integrate(
 ) -> tuple[Array, Array]:
     """Return moves (n, 2) in m and velocities (n, 2) in m/s after a step of `seconds` under constant forces.
 
-    They are the exact solution of dv/dt = (intended velocity - v) / τ + external force, limited to the maximum speeds.
+    Solves dv/dt = (intended velocity - v) / τ + external force exactly, and limits the result to the maximum speeds.
     """
     intended = np.zeros_like(positions)
     for number, intent in enumerate(intents):
@@ -310,21 +312,18 @@ def _limit_lengths(vectors: Array, limits: Array) -> Array:
 
 
 def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
-    """Return the sums (count, 2) of the forces (n, 2) on each of `count` pedestrians; `person` (n,) are their indices.
-
-    The forces are added in order, so that rounding is reproducible.
-    """
+    """Return the sum (count, 2) of the forces (n, 2) on each pedestrian. `person` (n,) are indices of pedestrians."""
     sums = [np.bincount(person, force[:, axis], minlength=count) for axis in (0, 1)]
     return np.stack(sums, axis=1).astype(np.float64)  # without any force, bincount returns integers
 
 
-def _nearest_by_owner(person: Indices, owner: Indices, distance: Array) -> Indices:
-    """Return the index of the entry with the least distance for each pair of a pedestrian and an owner.
+def _nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
+    """Return the index of the nearest point for each pair of a pedestrian and a solid.
 
-    Entry k is a point of the solid `owner[k]`, `distance[k]` m away from the pedestrian `person[k]`.
+    Point k belongs to the solid `solid[k]` and is `distance[k]` m away from the pedestrian `person[k]`.
     """
-    order = np.lexsort((distance, owner, person))
-    pairs = np.stack((person[order], owner[order]), axis=1)
+    order = np.lexsort((distance, solid, person))
+    pairs = np.stack((person[order], solid[order]), axis=1)
     is_first = np.ones(len(order), dtype=np.bool_)
     is_first[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
     first: Indices = order[is_first]
@@ -334,24 +333,28 @@ def _nearest_by_owner(person: Indices, owner: Indices, distance: Array) -> Indic
 def _nearest_points(
     indices: Indices, positions: Array, segments: Array, of_each_segment: bool = False
 ) -> tuple[Indices, Array]:
-    """Return pedestrians near an outline, as indices (k,), and the points (k, 2) of the outline nearest to them.
+    """Return the points (k, 2) of an outline that are nearest to pedestrians, after the indices (k,) of the pedestrians.
 
-    Only the pedestrians `indices` are examined, and only points within OBSTACLE_RANGE_M count. The outline consists of
-    `segments` (n, 2, 2). There is one point per pedestrian or, with `of_each_segment`, per pedestrian and segment.
+    Only points within OBSTACLE_RANGE_M are returned: one for each pedestrian or, with `of_each_segment`, one for each
+    pair of a pedestrian and a segment.
+
+    indices:             pedestrians to examine
+    positions (n, 2):    positions of all pedestrians in m
+    segments (m, 2, 2):  segments of the outline
     """
     repeated = np.repeat(indices, len(segments))
     points = nearest_points_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
     distance = np.hypot(*(points - positions[repeated]).T)
     near = np.flatnonzero(distance <= OBSTACLE_RANGE_M)
     if not of_each_segment:
-        near = near[_nearest_by_owner(repeated[near], np.zeros_like(near), distance[near])]
+        near = near[_nearest_by_solid(repeated[near], np.zeros_like(near), distance[near])]
     return repeated[near], points[near]
 
 
 def _limits_towards(indices: Indices, points: Array, positions: Array, radii: Array, ratio: float) -> MoveLimits:
-    """Return limits of moves towards `points` (k, 2): a `ratio` of the gap between each point and a pedestrian.
+    """Return limits that allow the pedestrians `indices` (k,) to use a `ratio` of their gaps to `points` (k, 2).
 
-    `indices` (k,) are the pedestrians; `positions` (n, 2) and `radii` (n,) are those of all pedestrians.
+    `positions` (n, 2) and `radii` (n,) in m belong to all pedestrians.
     """
     towards = points - positions[indices]
     distance = np.maximum(np.hypot(towards[:, 0], towards[:, 1]), 1e-9)

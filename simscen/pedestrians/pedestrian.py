@@ -13,23 +13,20 @@ GOAL_RADIUS_M = 0.3
 CORNER_RADIUS_M = 0.5
 """Distance at which a corner of the path counts as passed."""
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
-"""Field of view to each side (HuNavSim's lineOfSight)."""
+"""Largest angle between the heading and a visible robot (HuNavSim's lineOfSight)."""
 MAX_TURN_RATE_RAD_S = math.pi
 """Maximum turn rate (HuNavSim's max_ang_vel)."""
 MIN_TURNING_SPEED_M_S = 0.1
 """Speed above which a pedestrian turns to its direction of motion."""
 LOST_RANGE_RATIO = 1.5
-"""Hysteresis: a reaction ends at this multiple of the distance at which it begins."""
+"""Ratio of the distance at which a reaction ends to the distance at which it begins (hysteresis)."""
 CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
-"""Speed at which curious pedestrians approach from afar (slower when nearer), and distance at which they stop."""
+"""Maximum speed of curious pedestrians, and distance to the robot at which they stop."""
 SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
-"""Maximum speed of scared pedestrians, and product of the force that repels them and their gap to the robot.
-
-In HuNavSim, the product is 20 x 0.2.
-"""
+"""Maximum speed of scared pedestrians, and their repulsive force times their gap to the robot (HuNavSim: 20 x 0.2)."""
 THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
-"""Maximum speed of threatening pedestrians, their distance in front of the robot, and the distance within which
-they look at it."""
+"""Maximum speed of threatening pedestrians, distance in front of the robot at which they stand, and distance within
+which they look at the robot."""
 STOPPING_DISTANCE_M = 0.05
 """Distance from the target position within which a pedestrian stops walking."""
 
@@ -40,9 +37,9 @@ class Intent:
 
     target:        point to walk to; None to stand still
     speed:         intended speed in m/s
-    max_speed:     maximum speed in m/s, also under the forces of others
-    looks_at:      point to turn to; None for the direction of motion
-    is_immovable:  whether the forces of others have no effect
+    max_speed:     maximum speed in m/s, including the effect of forces
+    looks_at:      point to turn to; None to turn to the direction of motion
+    is_immovable:  whether forces have no effect
     """
 
     target: tuple[float, float] | None
@@ -65,19 +62,19 @@ class Pedestrian:
     goal_index: int = 0
     """Index of the current goal in `spec.goals`."""
     is_forward: bool = True
-    """With `repeat: back_and_forth`, whether the goals are visited in order, not in reverse."""
+    """Whether the goals are visited in their order, not in reverse order. Used with `repeat: back_and_forth`."""
     has_arrived: bool = False
     """Whether the last goal was reached; True without goals."""
     path: list[tuple[float, float]] = field(default_factory=list)
-    """Corners that are still ahead; the last one is the current goal."""
-    planned_for: tuple[float, float] | None = None
+    """Corners of the remaining path around walls. The last corner is the current goal."""
+    planned_goal: tuple[float, float] | None = None
     """Goal for which `path` was planned."""
     reacts_to: str | None = None
-    """Name of the robot to which the pedestrian reacts now."""
-    reaction_time: float = 0.0
-    """Total time in s of reactions so far."""
+    """Name of the robot to which the pedestrian currently reacts; None without a reaction."""
+    total_reaction_s: float = 0.0
+    """Total duration in s of all reactions so far."""
     has_lost_interest: bool = False
-    """Whether the full duration of the reaction has passed. Only scared pedestrians react again afterwards."""
+    """Whether `total_reaction_s` has reached `spec.reacts_for`. Only scared pedestrians react again afterwards."""
 
     @classmethod
     def at_start(cls, spec: WalkingPedestrian) -> "Pedestrian":
@@ -102,7 +99,7 @@ class Pedestrian:
     # Goals
 
     def update_goal(self) -> list[PedestrianAction]:
-        """Advance to the next corner or goal if the current one is reached. Return [action] if a goal was reached."""
+        """Advance to the next corner or goal if the current one is reached. Return one action if it is a goal."""
         while len(self.path) > 1 and math.dist(self.position, self.path[0]) <= CORNER_RADIUS_M:
             self.path.pop(0)
         if self.has_arrived or math.dist(self.position, self.destination) > GOAL_RADIUS_M:
@@ -136,17 +133,17 @@ class Pedestrian:
         return abs(wrap(bearing - self.yaw)) <= HALF_FIELD_OF_VIEW_RAD
 
     def update_reaction(self, visible: dict[str, ObservedRobot], seconds: float) -> list[PedestrianAction]:
-        """Begin, continue, or end a reaction in a step of `seconds`. Return [action] if a reaction began or ended.
+        """Begin, continue, or end a reaction in a step of `seconds`. Return one action if a reaction began or ended.
 
         `visible` are the robots that no wall hides, by name.
         """
         if self.reacts_to is not None:
-            self.reaction_time += seconds
+            self.total_reaction_s += seconds
             robot = visible.get(self.reacts_to)
             lost = (
                 robot is None or math.dist(self.position, robot.pose[:2]) > LOST_RANGE_RATIO * self.spec.reacts_within
             )
-            is_over = self.reaction_time >= self.spec.reacts_for
+            is_over = self.total_reaction_s >= self.spec.reacts_for
             if not lost and not (is_over and self.spec.behavior != "scared"):
                 return []
             self.has_lost_interest = is_over
@@ -162,7 +159,7 @@ class Pedestrian:
         return [PedestrianAction(self.spec.name, "reacted", self.reacts_to)]
 
     def intent(self, robot: ObservedRobot | None) -> Intent:
-        """Return the intended motion. `robot` is the robot to which the pedestrian reacts now; None for no reaction."""
+        """Return the intended motion. `robot` is the robot that the pedestrian reacts to; None without a reaction."""
         if robot is None:
             return self._intent_to_goal()
         robot_position = robot.pose[:2]
@@ -193,7 +190,8 @@ class Pedestrian:
         return self.path[0] if self.path else self.destination
 
     def _blocking_intent(self, robot: ObservedRobot) -> Intent:
-        """Return the intent to stand in front of the robot. HuNavSim's blockRobot swaps sine and cosine."""
+        """Return the intent to stand in front of the robot."""
+        # HuNavSim's blockRobot swaps sine and cosine.
         gap = max(BLOCKING_DISTANCE_M, robot.radius + self.spec.radius + STOPPING_DISTANCE_M)
         yaw = robot.pose.yaw
         target = robot.pose.x + gap * math.cos(yaw), robot.pose.y + gap * math.sin(yaw)
@@ -204,9 +202,9 @@ class Pedestrian:
     # Motion
 
     def move(self, displacement: Array, velocity: Array, looks_at: tuple[float, float] | None, seconds: float) -> None:
-        """Apply the displacement (2,) in m of a step of `seconds`, set the velocity (2,) in m/s, and turn.
+        """Apply the displacement (2,) in m of a step of `seconds`, and set the velocity (2,) in m/s.
 
-        The pedestrian turns to the point `looks_at` or, if that is None, to the direction of motion.
+        The pedestrian turns to the point `looks_at`, or to the direction of motion if `looks_at` is None.
         """
         self.x, self.y = self.x + float(displacement[0]), self.y + float(displacement[1])
         self.velocity = float(velocity[0]), float(velocity[1])

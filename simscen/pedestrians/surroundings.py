@@ -1,4 +1,4 @@
-"""What pedestrians perceive: walls that block them and their view, and the robots and objects of the current step."""
+"""Surroundings of pedestrians: walls that block them and their view, robots, and other objects."""
 
 import math
 from collections.abc import Sequence
@@ -13,27 +13,28 @@ from simscen.pedestrians.forces import Indices
 CELL_M = 1.0
 """Size of the grid cells for which nearby walls are cached."""
 OBSTACLE_RANGE_M = 1.2
-"""Distance from the center of a pedestrian within which walls and objects act: at a gap of 1 m from the body, their
-force is only 0.00014 m/s²."""
+"""Distance from the center of a pedestrian within which walls and objects act on it."""
 SIGHT_CELL_M = 0.1
-"""Cell size of the visibility grid; larger if it would have more than MAX_SIGHT_CELLS."""
+"""Minimum cell size of the visibility grid. Cells are larger if the grid would have more than MAX_SIGHT_CELLS."""
 MAX_SIGHT_CELLS = 4_000_000
 """Maximum number of cells of the visibility grid."""
 SIGHT_MARGIN_M = 0.3
-"""Distance from both ends of a line of sight within which nothing blocks it."""
+"""Distance from both ends of a line of sight within which walls do not block it."""
 
 NearestPoints = tuple[Indices, Indices, Array]
-"""For each pair of a pedestrian and a nearby wall segment: index of the pedestrian (k,), solid that the segment belongs
-to (k,), and point of the segment nearest to the pedestrian (k, 2)."""
+"""Indices of pedestrians (k,), indices of solids (k,), and points (k, 2) in m on wall segments of these solids.
+
+Each row is the point of one nearby segment that is nearest to one pedestrian.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedRobot:
-    """A robot at the current step.
+    """State of a robot in the current step.
 
-    pose:     pose of the base in the world
-    velocity: velocity of the base in m/s along the world's x and y axes
-    radius:   radius in m of a disc around the origin of the base frame that contains the body
+    pose:     pose of the base in the world frame
+    velocity: velocity of the base in m/s along x and y of the world frame
+    radius:   radius in m of a circle around the base that contains the body
     outline:  corners (n, 2) of the body in the base frame
     """
 
@@ -46,7 +47,7 @@ class ObservedRobot:
 
 @dataclass(frozen=True, eq=False)
 class ObservedObject:
-    """An object at the current step, with the corners (n, 2) of its outlines in the world frame."""
+    """Outlines of an object in the current step, each as corners (n, 2) in the world frame."""
 
     name: str
     outlines: tuple[Array, ...]
@@ -54,7 +55,7 @@ class ObservedObject:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """All robots and objects at the current step, sorted by name."""
+    """All robots and objects in the current step, sorted by name."""
 
     robots: tuple[ObservedRobot, ...] = ()
     objects: tuple[ObservedObject, ...] = ()
@@ -67,10 +68,10 @@ def edges(outlines: Sequence[Array]) -> Array:
 
 
 class WallMap:
-    """Walls that block pedestrians. Those that are opaque also block their view."""
+    """Walls that block pedestrians. Opaque walls also block their view."""
 
     def __init__(self, segments: Array, owners: Indices, is_opaque: npt.NDArray[np.bool_]) -> None:
-        """Create a map of wall segments. Raises ValueError for coordinates that are not finite.
+        """Create the map. Raises ValueError for coordinates that are not finite.
 
         segments (n, 2, 2):  ends of the segments in m in the world frame
         owners (n,):         index of the solid that each segment belongs to
@@ -86,7 +87,7 @@ class WallMap:
     def nearest_points(self, points: Array) -> NearestPoints:
         """Return the nearest points of wall segments for pedestrians at `points` (n, 2).
 
-        Contains all segments within OBSTACLE_RANGE_M of a point, and some that are a little farther away.
+        Includes all segments within OBSTACLE_RANGE_M of a pedestrian, and some segments a little farther away.
         """
         cells = np.floor(points / CELL_M).astype(np.int64).tolist()
         candidates = [self._segments_near(column, row) for column, row in cells]
@@ -109,7 +110,7 @@ class WallMap:
         return self._segments_by_cell[column, row]
 
     def distance(self, point: tuple[float, float]) -> float:
-        """Return the distance in m from a point to the nearest wall; may be inf beyond OBSTACLE_RANGE_M."""
+        """Return the distance in m from a point to the nearest wall, or inf if all walls are far away."""
         points = np.array([point])
         _, _, nearest = self.nearest_points(points)
         return float(np.hypot(*(nearest - points).T).min(initial=math.inf))
@@ -120,7 +121,7 @@ class WallMap:
 
 
 class _SightGrid:
-    """Grid of the cells that opaque segments (n, 2, 2) pass through, which block lines of sight."""
+    """Grid whose cells block lines of sight if an opaque wall segment passes through them."""
 
     def __init__(self, segments: Array) -> None:
         self._low = segments.reshape(-1, 2).min(axis=0, initial=0.0) - SIGHT_CELL_M
@@ -136,10 +137,8 @@ class _SightGrid:
         self._opaque[cells[:, 0], cells[:, 1]] = True
 
     def clear_lines(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
-        """Return for each pair of points (n, 2) whether the line of sight between them is clear.
-
-        The line is sampled once per cell. This suffices, because walls are closed outlines or thicker than a cell.
-        """
+        """Return for each pair of points (n, 2) whether the line of sight between them is clear."""
+        # One sample per cell length suffices, because walls are closed outlines or thicker than a cell.
         offset = targets - viewers
         distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
         samples = np.maximum(np.ceil((distance - 2 * SIGHT_MARGIN_M) / self._cell), 0).astype(np.int64)
