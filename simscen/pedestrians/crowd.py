@@ -333,10 +333,10 @@ def _nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indic
 def _nearest_points(
     indices: Indices, positions: Array, segments: Array, of_each_segment: bool = False
 ) -> tuple[Indices, Array]:
-    """Return the points (k, 2) of an outline that are nearest to pedestrians, after the indices (k,) of the pedestrians.
+    """Return indices (k,) of pedestrians, and for each the nearest point (k, 2) in m of an outline.
 
-    Only points within OBSTACLE_RANGE_M are returned: one for each pedestrian or, with `of_each_segment`, one for each
-    pair of a pedestrian and a segment.
+    Pedestrians farther than OBSTACLE_RANGE_M are left out. With `of_each_segment`, each segment of the outline in range
+    has its own entry.
 
     indices:             pedestrians to examine
     positions (n, 2):    positions of all pedestrians in m
