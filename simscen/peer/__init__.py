@@ -1,6 +1,6 @@
-"""Client of the stack protocol, for a navigation stack that runs in a process of its own.
+"""Client of the stack protocol, for a navigation stack that runs in its own process.
 
-It needs Python 3.8 or later and nothing else, neither numpy nor simscen. A minimal stack:
+The client needs only the standard library of Python 3.8 or later. A minimal stack:
 
     from simscen.peer import Peer
 

@@ -1,7 +1,7 @@
-"""Writer and reader of messages in the serialization of ROS 2 (CDR), with nothing but the standard library.
+"""Writer and reader of ROS 2 messages in CDR (Common Data Representation, XCDR version 1, OMG DDSI-RTPS 10.5).
 
-This is Common Data Representation, XCDR version 1 (OMG DDSI-RTPS 10.5): a header of four bytes, then the fields. Each
-field is aligned to its own width, counted from the end of the header.
+A message is a header of four bytes, followed by the fields. Each field is aligned to its own width, counted from the
+end of the header.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Writer:
         self._data = bytearray(HEADER)
 
     def put(self, codes: str, *values: Any) -> Writer:
-        """Append values of one width, whose types are codes of `struct`, e.g. "iI" or "7d"."""
+        """Append numbers of equal width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
         self._align(struct.calcsize("<" + codes[-1]))
         self._data += struct.pack("<" + codes, *values)
         return self
@@ -41,7 +41,7 @@ class Writer:
         return self
 
     def numbers(self, code: str, values: Sequence[float]) -> Writer:
-        """Append a sequence: its length, then its numbers, whose type is a code of `array`, e.g. "f"."""
+        """Append a sequence of numbers, after its length. `code` is a type code of `array`, e.g. "f"."""
         numbers = array(code, values)
         if sys.byteorder == "big":
             numbers.byteswap()
@@ -60,9 +60,9 @@ class Writer:
 
 
 class Reader:
-    """Reads a message, of either byte order, field by field, in the order of its definition.
+    """Reads a message field by field, in the order of its definition and in either byte order.
 
-    Raises ValueError if the data are not CDR, or end before the field that is read.
+    Methods raise ValueError if the data are not CDR or too short.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -71,7 +71,7 @@ class Reader:
         self._data, self._byte_order, self._offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
-        """Return the next values of one width, whose types are codes of `struct`, e.g. "iI" or "7d"."""
+        """Return the next numbers, of equal width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
         layout = struct.Struct(self._byte_order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         try:
@@ -82,7 +82,7 @@ class Reader:
         return values
 
     def count(self) -> int:
-        """Return the length of the sequence that follows."""
+        """Read the length of the next sequence."""
         return int(self.take("I")[0])
 
     def string(self) -> str:
@@ -95,7 +95,7 @@ class Reader:
         return self._data[start : self._offset]
 
     def numbers(self, code: str) -> array[Any]:
-        """Return the next sequence of numbers, whose type is a code of `array`, e.g. "f"."""
+        """Return the next sequence of numbers. `code` is a type code of `array`, e.g. "f"."""
         values: array[Any] = array(code)
         if count := self.count():
             self._align(values.itemsize)

@@ -17,7 +17,7 @@ COMMAND, EVENTS, LOG = "/cmd_vel", "/simscen/events", "/rosout"
 
 
 class Message(NamedTuple):
-    """A serialized message on a topic: `type` is its ROS type, `raw` its bytes (CDR)."""
+    """A message on a topic, with its ROS type and its serialized bytes (CDR)."""
 
     topic: str
     type: str
@@ -25,15 +25,18 @@ class Message(NamedTuple):
 
     @property
     def content(self) -> Any:
-        """The deserialized message: an object of a class of simscen.peer.messages, or a plain Python value."""
+        """The deserialized message: an object of simscen.peer.messages, or a plain Python value."""
         return messages.read(self.type, self.raw)
 
 
 class Step:
-    """One step of the run: the messages that the stack receives, and its answer.
+    """One step of the run: the messages for the stack, and its answer.
 
-    The answer is collected by `drive`, `publish` and `log`, and is sent when the loop over the Peer continues.
-    `messages` are the messages since the last step. `canceled` is True if simscen has canceled a goal since then.
+    `drive`, `publish`, and `log` add to the answer. It is sent when the loop over the Peer requests the next step.
+
+    Attributes:
+        messages: Messages since the last step.
+        canceled: True if simscen has canceled a goal since the last step.
     """
 
     def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
@@ -64,17 +67,17 @@ class Step:
         return bool(self._header.flags & wire.COMMAND_DUE)
 
     def get(self, topic: str) -> Any:
-        """Return the content of the newest message on a topic; None if this step has none."""
+        """Return the content of the newest message on a topic; None if the step has no message on it."""
         found = [message for message in self.messages if message.topic == topic]
         return found[-1].content if found else None
 
     def drive(self, vx: float, wz: float, vy: float = 0.0) -> None:
-        """Command a velocity: m/s forward, rad/s counterclockwise, m/s to the left. It holds until the next command."""
+        """Command `vx` m/s forward, `wz` rad/s counterclockwise, and `vy` m/s to the left, until the next command."""
         self._peer.command = (float(vx), float(vy), float(wz))
         self._commanded = True
 
     def publish(self, topic: str, data: bytes) -> None:
-        """Publish a message that simscen.peer.messages packed. Raises KeyError if simscen does not accept the topic."""
+        """Publish a serialized message. Raises KeyError if simscen does not accept the topic."""
         self._published.append((self._peer.accepted_topics[topic], data))
 
     def log(self, text: str, level: int = 20) -> None:
@@ -92,14 +95,18 @@ class Step:
 class Peer:
     """Connection of a stack to simscen. Iteration yields one Step after another until the run ends.
 
-    `name`, `version` and `about` (any JSON data) describe the stack in the log of the run. `topics` are the topics to
-    receive; None means all. With `every_beat`, there is a step whenever a sensor publishes. Otherwise, there is a step
-    for each command, with the messages since the last step. `modes` are the Nav2 actions that the stack supports: a
-    stack with navigate_through_poses passes goals with `via` without stopping. `connection` is by default the socket
-    that simscen passes to the processes that it starts.
+    Args:
+        name: Name of the stack for the run's log, as `version` and `about` (any JSON object).
+        topics: Topics to receive; None for all.
+        every_beat: True for a step whenever a sensor publishes, False for one step per velocity command.
+        modes: Nav2 actions that the stack supports.
+        connection: None for the socket that simscen passes to the processes that it starts.
 
-    `hello` and `task` are the contents of the frames HELLO and GOAL. `goals` is the queue of goals, and `command` the
-    last velocity vx, vy, wz. `accepted_topics` has the numbers of the topics that simscen accepts, by name.
+    Attributes:
+        hello, task: Contents of the frames HELLO and GOAL.
+        goals: Queue of goals.
+        command: Last commanded velocity vx, vy, wz.
+        accepted_topics: Numbers of the topics that simscen accepts, by name.
 
     Raises wire.Malformed if a frame is invalid, Refused if simscen reports an error of this stack, and Disconnected if
     simscen closes the connection.
@@ -142,7 +149,7 @@ class Peer:
 
     @property
     def robot(self) -> dict[str, Any]:
-        """Properties of the robot: the object `robot` of the frame HELLO in docs/reference/stack-protocol.md."""
+        """Properties of the robot, as in the object `robot` of the frame HELLO."""
         robot: dict[str, Any] = self.hello["robot"]
         return robot
 
@@ -171,7 +178,7 @@ class Peer:
                 self._process_frame(kind, wire.from_json(body))
 
     def add(self, **about: Any) -> None:
-        """Add facts about this stack to the run's log. They are sent at the end of the run."""
+        """Add facts about the stack to the run's log. They are sent at the end of the run."""
         self._bye_content.update(about)
 
     def give_up(self, message: str) -> None:

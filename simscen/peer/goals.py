@@ -1,4 +1,4 @@
-"""Goal queue of a stack: takes the goals that simscen sends, and collects the events that report their progress."""
+"""Goal queue of a stack: holds the goals from simscen, and collects events about their progress."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ ROUNDING_S = 1e-8
 
 
 class Goal(NamedTuple):
-    """A pose in the map to reach within tolerances (m, rad).
+    """Goal pose in the map frame, with tolerances in m and rad.
 
-    `timeout` is the limit in simulated seconds, None without a limit. The robot passes a goal with `via` without
-    stopping and with any heading, in one drive with the next goal. It stays at the goal for `wait` simulated seconds.
+    timeout:  limit in simulated seconds; None without a limit
+    via:      whether the robot passes the goal without stopping and with any heading
+    wait:     simulated seconds that the robot stays at the goal
     """
 
     name: str
@@ -39,8 +40,9 @@ class Goal(NamedTuple):
 class Goals:
     """Queue of goals, and the events to send with the next answer.
 
-    `current` is the accepted goal, None if there is none; `waiting` are the goals after it. When simscen cancels or
-    preempts the current goal, it is dropped and reported as canceled.
+    Attributes:
+        current: Accepted goal, or None.
+        waiting: Goals after the current one.
     """
 
     def __init__(self) -> None:
@@ -52,13 +54,13 @@ class Goals:
         self._events: list[dict[str, Any]] = []
 
     def start(self, goals: Sequence[Goal]) -> None:
-        """Replace all goals by `goals`, in the order in which the robot drives to them."""
+        """Replace all goals by `goals`."""
         self.current, self.waiting, self._wait_until = None, list(goals), 0.0
 
     def accept(self) -> Goal | None:
         """Accept the next goal if no goal is current, and return the current goal.
 
-        Returns None if there is no goal, or while the robot waits at the previous one.
+        Returns None if there is no goal, or while the robot waits at the previous goal.
         """
         if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING_S:
             self.current = self.waiting.pop(0)
@@ -77,31 +79,30 @@ class Goals:
 
     @property
     def ahead(self) -> list[Goal]:
-        """The goals that follow the current one in the same drive: up to the first without `via`."""
+        """Goals that follow the current one without a stop in between: up to the first without `via`."""
         if self.current is None or not self.current.via:
             return []
         stop = next((k for k, goal in enumerate(self.waiting) if not goal.via), len(self.waiting) - 1)
         return self.waiting[: stop + 1]
 
     def failed(self, error_code: int | str, message: str = "", go_on: bool = False) -> None:
-        """Report the current goal as failed, with one of Nav2's error codes by number or name.
+        """Report the current goal as failed, with the number or name of a Nav2 error code.
 
-        With `go_on`, keep the goals of later drives. Otherwise, drop all goals, as FollowWaypoints does with
-        stop_on_failure. Raises ValueError without a current goal.
+        Drops the goals `ahead`; without `go_on`, drops all goals. Raises ValueError without a current goal.
         """
         self._drop("goal.failed", error_code=error_code, message=message)
         if not go_on:
             self.waiting = []
 
     def preempt(self, goal: Goal) -> None:
-        """Cancel the current goal, and put another one before all waiting goals."""
+        """Cancel the current goal and the goals `ahead`, and insert `goal` as the next one."""
         if self.current is not None:
             self._drop("goal.canceled")
         self._wait_until = 0.0
         self.waiting.insert(0, goal)
 
     def cancel(self, everything: bool) -> None:
-        """Cancel the current goal; with `everything`, also drop all waiting goals."""
+        """Cancel the current goal and the goals `ahead`; with `everything`, all goals."""
         if self.current is not None:
             self._drop("goal.canceled")
         if everything:
@@ -117,7 +118,7 @@ class Goals:
         return events
 
     def _drop(self, kind: str, **data: Any) -> None:
-        """End the current goal with an event of this kind, and drop the goals that follow it in the same drive."""
+        """End the current goal with an event of this kind, and drop the goals `ahead`."""
         ahead = len(self.ahead)
         self._end(kind, **data)
         self.waiting = self.waiting[ahead:]

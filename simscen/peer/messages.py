@@ -220,9 +220,9 @@ READERS: dict[str, Callable[[Reader], Any]] = {
 
 
 def read(kind: str, data: bytes) -> Any:
-    """Return a message of a type in `READERS`: an object of a class above, or a plain Python value, e.g. for Bool.
+    """Deserialize a message of the ROS type `kind`: an object of a class above, or a plain Python value, e.g. for Bool.
 
-    Raises ValueError if the data are not such a message.
+    Raises ValueError if the data are not a message of this type.
     """
     return READERS[kind](Reader(data))
 

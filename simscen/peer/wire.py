@@ -1,7 +1,6 @@
-"""Wire format of the stack protocol: packs, unpacks, sends and receives the frames between simscen and a stack.
+"""Wire format of the stack protocol: packs, unpacks, sends, and receives the frames between simscen and a stack.
 
-docs/reference/stack-protocol.md defines the protocol. Both simscen and the client use this module, so that it must run
-on Python 3.8.
+docs/reference/stack-protocol.md defines the protocol. The module must run on Python 3.8.
 """
 
 from __future__ import annotations
@@ -22,21 +21,20 @@ HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 
 KIND_NAMES = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
 
 COMMAND_DUE = 1
-"""Flag of a STEP: its answer must contain a command."""
+"""Flag of a STEP frame: the answer must contain a velocity command."""
 MAX_FRAME_BYTES = 256 << 20
-"""Largest frame in bytes, so that a wrong size is an error and does not exhaust the memory."""
 
 MAX_JSON_DEPTH = 32
-"""Largest nesting depth of JSON."""
+"""Maximum nesting depth of JSON."""
 
 SIZE = struct.Struct("<I")
-"""Size of the rest of the frame in bytes, with which each frame starts."""
+"""First field of a frame: size of the rest of the frame in bytes."""
 _STEP = struct.Struct("<QiIIII")
-"""The fields of StepHeader, and the number of messages."""
+"""Header of a STEP frame: the fields of StepHeader, and the number of messages."""
 _ANSWER = struct.Struct("<QI")
-"""Tick, and number of messages."""
+"""Header of an ANSWER frame: tick, and number of messages."""
 _MESSAGE = struct.Struct("<II")
-"""Number of the topic, and size of the message in bytes."""
+"""Header of a message: number of the topic, and size of the message in bytes."""
 
 if TYPE_CHECKING:
     Messages = list[tuple[int, bytes]]  # each message is the number of its topic, and its bytes (CDR)
@@ -47,9 +45,9 @@ class Malformed(ValueError):
 
 
 class StepHeader(NamedTuple):
-    """Header of a STEP: the tick, and the simulated time `sec` + `nanosec`.
+    """Header of a STEP frame: the tick (physics step), and the simulated time `sec` + `nanosec`.
 
-    `deadline` is the wall time in milliseconds that the answer may take. `flags` is 0 or COMMAND_DUE.
+    `deadline` is the maximum wall time for the answer in milliseconds. `flags` is 0 or COMMAND_DUE.
     """
 
     tick: int
@@ -146,7 +144,7 @@ class Refused(RuntimeError):
 
 
 class Connection:
-    """Stream socket that sends and receives frames. It blocks, because the simulation waits for the answer anyway."""
+    """Blocking stream socket that sends and receives frames."""
 
     def __init__(self, stream: socket.socket) -> None:
         self._stream = stream

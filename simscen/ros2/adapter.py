@@ -33,16 +33,16 @@ SUBSCRIPTIONS = {
     "/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
     "/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
 }
-"""Topics that are received from the nodes besides /cmd_vel, and their types."""
+"""Topics that the adapter receives from the nodes in addition to /cmd_vel, and their types."""
 THROUGH_POSES = "navigate_through_poses"
 STOP = (0.0,) * 6
-"""Linear and angular velocity of a zero command."""
+"""Linear and angular velocity (x, y, z) of a zero command."""
 MAX_WAIT_FRACTION = 0.8
-"""Fraction of the wall time of a step after which waiting ends, so that the error reaches simscen in time."""
+"""Fraction of the maximum wall time of a step that the adapter waits for nodes."""
 
 
 class Adapter:
-    """The stack of one run: call `prepare` first, then `step` repeatedly, and `end`. `mode` is one of main.MODES."""
+    """ROS nodes as the stack of one run. Call `prepare` first, then `step` repeatedly, then `end`."""
 
     def __init__(
         self,
@@ -59,9 +59,10 @@ class Adapter:
 
         Args:
             topics: Topics of the robot that simscen can publish.
+            goals: Queue of goals.
             launched: The user's launch command; None if the user starts the nodes.
             period_s: Control period.
-            answer_limit_s: Wall time for the answer to a step once the graph is ready.
+            answer_limit_s: Maximum wall time for the answer to a step after the nodes are ready.
             filter_info: Messages that describe the zone masks among `topics`.
             restart_reason: Why the launch command was started a second time; empty the first time.
         """
@@ -99,17 +100,17 @@ class Adapter:
 
     @property
     def needed_topics(self) -> Set[str]:
-        """Topics that simscen must send: all that are published, and /tf_static if the user's nodes replace it."""
+        """Topics that the adapter needs from simscen: all that it publishes, and `_replaced_topics`."""
         return {*self._graph.publishers, *self._replaced_topics}
 
     @property
     def latest_start_s(self) -> float:
-        """Simulated time in s by which the graph must be ready."""
+        """Simulated time in s at which the nodes must be ready."""
         return self._bring_up.latest_start_s
 
     @property
     def _replaced_topics(self) -> Set[str]:
-        """/tf_static if the user's nodes publish it instead of simscen. It is still compared with simscen's."""
+        """/tf_static if the user's nodes publish it instead of simscen; otherwise empty."""
         return {TF_STATIC} & set(self._options.without)
 
     def _check_launched(self) -> None:
@@ -118,7 +119,7 @@ class Adapter:
             raise AdapterError(f"the launched command {self._launched.ended}: {self._launched.command}")
 
     def run_facts(self) -> Dict[str, Any]:
-        """Return facts about this run for its log and stack.json."""
+        """Return facts about the nodes and the synchronization for the run's log."""
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
         facts = {
             "sync": self._options.sync,
@@ -149,21 +150,20 @@ class Adapter:
         return facts
 
     def prepare(self) -> None:
-        """Wait before the first step until the graph is complete, or until it probably needs sensor data.
+        """Wait until all nodes are ready or probably need sensor data to become ready.
 
-        If the user's nodes replace /tf_static, the wait continues in the first step, which contains simscen's
-        /tf_static. Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
+        Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """
         if self._bring_up.prepare() and not self._replaced_topics:
             self._begin()
 
     def preempt(self, now: int, goal: Goal) -> None:
-        """Cancel the current goal, and send `goal` before the remaining ones. `now` is the time of the run in ns."""
+        """Cancel the current goal, and send `goal` before the remaining goals. `now` is simulated time in ns."""
         self._goals.preempt(goal)
         self._send(now)
 
     def cancel(self, now: int, everything: bool) -> None:
-        """Cancel the current goal, or all goals with `everything`. `now` is the time of the run in ns."""
+        """Cancel the current goal, or all goals with `everything`. `now` is simulated time in ns."""
         if self._sender is not None and self._goals.current is not None:
             self._sender.cancel(self._state(now), self._barrier)
         self._goals.cancel(everything)
@@ -171,9 +171,14 @@ class Adapter:
     def step(self, now: int, messages: Sequence[Message], is_command_due: bool, limit_s: float) -> List[Message]:
         """Perform one step of the run: publish `messages`, and return the messages of the nodes.
 
-        `now` is the time of the run in ns. `is_command_due` means that the robot needs a command now. The answer may
-        take `limit_s` of wall time, and at most `answer_limit_s` once the nodes are ready; the first steps wait until
-        they are. Raises AdapterError if the nodes do not become ready, or a required node fails.
+        The first steps wait until the nodes are ready. Raises AdapterError if they do not become ready, or if a
+        required node fails.
+
+        Args:
+            now: Simulated time in ns.
+            messages: Topics and serialized messages.
+            is_command_due: Whether the robot needs a velocity command now.
+            limit_s: Maximum wall time for the answer.
         """
         self._check_launched()
         limit_s = min(limit_s, self._answer_limit_s) if self.is_ready else limit_s
@@ -183,7 +188,7 @@ class Adapter:
             if topic in self._replaced_topics:
                 self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
-        messages = self._bring_up.keep_initial_pose(messages)
+        messages = self._bring_up.hold_initial_pose(messages)
         warming_up = now < self._options.warm_up * NANOSECONDS
         if not self.is_ready:
             warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
@@ -200,7 +205,7 @@ class Adapter:
         received = synchronized.step(now, messages, is_command_due, self._goals.current is not None)
         commanded = any(message.topic == COMMAND for message in received)
         # The order of messages on different topics is random.
-        answers = sorted((answer for message in received for answer in self._answers(message)), key=lambda a: a[0])
+        answers = sorted((each for message in received for each in self._process(message)), key=lambda each: each[0])
         if is_command_due or commanded:
             answers.append((COMMAND, write_twist(self._velocity)))
         if self.is_ready:
@@ -211,11 +216,11 @@ class Adapter:
         return answers
 
     def take_lines(self) -> List[LogLine]:
-        """Return the log lines of Nav2 since the last call, for /rosout of the run's log."""
+        """Return the log lines of Nav2's nodes since the last call."""
         return [] if self._report is None else self._report.take_lines()
 
     def _begin(self) -> None:
-        """Subscribe to the topics of the nodes, which are all ready now."""
+        """Subscribe to the topics of the nodes. Called when all nodes are ready."""
         self.is_ready = True
         self._bring_up.end()
         self._unused_masks = self._filter_info.unused_masks(
@@ -233,7 +238,7 @@ class Adapter:
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:
-        """Send the remaining goals. If they are rejected, the current goal has failed, and the next is sent."""
+        """Send the remaining goals. If they are rejected, report the current goal as failed and send the next one."""
         while self._sender is not None and self._goals.accept() is not None:
             batch = self._next_batch()
             self._sent = 1 if self._sender.takes_single_goals else len(batch)
@@ -244,10 +249,8 @@ class Adapter:
             self._goals.failed(failed.code, failed.message, go_on=self.continue_after_failure)
 
     def _next_batch(self) -> List[Goal]:
-        """Return the remaining goals up to the first one at which the robot must wait or stop, for one action.
-
-        The wait takes place between two actions, because Nav2's waypoint follower knows only its own waiting time.
-        """
+        """Return the goals of the next action: up to the first one at which the robot must wait or stop."""
+        # Nav2's waypoint follower has one waiting time for all goals. So the robot waits between two actions.
         assert self._goals.current is not None
         remaining = [self._goals.current, *self._goals.waiting]
         stops = (k for k, goal in enumerate(remaining) if goal.wait or (self.mode == THROUGH_POSES and not goal.via))
@@ -273,8 +276,8 @@ class Adapter:
         is_stopped = all(abs(number) < 1e-3 for number in self._velocity)
         return StackState(now, is_stopped, self._estimate.pose)
 
-    def _answers(self, message: ReceivedMessage) -> List[Message]:
-        """Process a message of the nodes. Return it for simscen, unless it is a command or irrelevant."""
+    def _process(self, message: ReceivedMessage) -> List[Message]:
+        """Process a message of the nodes. Return the messages to send to simscen: none for a command."""
         if message.topic == COMMAND:
             self._velocity = read_twist(message.data, message.type == TWIST_STAMPED_TYPE)
             return []
@@ -284,7 +287,7 @@ class Adapter:
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
-        """Report a new plan as an event. Its reason is guessed: the graph does not contain it."""
+        """Report a new plan as an event: of the reason "goal" for the first plan to a goal, otherwise "rate"."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return
@@ -294,12 +297,12 @@ class Adapter:
         self._goals.report("plan.made", goal.name, reason=reason, length=round(length, 6))
 
     def _with_frames(self, topic: str, data: bytes) -> bytes:
-        """Return the serialized message with the names that frames have in the graph."""
+        """Return the serialized message with the frame names of the user's graph."""
         publisher = self._graph.publishers.get(topic)
         return data if publisher is None else self._frames.apply(topic, publisher.msg_type, data)
 
     def end(self) -> None:
-        """Leave the graph, and end the launch command with all of its processes."""
+        """Leave the graph, and end all processes of the launch command."""
         self._graph.close()
         if rclpy.ok():
             rclpy.shutdown()

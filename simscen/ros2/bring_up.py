@@ -1,9 +1,8 @@
 """Wait until all nodes of the stack are ready, and publish sensor data meanwhile if they need it.
 
-Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits for
-odom -> base_link, a planner for the pose on the map. `BringUp.prepare` first waits without sensor data, which is enough
-for other nodes. If nodes are missing or inactive afterwards, `BringUp.wait` publishes the readings of the first step
-repeatedly. ROS time advances meanwhile, but the time of the run does not (`Graph.offset_ns` is the difference).
+Some nodes become active only if sensor data arrive and time advances. For example, Nav2's costmaps wait for
+odom -> base_link. `BringUp.prepare` first waits without sensor data. Then `BringUp.wait` publishes the readings of the
+first step repeatedly, if necessary. Meanwhile, ROS time advances, but simulated time does not.
 """
 
 import math
@@ -26,13 +25,13 @@ PREPARE_S = 10.0
 PREPARE_SETTLE_S = 2.0
 """Wall time without new nodes, in addition to `--settle`, after which nodes probably wait for sensor data."""
 CHECK_PERIOD_S = 0.25
-"""Wall time between two checks of the graph. More checks would slow down nodes that are starting."""
+"""Wall time between two checks of the graph."""
 FIRST_SCAN_S = 2.0
-"""Maximum simulated time, at real-time speed, to wait for the first scan of each lidar."""
+"""Maximum simulated time until the first scan of each lidar."""
 
 
 class BringUp:
-    """Waits for the nodes of a run, and keeps the latest readings to publish them until the nodes are ready."""
+    """Waits until the nodes of a run are ready, and publishes the latest readings meanwhile."""
 
     def __init__(
         self,
@@ -43,7 +42,13 @@ class BringUp:
         unavailable: Sequence[Topic],
         report: Optional[Nav2Report],
     ) -> None:
-        """`period_s` is the control period, `unavailable` topics without installed type; `report` is for Nav2 only."""
+        """Create the checks.
+
+        Args:
+            period_s: Control period.
+            unavailable: Topics whose message type is not installed.
+            report: Report about Nav2; None for other nodes.
+        """
         self._graph, self._readiness, self._options, self._period = graph, readiness, options, period_s
         self._unavailable, self._report = list(unavailable), report
         self._started_at = time.monotonic()
@@ -52,11 +57,11 @@ class BringUp:
 
     @property
     def latest_start_s(self) -> float:
-        """Simulated time in s by which the nodes must be ready."""
+        """Simulated time in s at which the nodes must be ready."""
         return max(self._options.warm_up, FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
 
     def prepare(self) -> bool:
-        """Wait before the first step; return whether all nodes are ready without sensor data.
+        """Wait without sensor data. Return whether all nodes are ready.
 
         Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """
@@ -82,37 +87,37 @@ class BringUp:
         return is_settled and not missing and not self._options.warm_up
 
     def keep(self, messages: Sequence[Message]) -> None:
-        """Keep the latest message of each topic, so that `wait` can publish it."""
+        """Keep the latest message of each topic for `wait`."""
         self._latest.update(messages)
 
-    def keep_initial_pose(self, messages: Sequence[Message]) -> List[Message]:
-        """Keep the initial pose until a node subscribes to it; return the other messages."""
+    def hold_initial_pose(self, messages: Sequence[Message]) -> List[Message]:
+        """Hold back the initial pose until a node subscribes to it. Return the other messages."""
         self._initial_pose = dict(messages).get(INITIAL_POSE, self._initial_pose)
         return [message for message in messages if message[0] != INITIAL_POSE]
 
     def due_initial_pose(self) -> List[Message]:
-        """Return the initial pose if it has not been returned yet and a node subscribes to it."""
+        """Return the held initial pose once a node subscribes to it, only once; otherwise an empty list."""
         if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
             return []
         pose, self._initial_pose = self._initial_pose, None
         return [(INITIAL_POSE, pose)]
 
     def lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
-        """Return whether to simulate on, at most until FIRST_SCAN_S, because a lidar has not measured yet.
+        """Return whether a lidar has not published its first scan yet. Always False without Nav2 or after FIRST_SCAN_S.
 
-        Nav2's AMCL needs a scan to publish map -> odom, so `wait` would not succeed without one. `now` is the time of
-        the run in ns, and `messages` are those of this step.
+        `now` is simulated time in ns. `messages` are the messages of this step.
         """
+        # Nav2's AMCL needs a scan to publish map -> odom.
         if not self._options.nav2 or now >= FIRST_SCAN_S * NANOSECONDS:
             return False
         known = {*self._latest, *(topic for topic, _ in messages)}
         return any(type_name == SCAN_TYPE and topic not in known for topic, type_name in self._graph.types.items())
 
     def wait(self, now: int, step_limit_s: float) -> None:
-        """Publish the latest readings with advancing ROS time until all nodes are ready; `now` is the run's time in ns.
+        """Publish the latest readings with advancing ROS time until all nodes are ready.
 
-        Raises AdapterError with what is missing after the wall time `--ready` or `step_limit_s`, and BringUpAborted if
-        the lifecycle manager of a launched Nav2 has given up.
+        `now` is simulated time in ns. Raises AdapterError if nodes are not ready after the wall time `--ready` or
+        `step_limit_s`. Raises BringUpAborted if the lifecycle manager of a launched Nav2 has given up.
         """
         remaining_s = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
         self._readiness.has_map = MAP in self._latest
@@ -153,11 +158,11 @@ class BringUp:
         print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
 
     def end(self) -> None:
-        """Forget the readings, because all nodes are ready."""
+        """Delete the kept readings."""
         self._latest.clear()
 
     def _reasons(self, missing: Sequence[str]) -> str:
-        """Return the message of the error for nodes that are not ready."""
+        """Return the error message for nodes that are not ready."""
         waited = time.monotonic() - self._started_at
         reasons = list(dict.fromkeys([*self._readiness.likely_causes(), *missing]))
         text = "; ".join(reasons) or "nodes keep appearing and disappearing"

@@ -15,10 +15,10 @@ class FrameNames:
     """Renames frames in the messages that simscen publishes, and gives the base frame a second name.
 
     Args:
-        renames: Texts `FRAME:=NAME`: simscen's name and the name in the user's graph, such as `lidar:=base_scan`.
+        renames: Texts `FRAME:=NAME`: simscen's name, and the name in the user's graph.
         second_base: Second name of the base frame, such as base_footprint; None for no second name.
 
-    Raises AdapterError if a rename is not of this form, or names a frame that cannot be renamed.
+    Raises AdapterError if a rename has another form, or if the frame cannot be renamed.
     """
 
     def __init__(self, renames: Sequence[str], second_base: Optional[str]) -> None:
@@ -35,7 +35,7 @@ class FrameNames:
         """The names of the base frame in the user's graph."""
 
     def apply(self, topic: str, message_type: Any, data: bytes) -> bytes:
-        """Return a serialized message with the user's frame names; to /tf_static, add the second base frame."""
+        """Return a serialized message with renamed frames. Adds the second base frame to /tf_static."""
         has_second_base = topic == TF_STATIC and len(self.bases) > 1
         if not has_second_base and not any(frame.encode() in data for frame in self._names):
             return data
@@ -57,7 +57,7 @@ class FrameNames:
             part.child_frame_id = self._names.get(part.child_frame_id, part.child_frame_id)
 
     def _second_base(self) -> Any:
-        """Return the transform from the base frame to its second name, which is the identity."""
+        """Return the identity transform from the base frame to its second name."""
         transform_type: Any = find_type("geometry_msgs/msg/TransformStamped")
         transform = transform_type()
         transform.header.frame_id, transform.child_frame_id = self.bases
@@ -66,9 +66,7 @@ class FrameNames:
 
 
 def transforms_first(messages: Iterable[Tuple[str, bytes]]) -> List[Tuple[str, bytes]]:
-    """Return the messages, pairs of topic and CDR, with those of /tf_static and /tf first, otherwise in the same order.
-
-    Some nodes, such as Nav2's collision monitor, wait in a callback until they can transform their newest scan.
-    Meanwhile, they do not answer the node barrier, and so the transform would never be published.
-    """
+    """Return the messages (topic, CDR) with transforms first, otherwise in the same order."""
+    # Nav2's collision monitor waits in a callback until it can transform its newest scan. Meanwhile, it does not answer
+    # the node barrier, so that a later transform would never be published.
     return sorted(messages, key=lambda message: message[0] not in (TF, TF_STATIC))

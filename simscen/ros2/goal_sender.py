@@ -21,7 +21,7 @@ ACTIONS = {
 STANDSTILL_NS = NANOSECONDS
 """Simulated time with zero commands after which a goal on /goal_pose counts as reached."""
 REJECTED, UNKNOWN = 1, 9000
-"""Error codes for a rejected goal and for an unknown reason, as in Nav2."""
+"""Error codes for a rejected goal and for an unknown error."""
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 """Values of action_msgs/msg/GoalStatus.status."""
 
@@ -41,7 +41,12 @@ Outcome = Union[GoalReached, GoalFailed]
 
 
 class StackState(NamedTuple):
-    """Time of the run in ns, whether the stack commands zero velocity, and the stack's own pose estimate, if known."""
+    """State of the stack in the current step.
+
+    now:         simulated time in ns
+    is_stopped:  whether the last command is zero
+    pose:        pose estimate of the stack; None if unknown
+    """
 
     now: int
     is_stopped: bool
@@ -51,9 +56,8 @@ class StackState(NamedTuple):
 class GoalPoseSender:
     """Publishes a pose on /goal_pose, as RViz does.
 
-    The stack does not report the end of such a goal. It counts as reached when the command has been zero for
-    STANDSTILL_NS while the stack's own estimate is within the tolerances of the goal. A stop elsewhere has no effect;
-    the goal then ends by its timeout.
+    The stack does not report the result of the goal. The goal counts as reached if the stack commands zero velocity for
+    STANDSTILL_NS while its pose estimate is within the tolerances of the goal. A stop elsewhere has no effect.
     """
 
     takes_single_goals = True
@@ -70,12 +74,12 @@ class GoalPoseSender:
         return self._graph.names(GOAL_POSE)
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent (no subscriber), or an empty list."""
+        """Return a reason why goals cannot be sent (no subscriber), or an empty list."""
         found = self._graph.subscribers_of(self.name)
         return [] if found else [f"no node takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
 
     def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[GoalFailed]:
-        """Send the first goal. This never fails."""
+        """Send the first goal. Always returns None."""
         from rclpy.serialization import serialize_message
 
         self._goal, self._stopped_since = goals[0], None
@@ -128,7 +132,7 @@ class ActionSender:
         return self.action == "navigate_to_pose"
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent (no action server), or an empty list."""
+        """Return a reason why goals cannot be sent (no action server), or an empty list."""
         if self._client.server_is_ready():
             return []
         return [f"no node takes goals: no action server {self.name} ({self.type})"]
@@ -184,6 +188,7 @@ class ActionSender:
         return [*self._passed_goals(state), *[GoalFailed(code, message)] * (len(self._goals) - self._passed)]
 
     def _missed_waypoints(self, result: Any) -> Dict[int, GoalFailed]:
+        """Return the failures in a result of FollowWaypoints by the index of the goal."""
         missed: Dict[int, GoalFailed] = {}
         for waypoint in getattr(result, "missed_waypoints", ()):
             index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
@@ -192,10 +197,8 @@ class ActionSender:
         return missed
 
     def _passed_goals(self, state: StackState) -> List[Outcome]:
-        """Return the outcomes of the goals that the robot has passed since the last call, according to the feedback.
-
-        The feedback of FollowWaypoints does not tell reached goals from missed ones, so the pose estimate decides.
-        """
+        """Return the outcomes of the goals that the robot has passed since the last call, according to the feedback."""
+        # The feedback of FollowWaypoints is the same for reached and missed goals, so that the pose estimate decides.
         found: List[Outcome] = []
         for goal in self._goals[self._reported : self._passed]:
             arrived = state.pose is not None and _within_tolerance(goal, state.pose)
@@ -217,7 +220,7 @@ GoalSender = Union[GoalPoseSender, ActionSender]
 
 
 class GoalSenders:
-    """Chooses how goals are sent: as the option --goals requests, or for `auto`, by NavigateToPose or /goal_pose."""
+    """Goal senders that the option --goals allows: for `auto`, NavigateToPose and /goal_pose."""
 
     def __init__(self, graph: Graph, requested: str) -> None:
         self._senders: List[GoalSender] = []
@@ -233,7 +236,7 @@ class GoalSenders:
         return next((sender for sender in self._senders if not sender.missing()), None)
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent, or an empty list."""
+        """Return a reason why goals cannot be sent, or an empty list."""
         if self.usable is not None:
             return []
         reasons = [sender.missing()[0] for sender in self._senders]
@@ -241,7 +244,7 @@ class GoalSenders:
 
 
 def pose_stamped(goal: Goal, now: int) -> Any:
-    """Return the goal as geometry_msgs/msg/PoseStamped in the map frame; the stamp is `now` in ns."""
+    """Return the goal as geometry_msgs/msg/PoseStamped in the map frame, with the stamp `now` in ns."""
     message: Any = find_type(POSE_TYPE)()  # type: ignore[misc]
     message.header.frame_id = "map"
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, NANOSECONDS)

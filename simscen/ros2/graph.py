@@ -1,8 +1,8 @@
-"""simscen's own ROS node: it publishes and receives serialized (CDR) messages, and lists the other nodes of the graph.
+"""simscen's own ROS node, which publishes and receives serialized (CDR) messages, and lists the other nodes.
 
-ROS time may be ahead of the time of the run, because it advances while the run waits for nodes to become ready.
-`Graph.offset_ns` is the difference. It is added to the stamps of published messages and subtracted from those of
-received messages.
+ROS time may be ahead of simulated time, because it advances while the run waits for nodes to become ready.
+`Graph.offset_ns` is the difference. The graph adds it to the stamps of published messages, and subtracts it from the
+stamps of received messages.
 """
 
 import time
@@ -27,16 +27,16 @@ LATCHED = frozenset(
     )
 )
 """Topics that are published with transient local durability, so that later subscribers receive the last message."""
-DEPTH = {"/tf": 100, "/imu": 100}
-"""Queue lengths of topics with a high rate, for slow subscribers."""
-DEFAULT_DEPTH = 10
-"""Queue length of other topics that are not latched."""
+QUEUE_DEPTHS = {"/tf": 100, "/imu": 100}
+"""QoS history depths of topics with a high rate."""
+DEFAULT_QUEUE_DEPTH = 10
+"""QoS history depth of other topics that are not latched."""
 Node = Tuple[str, str]
 """Name and namespace of a node."""
 
 
 class ReceivedMessage(NamedTuple):
-    """A message of the nodes: topic of the stack protocol, name of the type, and CDR."""
+    """A message from the nodes: topic of the stack protocol, name of the type, and CDR."""
 
     topic: str
     type: str
@@ -44,14 +44,14 @@ class ReceivedMessage(NamedTuple):
 
 
 class Topic(NamedTuple):
-    """A topic of the stack protocol, which may have another name in the graph, and its type."""
+    """A topic of the stack protocol, and its type. The topic may have another name in the graph."""
 
     name: str
     type: str
 
 
 class Endpoint(NamedTuple):
-    """A publisher or a subscription of another node: full name of the node, type, and QoSProfile."""
+    """A publisher or a subscription of another node: full name of the node, message type, and QoSProfile."""
 
     node: str
     type: str
@@ -62,7 +62,10 @@ STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
 class Graph:
-    """simscen's node in one ROS domain. A `topic` is one of the protocol; a `name` is that of a topic in the graph."""
+    """simscen's node in one ROS domain.
+
+    Parameters `topic` are topics of the stack protocol. Parameters `name` are names of topics in the graph.
+    """
 
     def __init__(self, names: TopicNames, check_alive: Callable[[], None]) -> None:
         """`check_alive` is called repeatedly while waiting, and may raise an exception to end the wait."""
@@ -89,7 +92,7 @@ class Graph:
         return True
 
     def publish(self, topic: str, data: bytes) -> bool:
-        """Publish CDR on a topic; return whether it has subscribers. Does nothing if it is not advertised."""
+        """Publish CDR, and return whether the topic has subscribers. Does nothing if the topic is not advertised."""
         publisher = self.publishers.get(topic)
         if publisher is None:
             return False
@@ -97,7 +100,7 @@ class Graph:
         return bool(publisher.get_subscription_count())
 
     def publish_clock(self, now: int) -> None:
-        """Publish the ROS time that belongs to the time `now` of the run in ns."""
+        """Publish ROS time on /clock: the simulated time `now` in ns plus `offset_ns`."""
         self.publish(CLOCK, write_clock(now + self.offset_ns))
 
     def subscribe(self, topic: str, type_name: str) -> None:
@@ -117,7 +120,7 @@ class Graph:
         self._subscriptions[topic] = (type_name, subscription)
 
     def subscribe_to_status(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
-        """Call `callback` with each GoalStatusArray of an action; return its server, None unless there is one."""
+        """Call `callback` with each GoalStatusArray of an action. Return the action server's node, or None."""
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
@@ -206,18 +209,18 @@ def _endpoints(infos: List[Any]) -> List[Endpoint]:
 
 
 def publisher_qos(topic: str) -> QoSProfile:
-    """Return the QoS profile with which simscen publishes a topic. Every subscription accepts its reliability."""
+    """Return the QoS profile with which simscen publishes a topic."""
     latched = topic in LATCHED
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=1 if latched else DEPTH.get(topic, DEFAULT_DEPTH),
+        depth=1 if latched else QUEUE_DEPTHS.get(topic, DEFAULT_QUEUE_DEPTH),
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
 
 
 def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
-    """Return a QoS profile that matches all publishers: reliable or transient local only if all of them are."""
+    """Return a QoS profile that is compatible with all `publishers`."""
     profiles = [publisher.qos_profile for publisher in publishers]
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
     latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
@@ -230,10 +233,7 @@ def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
 
 
 def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> List[Tuple[str, str, str]]:
-    """Return the QoS policies that keep a subscription from receiving anything from a publisher.
-
-    Each is (policy, value that the publisher offers, value that the subscription requests).
-    """
+    """Return the incompatible QoS policies of a publisher and a subscription, as (policy, offered, requested)."""
     found = []
     if requested.reliability == ReliabilityPolicy.RELIABLE and offered.reliability == ReliabilityPolicy.BEST_EFFORT:
         found.append(("reliability", "best effort", "reliable"))

@@ -1,8 +1,8 @@
 """Run the user's launch command, and end all processes that it started, even if the adapter is killed.
 
-LaunchedCommand runs this file as a program, `python launch.py COMMAND`. The program runs the command in a shell and in
-a session of its own. When the command ends, or standard input closes because the adapter has ended, it sends SIGINT to
-all descendants, as Ctrl-C does, then SIGTERM, then SIGKILL.
+LaunchedCommand runs this file as a program, `python launch.py COMMAND`. The program runs the command in a shell. When
+the command ends or the adapter closes standard input, the program sends SIGINT to all descendants, then SIGTERM, then
+SIGKILL.
 """
 
 import contextlib

@@ -22,9 +22,9 @@ DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
 """Nav2 actions by which a scenario can request that goals are sent."""
 PROTOCOL_TOPICS = {published: topic for topic, published in MASKS.items()}
-"""Topics of the protocol by the topics under which the adapter publishes them."""
+"""Topics of zone masks in the stack protocol, by the topics under which the adapter publishes them."""
 READY_MARGIN_S = 15.0
-"""Wall time that the first answer may take in addition to `--ready`, to finish the last check and the first period."""
+"""Wall time that the first answer may take in addition to `--ready`."""
 
 
 def main(values: Dict[str, Any]) -> int:
@@ -45,24 +45,24 @@ def main(values: Dict[str, Any]) -> int:
 
 
 class Hello(NamedTuple):
-    """The content of HELLO, simscen's first frame, that the adapter uses."""
+    """Content of HELLO, the first frame from simscen."""
 
     topics: Dict[int, Tuple[str, str]]
-    """Name and type of each topic that simscen can send for the robot, by its number in the protocol."""
+    """Names and types of the topics that simscen can send for the robot, by topic number."""
     stack_topics: Dict[str, int]
-    """Number of each topic that the adapter can send."""
+    """Numbers of the topics that the adapter can send, by name."""
     period_s: float
     """Control period."""
     mode: str
-    """Nav2 action by which the scenario requests to send goals, one of MODES."""
+    """Nav2 action that the scenario requests, one of MODES."""
     zone_masks: List[Dict[str, Any]]
-    """Meaning of the values of each zone mask (keys `topic`, `filter`, `percent`, `base`, `multiplier`)."""
+    """Descriptions of the zone masks (keys `topic`, `filter`, `percent`, `base`, `multiplier`)."""
     answer_limit_s: float
-    """Wall time for an answer once the nodes are ready."""
+    """Maximum wall time for an answer after the nodes are ready."""
 
     @classmethod
     def receive(cls, connection: Connection) -> "Hello":
-        """Receive HELLO. Raises AdapterError for another frame, or another version of the protocol."""
+        """Receive HELLO. Raises AdapterError for another frame or another version of the protocol."""
         kind, body = connection.receive()
         if kind != wire.HELLO:
             raise AdapterError(f"a frame of kind {kind} instead of HELLO")
@@ -84,17 +84,22 @@ class Hello(NamedTuple):
 
 
 class ReceivedStep(NamedTuple):
-    """The content of a STEP frame: time of the run in ns, messages (topic, CDR), and wall time for the answer."""
+    """Content of a STEP frame.
+
+    now:             simulated time in ns
+    messages:        topics and CDR
+    is_command_due:  whether the robot needs a velocity command now
+    limit_s:         maximum wall time for the answer
+    """
 
     now: int
     messages: List[Tuple[str, bytes]]
     is_command_due: bool
-    """Whether the robot needs a command now."""
     limit_s: float
 
 
 class AdapterRun:
-    """Context manager with the ROS domain, the launch command, and the adapter of one run. Leaving it ends them."""
+    """ROS domain, launch command, and adapter of one run, as a context manager that ends all of them."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -169,10 +174,8 @@ class AdapterRun:
                 self._process_frame(kind, wire.from_json(body), now)
 
     def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
-        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it and repeat all steps.
-
-        On a busy machine, Nav2's lifecycle manager gives up when a single response is lost.
-        """
+        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it and repeat all steps."""
+        # On a busy machine, Nav2's lifecycle manager gives up when a single response is lost.
         if self._adapter.is_ready:
             return list(self._adapter.step(*step))
         end = time.monotonic() + step.limit_s
@@ -194,7 +197,7 @@ class AdapterRun:
             self._steps_until_ready.append(step)
 
     def _options_for(self, mode: str) -> Options:
-        """Return the options with the scenario's mode as `goals`. Raises AdapterError if `--goals` contradicts it."""
+        """Return the options with `mode` as `goals`. Raises AdapterError if `--goals` contradicts the mode."""
         requested = self._options.goals
         if mode in (DEFAULT_MODE, requested):
             return self._options
@@ -215,13 +218,13 @@ class AdapterRun:
     def _number_messages(
         self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
     ) -> "List[Tuple[int, bytes]]":
-        """Return the `received` messages and the events of goals, with the numbers of their topics."""
+        """Return the `received` messages and the goal events, with topic numbers instead of names."""
         out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
     def _set_environment(self) -> None:
-        """Claim a ROS domain, and set the environment of this process, which the nodes inherit."""
+        """Claim a ROS domain, and set the environment variables of this process and its nodes."""
         options, environment = self._options, dict(os.environ)
         domain = self._claim_domain(options, environment)
         self._cleanup.append(domain.release)
@@ -233,7 +236,7 @@ class AdapterRun:
 
     @staticmethod
     def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:
-        """Claim the requested domain, a free one for a launch command, or the one in which the user's nodes run."""
+        """Claim the requested domain. By default, claim a free domain for a launch command, else the user's domain."""
         if options.domain is not None or options.launch:
             return claim_domain(options.domain, environment)
         return claim_domain(int(environment.get("ROS_DOMAIN_ID") or 0), environment)

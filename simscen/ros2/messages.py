@@ -1,4 +1,4 @@
-"""Find installed message types, read and write a few messages as CDR bytes, and compute with 2D poses."""
+"""Helpers for message types, a few messages as CDR bytes, and 2D poses."""
 
 import functools
 import importlib
@@ -32,14 +32,14 @@ def find_type(name: str) -> Optional[Any]:
 
 
 def read_header(message: bytes) -> Tuple[int, str]:
-    """Return stamp in ns and frame of a serialized message that begins with a std_msgs/Header."""
+    """Return the stamp in ns and the frame of a serialized message that begins with a std_msgs/Header."""
     order = _byte_order(message)
     seconds, nanoseconds, size = struct.unpack_from(order + "iII", message, 4)
     return seconds * NANOSECONDS + nanoseconds, message[16 : 16 + size - 1].decode("utf-8", "replace")
 
 
 def read_twist(message: bytes, is_stamped: bool) -> Tuple[float, ...]:
-    """Return linear x, y, z in m/s and angular x, y, z in rad/s of a serialized Twist or TwistStamped."""
+    """Return linear x, y, z in m/s and angular x, y, z in rad/s of a serialized Twist (or TwistStamped)."""
     order, start = _byte_order(message), 4
     if is_stamped:
         (size,) = struct.unpack_from(order + "I", message, 12)

@@ -1,13 +1,11 @@
 """Barrier that waits until all nodes have processed the messages that the adapter published.
 
-The barrier requests a parameter of each node. Executors of rclcpp and rclpy serve timers, subscriptions and services in
-this order, and a node serves its parameters in the executor that also calls its other callbacks. So a node that answers
-has processed all messages that reached it before the request. If such a message has a further effect, for example if a
-new /clock makes a timer due, the effect has taken place at the answer to the next request. A *round* sends a request to
-all nodes at once, and waits for all answers.
+In a *round*, the barrier requests a parameter from all nodes at once and waits for all answers. The executor of a node
+serves timers, subscriptions, and services in this order. A node that answers has therefore processed all messages that
+it received before the request. If a message makes a timer due (/clock), the timer has run after the next round.
 
-Only nodes that answered before the run take part in the rounds. They are *in step*. Others are left out, such as client
-nodes that Nav2's behavior tree spins only occasionally.
+Only nodes that answered before the run take part in rounds; they are *in step*. Other nodes are left out, such as
+client nodes that Nav2's behavior tree spins only occasionally.
 """
 
 import time
@@ -20,9 +18,9 @@ from simscen.ros2.step_time import StepTime
 
 PARAMETER_SERVICE = "rcl_interfaces/srv/GetParameters"
 POLL_S = 0.5
-"""Wall time that a poll before the run waits for the answers of nodes, which may be busy."""
+"""Maximum wall time that a poll before the run waits for answers."""
 SILENT_AFTER_S = 3.0
-"""Wall time without an answer after which the run does not wait for a node that is not required."""
+"""Wall time without an answer after which a node is left out, unless it is required."""
 DISAPPEAR_TIMEOUT_S = 1.0
 """Wall time that the service of a node may be missing from the graph before the node counts as exited."""
 
@@ -33,7 +31,7 @@ class _Request(NamedTuple):
 
 
 class ServicePoll:
-    """Calls the same service of several nodes repeatedly, without being blocked by nodes that do not answer."""
+    """Repeated calls of the same service of several nodes. Nodes that do not answer do not block other nodes."""
 
     def __init__(self, graph: Graph, service_type: str, service: str, **request: Any) -> None:
         self._graph, self._service = graph, service
@@ -46,7 +44,7 @@ class ServicePoll:
         """Answers of the nodes that answered during the last `ask`."""
 
     def track(self, nodes: Iterable[Node]) -> None:
-        """Call exactly these nodes from now on."""
+        """Replace the set of nodes to call."""
         tracked = set(nodes)
         for node in [node for node in self.clients if node not in tracked]:
             self.forget(node)
@@ -77,7 +75,7 @@ class ServicePoll:
         return not self._waiting
 
     def waiting_s(self, node: Node) -> float:
-        """Return the wall time since the first `ask` that a node has not answered."""
+        """Return the wall time in s for which a node has not answered; 0 if it has answered."""
         return time.monotonic() - self._waiting[node].since if node in self._waiting else 0.0
 
 
@@ -103,13 +101,13 @@ class NodeBarrier:
 
     @property
     def not_in_step(self) -> List[str]:
-        """Full names of the nodes for which no round waits, sorted."""
+        """Full names of the nodes that are left out of rounds, sorted."""
         return sorted([*self.without_parameters, *self.left_out])
 
     def poll(self) -> List[str]:
-        """Send a request to all nodes of the graph; return for which of them the run must still wait, one text each.
+        """Send a request to all nodes of the graph. Return a text for each node that has not answered.
 
-        A node that is not required and does not answer for SILENT_AFTER_S is left out.
+        Nodes that are not required are left out after SILENT_AFTER_S without an answer.
         """
         nodes = self._graph.nodes()
         serving = [node for node in nodes if self._graph.service_type(node, "get_parameters") is not None]
@@ -136,7 +134,7 @@ class NodeBarrier:
         return {full_name(node): answer.values[0].bool_value for node, answer in answers if answer.values}
 
     def begin(self) -> None:
-        """Begin the run: all rounds wait for the nodes that answered the last poll."""
+        """Begin the run. All rounds wait for the nodes that answered the last poll."""
         required = self.required()  # a node that exits later is still required, though the graph forgets it
         self.required = lambda: required
         for node in [node for node in self._poll.clients if node not in self._poll.answers]:
@@ -145,8 +143,8 @@ class NodeBarrier:
     def round(self) -> None:
         """Wait until every node in step has processed the messages sent to it.
 
-        If nodes do not answer, raises AdapterError with their names if they are required, and otherwise leaves them out
-        of further rounds.
+        Raises AdapterError if a required node does not answer. Other nodes that do not answer are left out of further
+        rounds.
         """
         clients = self._poll.clients
         absent = [node for node in clients if not clients[node].service_is_ready()]
@@ -170,7 +168,7 @@ class NodeBarrier:
             self.left_out.append(full_name(node))
 
     def wait(self, future: Any, problem: str) -> None:
-        """Wait until `future` is done. Raises AdapterError if that takes too long; `problem` begins its message."""
+        """Wait until `future` is done. Raises AdapterError with the message `problem` if that takes too long."""
         limit = min(self._limit, self.step_time.remaining)
         if not self._graph.spin_until(future.done, limit):
             raise AdapterError(f"{problem} for {limit:.3g} s")

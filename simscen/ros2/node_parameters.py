@@ -12,24 +12,24 @@ if TYPE_CHECKING:
     from simscen.ros2.node_barrier import NodeBarrier
 
 FIELDS = ("bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
-"""Fields of rcl_interfaces/msg/ParameterValue in the order of ParameterType, from PARAMETER_BOOL = 1."""
+"""Prefixes of the fields of rcl_interfaces/msg/ParameterValue, in the order of ParameterType from PARAMETER_BOOL on."""
 STRING_ARRAY = 9
 """ParameterType.PARAMETER_STRING_ARRAY."""
 
 
 class NodeParameters:
-    """Reads parameters by the services of the nodes. For a node that does not answer in time, results are empty."""
+    """Reads parameters of nodes by their parameter services. Results are empty if a node does not answer in time."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
 
     def names(self, node: str) -> list[str]:
-        """Return the names of all parameters of the node with this full name, sorted."""
+        """Return the names of all parameters of a node, sorted. `node` is the full name of the node."""
         answer = self._call(node, "ListParameters", "list_parameters")
         return [] if answer is None else sorted(answer.result.names)
 
     def values(self, node: str, names: Sequence[str]) -> dict[str, Any]:
-        """Return the values of these parameters of the node with this full name, as JSON values."""
+        """Return the values of the parameters `names` of a node as JSON values. `node` is the full name of the node."""
         answer = self._call(node, "GetParameters", "get_parameters", names=list(names)) if names else None
         return {} if answer is None else dict(zip(names, map(plain_value, answer.values)))
 
@@ -43,7 +43,7 @@ class NodeParameters:
 
 
 def plain_value(value: Any) -> Any:
-    """Return an rcl_interfaces/msg/ParameterValue as a JSON value: nan and inf as text, None if it is not set."""
+    """Return an rcl_interfaces/msg/ParameterValue as a JSON value: text for nan and inf, None if it is not set."""
     if value.type == 0:
         return None
     field = "string_array" if value.type == STRING_ARRAY else FIELDS[value.type - 1]

@@ -1,7 +1,6 @@
-"""Options and errors of `simscen ros2`, and what follows from the options: topic names and the ROS domain of a run.
+"""Options and errors of `simscen ros2`, names of topics, and the ROS domain of a run.
 
-A run has a ROS_DOMAIN_ID that no other run of this user on this machine uses at the same time. To ensure this, a run
-locks the file of its domain. The kernel releases the lock when the process ends.
+Each run locks the file of its ROS_DOMAIN_ID, so that no other run of this user on this machine uses the same domain.
 """
 
 import fcntl
@@ -13,7 +12,7 @@ from typing import IO, Any, Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 
 class AdapterError(Exception):
-    """The run cannot continue; the message says what is wrong and what to do."""
+    """The run cannot continue. The message states the problem and its solution."""
 
 
 class BringUpAborted(AdapterError):
@@ -25,7 +24,17 @@ class BringUpAborted(AdapterError):
 
 
 class Options(NamedTuple):
-    """Options of `simscen ros2`; see its --help. Times are in s."""
+    """Options of `simscen ros2`. Times are in s.
+
+    without:  topics that simscen does not publish
+    frame:    renamed frames, `FRAME:=NAME`
+    rounds:   extra rounds of the node barrier if no command has arrived; 0 = one per node
+    wait:     maximum wall time to wait for a command
+    warm_up:  simulated time before goals are sent
+    ready:    maximum wall time until the nodes are ready
+    settle:   wall time for which the graph must be unchanged before the run
+    answer:   maximum wall time to wait for an answer of a node
+    """
 
     launch: Optional[str] = None
     domain: Optional[int] = None
@@ -50,14 +59,14 @@ class Options(NamedTuple):
 
 
 GLOBAL_TOPICS = ("/clock",)
-"""Topics that are not moved to the namespace, because nodes of all namespaces use the same clock."""
+"""Topics that are not moved to the namespace."""
 
 
 class TopicNames:
     """Callable that maps topics of the stack protocol to their names in the graph.
 
-    A remapping has the form `/scan:=/front/scan`. A target without a leading slash is relative to the namespace. Topics
-    without a remapping, except /clock, are moved to the namespace. Raises AdapterError for a remapping of another form.
+    Remappings have the form `/scan:=/front/scan`. A new name without a leading slash is relative to the namespace.
+    Topics without a remapping are moved to the namespace, except /clock. Raises AdapterError for an invalid remapping.
     """
 
     def __init__(self, namespace: str, remappings: Iterable[str]) -> None:
@@ -80,11 +89,11 @@ class TopicNames:
 ROBOT_VARIABLE = "SIMSCEN_ROBOT"
 """Environment variable with the name of the robot; set if the scenario has several robots."""
 DOMAINS = range(1, 102)
-"""ROS domains for runs. 0 is the default of all ROS users, and above 101, ports may be ephemeral ports of Linux."""
+"""ROS domains for runs. 0 is the default domain. Ports of domains above 101 may be ephemeral ports of Linux."""
 
 
 class Domain(NamedTuple):
-    """A ROS domain that is reserved for this run until `release` or the end of the process."""
+    """A ROS domain that is reserved for this process until `release`."""
 
     number: int
     lock: IO[str]
@@ -95,7 +104,7 @@ class Domain(NamedTuple):
 
 
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
-    """Reserve the domain `requested`, or for None the first free one. Raises AdapterError if it is in use."""
+    """Reserve the domain `requested`; None reserves the first free domain. Raises AdapterError if it is in use."""
     folder = _lock_folder(environment)
     for number in DOMAINS if requested is None else (requested,):
         lock = (folder / f"{number}.lock").open("a+")
@@ -119,7 +128,7 @@ def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Do
 
 
 def _lock_folder(environment: Mapping[str, str]) -> Path:
-    """Return the folder of the lock files, which is the same in all sessions of a user."""
+    """Return the folder of the user's lock files."""
     runtime = environment.get("XDG_RUNTIME_DIR")
     if not runtime or not os.access(runtime, os.W_OK):
         runtime = str(Path(tempfile.gettempdir(), f"simscen-{os.getuid()}"))
@@ -131,7 +140,7 @@ def _lock_folder(environment: Mapping[str, str]) -> Path:
 
 
 def ros_environment(domain: int, log_folder: str, environment: Mapping[str, str]) -> Mapping[str, str]:
-    """Return the environment variables of the adapter and its nodes: the ROS domain, restricted to this machine."""
+    """Return environment variables that restrict the adapter and its nodes to a ROS domain on this machine."""
     env = dict(environment, ROS_DOMAIN_ID=str(domain), ROS_LOG_DIR=log_folder)
     # simscen's virtual environment would hide the Python that has rclpy from the user's commands.
     env["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", os.defpath)])

@@ -1,4 +1,4 @@
-"""Derive the stack's own estimate of the robot's pose, and its newest plan, from messages."""
+"""Pose estimate and newest plan of the stack, derived from messages."""
 
 from typing import Any, List, Optional, Tuple
 
@@ -12,10 +12,10 @@ PLAN = "/plan"
 
 
 class PoseEstimate:
-    """Pose estimate and plan of the stack, from the messages that simscen and the nodes publish.
+    """Pose estimate and newest plan of the stack.
 
-    The pose is the first of these that is available: map -> odom of /tf composed with odometry; /amcl_pose; the initial
-    pose composed with odometry.
+    The pose estimate is map -> odom of /tf composed with odometry. If the transform is missing, the estimate is
+    /amcl_pose, or else the initial pose composed with odometry.
     """
 
     def __init__(self) -> None:
@@ -38,14 +38,14 @@ class PoseEstimate:
         return None
 
     def take_published(self, topic: str, data: bytes) -> None:
-        """Process a message that simscen publishes."""
+        """Process a message from simscen."""
         if topic == "/odom":
             self._odometry = _pose(_read("nav_msgs/msg/Odometry", data).pose.pose)
         elif topic == "/initialpose":
             self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
 
     def take_received(self, message: ReceivedMessage) -> bool:
-        """Process a message of the nodes; return False for a /tf without map -> odom, which is irrelevant.
+        """Process a message from the nodes. Return False for a message on /tf without map -> odom, else True.
 
         Raises AdapterError for a pose or plan in another frame than `map`.
         """

@@ -1,4 +1,4 @@
-"""Check whether the nodes of the user's graph are ready for a run, and describe what is missing or does not match."""
+"""Checks of whether the nodes of the user's graph are ready for a run."""
 
 from typing import Any, Iterable, List, Optional, Sequence, Set, Tuple
 
@@ -22,7 +22,7 @@ SHARED_TOPICS = ("/tf", "/tf_static", "/initialpose", GOAL_POSE)
 
 
 class Readiness:
-    """Checks of the graph that are repeated until nothing is missing. All checks return one text for each problem."""
+    """Checks of the ROS graph. Each check returns one text for each problem."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Readiness:
         options: Options,
         bases: Sequence[str],
     ) -> None:
-        """`topics` are those that simscen publishes. `bases` are the names of the base frame in the graph."""
+        """`topics` are published by simscen. `bases` are the names of the base frame in the graph."""
         self._graph, self._barrier, self._topics, self._senders = graph, barrier, list(topics), senders
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
@@ -48,23 +48,23 @@ class Readiness:
         self._user_transforms = self._nav2.user_transforms = transforms
 
     def no_nodes(self) -> List[str]:
-        """Return a problem if there is no other node."""
+        """Return a problem if the graph has no node except simscen's."""
         return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
 
     def missing(self) -> List[str]:
-        """Return everything that is missing or does not match now."""
+        """Return all problems that prevent the start of the run."""
         if self.no_nodes():
             return self.no_nodes()
         busy = self._barrier.poll()
-        found = self._commands() + self._senders.missing()
+        found = self._command_problems() + self._senders.missing()
         for topic in self._topics:
-            found += self._subscribers(topic) + self._other_publishers(topic)
+            found += self._incompatible_subscribers(topic) + self._other_publishers(topic)
         found += self._unused_sensors()
         found += self._user_transforms.missing() if self._user_transforms is not None else []
         if self._options.nav2:
             found += self._nav2.missing_nodes()
             found += [] if found else self._nav2.wrong_parameters()
-        return busy + found + self._wall_time() + self._inactive()
+        return busy + found + self._nodes_on_wall_time() + self._inactive_nodes()
 
     def likely_causes(self) -> List[str]:
         """Return problems that may prevent nodes from becoming active: no map, and wrong parameters of Nav2's nodes."""
@@ -94,7 +94,8 @@ class Readiness:
         """Return the type with which commands are published, Twist or TwistStamped."""
         return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
 
-    def _commands(self) -> List[str]:
+    def _command_problems(self) -> List[str]:
+        """Return problems of the publishers of /cmd_vel."""
         name = self._graph.names(COMMAND)
         ends = self._graph.publishers_of(name)
         if not ends:
@@ -113,8 +114,8 @@ class Readiness:
             return [f"{name} is published both as Twist and as TwistStamped: {listed}"]
         return []
 
-    def _subscribers(self, topic: Topic) -> List[str]:
-        """Return subscribers of a topic of simscen that receive nothing, because type or QoS do not match."""
+    def _incompatible_subscribers(self, topic: Topic) -> List[str]:
+        """Return subscribers that receive nothing, because the type or the QoS profile is incompatible."""
         name, found = self._graph.names(topic.name), []
         for end in self._graph.subscribers_of(name):
             if end.type != topic.type:
@@ -128,7 +129,7 @@ class Readiness:
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
-        """Return other nodes that publish a topic which only simscen should publish."""
+        """Return other nodes that publish a topic of simscen."""
         if topic.name in SHARED_TOPICS:
             return []
         name = self._graph.names(topic.name)
@@ -138,7 +139,10 @@ class Readiness:
         ]
 
     def _unused_sensors(self) -> List[str]:
-        """Return sensors without a subscriber if a node waits for the type on another topic, or if all have none."""
+        """Return sensors without a subscriber if a node waits for this type on another topic.
+
+        Otherwise, return a problem if no sensor has a subscriber.
+        """
         found = []
         sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY_TYPE))]
         for topic in sensors:
@@ -157,7 +161,7 @@ class Readiness:
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
-        """Return topic names and endpoints of these types, for topics that are not simscen's."""
+        """Return names of topics that are not simscen's, with their endpoints of these types."""
         own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
         for name, existing in sorted(self._graph.topics().items()):
@@ -165,7 +169,7 @@ class Readiness:
                 found += [(name, end) for end in endpoints_of(name) if end.type in types]
         return found
 
-    def _wall_time(self) -> List[str]:
+    def _nodes_on_wall_time(self) -> List[str]:
         if self._options.wall_time:
             return []
         return [
@@ -177,7 +181,7 @@ class Readiness:
     def _lifecycle_nodes(self) -> List[Tuple[str, str]]:
         return [node for node in self._graph.nodes() if self._graph.service_type(node, "get_state") == STATE_SERVICE]
 
-    def _inactive(self) -> List[str]:
+    def _inactive_nodes(self) -> List[str]:
         """Return the lifecycle nodes that are not active, or do not report their state."""
         if self._states is None:
             return []

@@ -1,7 +1,7 @@
 """Program of the adapter, `python start.py OPTIONS`, for the user's ROS Python. OPTIONS are the Options in JSON.
 
-simscen is not installed in that Python. So this program makes simscen's folder importable as the package `simscen`. Its
-`__init__.py` is not run, because it may need packages or a newer Python that are missing there.
+simscen is not installed in that Python. The program makes simscen's folder importable as the package `simscen`, without
+running its `__init__.py`.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Limit the wall time of one step of the run, and name the slowest nodes in the error when the limit is exceeded."""
+"""Limit of the wall time of one step of the run."""
 
 import math
 import time
@@ -7,20 +7,20 @@ from typing import Callable, Dict, Iterable
 from simscen.ros2.options import AdapterError
 
 MAX_LISTED_NODES = 3
-"""Maximum number of nodes that the error names."""
+"""Maximum number of slow nodes that the error message lists."""
 
 
 class StepTime:
     """Limits the total wall time of all waits in a step."""
 
     def __init__(self, spin_until: Callable[[Callable[[], bool], float], bool]) -> None:
-        """`spin_until` is Graph.spin_until."""
+        """`spin_until` handles events of the graph, as Graph.spin_until does."""
         self._spin_until = spin_until
         self._end, self._limit = math.inf, math.inf
         self._waited: Dict[str, float] = {}
 
     def begin(self, limit_s: float) -> None:
-        """Begin a step that may take `limit_s`."""
+        """Begin a step with the maximum wall time `limit_s`."""
         self._end, self._limit, self._waited = time.monotonic() + limit_s, limit_s, {}
 
     @property
@@ -29,9 +29,9 @@ class StepTime:
         return max(0.0, self._end - time.monotonic())
 
     def wait_for(self, awaited: Callable[[], Iterable[str]], limit_s: float) -> bool:
-        """Handle events until `awaited` returns no more nodes; return False if that takes longer than `limit_s`.
+        """Handle events until `awaited` returns no nodes. Return False if that takes longer than `limit_s`.
 
-        Raises AdapterError with the nodes that took longest if the time of the step is over.
+        Raises AdapterError with the slowest nodes if the time of the step is over.
         """
         start = time.monotonic()
         waiting = set(awaited())

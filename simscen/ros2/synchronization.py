@@ -1,21 +1,19 @@
-"""Perform one step of a run with the nodes: publish sensor data, advance ROS time, and collect the command.
+"""Synchronization of a run with the nodes: publish sensor data, advance ROS time, and collect velocity commands.
 
-**Lockstep.** The simulation waits while these steps are performed for a control period:
+**Lockstep.** In each control period, the simulation waits for these steps:
 
-1. Publish everything measured since the last period, message by message. After each message with a subscriber, run a
-   round of the node barrier, because a node may process two waiting messages in any order.
-2. Publish the time of the period on /clock.
-3. Run at least two rounds. In the first, the nodes receive the new time. After the second, the timers that became due
-   have run. Up to one more round per node follows until there is a command, so that it can pass through filter nodes.
-4. If there is still no command while the robot drives to a goal, wait for a short wall time, because nodes of rclcpp
-   receive /clock in a separate thread.
-5. If a Nav2 server executes an action that moves the robot, and its command is due, wait for the command, at most
-   `limit_s` of wall time. If it sends no command in the next simulated second either, the run ends with an error.
+1. Publish all messages since the last period. After each message, run a round of the node barrier: wait until all nodes
+   have processed the message.
+2. Publish the time on /clock.
+3. Run two rounds, so that nodes receive the time and run their timers. Run more rounds until a command arrives, at most
+   one per node.
+4. Without a command while the robot drives to a goal, wait for a short wall time.
+5. If a Nav2 server moves the robot and its command is due, wait for the command, at most `limit_s` of wall time. The
+   run ends with an error if no command arrives in the next simulated second either.
 
-The command of the period is the last one received. Without one, the robot keeps its previous command, as a real robot
-would, and the adapter counts the period. ROS time is always a multiple of the control period.
+Without a command, the robot keeps its previous command. ROS time is always a multiple of the control period.
 
-**Paced.** The simulation does not wait for the nodes: a period begins at its wall time, and the newest command counts.
+**Paced.** The simulation does not wait for the nodes. It runs at a fixed multiple of real time.
 """
 
 import time
@@ -30,16 +28,16 @@ from simscen.ros2.options import AdapterError
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED_TYPE
 
 Message = Tuple[str, bytes]
-"""Topic of the protocol, and the message in CDR."""
+"""Topic of the stack protocol, and the message in CDR."""
 
 
 class LockstepSynchronization:
-    """Steps in which the simulation waits for the nodes, as described above."""
+    """Synchronization in which the simulation waits for the nodes."""
 
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, actions: MotionActions, rounds: int, wait_s: float, limit_s: float
     ) -> None:
-        """Limit extra rounds (step 3) to `rounds` (0 = one per node), step 4 to `wait_s`, and step 5 to `limit_s`."""
+        """Set limits: extra rounds in step 3 (0 = one per node), wall time of step 4, and wall time of step 5."""
         self._graph, self._barrier, self._actions = graph, barrier, actions
         self._extra_rounds, self._wait, self._limit = rounds, wait_s, limit_s
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}
@@ -47,9 +45,10 @@ class LockstepSynchronization:
     def step(
         self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
     ) -> List[ReceivedMessage]:
-        """Publish `messages`, and return the messages of the nodes since the last step. `now` is in ns.
+        """Publish `messages`, and return the messages of the nodes since the last step.
 
-        Raises AdapterError, with the name of the node, if a command is missing.
+        `now` is simulated time in ns. `is_driving` states whether the robot drives to a goal. Raises AdapterError if a
+        node sends no commands.
         """
         graph, barrier = self._graph, self._barrier
         for topic, data in transforms_first(messages):
@@ -70,6 +69,8 @@ class LockstepSynchronization:
         return _take_inbox(graph)
 
     def _wait_for_due_command(self, now: int, start: int) -> None:
+        """Perform step 5. `start` is the index of the first message of this period in the inbox."""
+
         def late_server() -> List[str]:
             overdue = self._actions.overdue_command(now)
             commanded = overdue is None or _last_command(self._graph.inbox[start:]) is not None
@@ -94,7 +95,7 @@ class LockstepSynchronization:
 
 
 class PacedSynchronization:
-    """Steps in which the simulation runs at `factor` times real time, and does not wait for the nodes."""
+    """Synchronization in which the simulation runs at `factor` times real time, and does not wait for the nodes."""
 
     def __init__(self, graph: Graph, factor: float) -> None:
         self._graph, self._factor = graph, factor
@@ -104,7 +105,10 @@ class PacedSynchronization:
     def step(
         self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
     ) -> List[ReceivedMessage]:
-        """Wait for the wall time of the step, publish `messages`, and return those of the nodes. `now` is in ns."""
+        """Wait until the wall time of the step, publish `messages`, and return the messages of the nodes.
+
+        `now` is simulated time in ns.
+        """
         elapsed = now / NANOSECONDS / self._factor
         start = time.monotonic() - elapsed
         # After a delay, the rest of the run keeps its pace instead of catching up.

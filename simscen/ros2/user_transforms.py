@@ -1,4 +1,4 @@
-"""Check transforms that the user's nodes publish instead of simscen's /tf_static, such as a robot_state_publisher."""
+"""Check of transforms that the user's nodes publish instead of simscen's /tf_static, e.g. by robot_state_publisher."""
 
 from typing import Any, List, Set
 
@@ -17,10 +17,10 @@ PROFILES = {
 
 
 class UserTransforms:
-    """Collects the frames of the user's nodes, and finds those of simscen's /tf_static that are missing."""
+    """Collects the frames of the user's nodes, and finds frames of simscen's /tf_static that are missing."""
 
     def __init__(self, graph: Graph, names: FrameNames, replaced: bytes) -> None:
-        """Subscribe to the transforms. `replaced` is simscen's own message for /tf_static, which is not published."""
+        """Subscribe to the transforms. `replaced` is simscen's message for /tf_static, which is not published."""
         self._required: List[str] = []
         self._published: Set[str] = set()
         message_type: Any = find_type(TRANSFORMS_TYPE)

@@ -1,12 +1,11 @@
-"""Observe the actions of Nav2's servers, to find out which commands are overdue, and to report recoveries.
+"""Observer of the actions of Nav2's servers, which finds overdue velocity commands and reports recoveries.
 
-**Overdue commands.** A server must send commands while it executes an action that moves the robot. The control loops of
-Nav2 up to Jazzy run on wall time. So the simulation waits for due commands; otherwise it would run ahead of a
-controller that takes longer than a control period, for example MPPI on a slow machine.
+**Overdue commands.** A server must send commands while it executes an action that moves the robot. The simulation waits
+for them, because the control loops of Nav2 up to Jazzy run on wall time and may be slower than the simulation.
 
-**Recoveries.** A recovery is a behavior of Nav2's behavior server, or the clearing of a costmap. A behavior is an
-action, whose status shows when it starts and how it ends. Clearing a costmap is a service, whose calls are not visible.
-Only the feedback of the navigation action counts both kinds (`number_of_recoveries`).
+**Recoveries.** A recovery is a behavior of Nav2's behavior server, or the clearing of a costmap. Behaviors are actions
+with a visible status. Clearings are service calls, which other nodes cannot observe. The feedback of the navigation
+action counts both (`number_of_recoveries`).
 """
 
 from __future__ import annotations
@@ -29,20 +28,17 @@ RATE_PARAMETERS = {
     "backup": "cycle_frequency",
     "drive_on_heading": "cycle_frequency",
 }
-"""Actions that move the robot, each with the parameter of its server that is the rate of commands in Hz."""
+"""Actions that move the robot, and the server's parameter that sets the rate of commands in Hz."""
 MISSING_LIMIT_NS = NANOSECONDS
-"""Simulated time without a due command after which the run fails, because a server may wait for simulated time.
-
-For example, Nav2's controller server waits for a current costmap for `costmap_update_timeout`.
-"""
+"""Simulated time without a due command after which the run fails."""
 NEXT_WAIT_S = 0.25
-"""Maximum wall time to wait for a due command if the one before did not arrive."""
+"""Maximum wall time to wait for a due command after a command that did not arrive."""
 BEHAVIORS = ("spin", "backup", "wait")
 """Actions of Nav2's behavior server that its behavior trees count as recoveries."""
 CLEARING = "clear_costmap"
-"""Name under which the clearing of a costmap is reported."""
+"""Name of the reported recovery if a costmap is cleared."""
 OUTCOMES = {4: "succeeded", 5: "canceled", 6: "failed"}
-"""Reported outcomes by action_msgs/msg/GoalStatus.status."""
+"""Reported outcomes, by GoalStatus.status."""
 FEEDBACK_DELAY_NS = NANOSECONDS
 """Simulated time to wait for the status of a behavior before a counted recovery is reported as costmap clearing."""
 
@@ -51,7 +47,7 @@ ReportEvent = Callable[..., None]
 
 
 class OverdueCommand(NamedTuple):
-    """A due command that has not arrived: the node that must send it, and the action that the node executes."""
+    """A missing command: the node that must send it, and the action that the node executes."""
 
     node: str
     action: str
@@ -63,7 +59,7 @@ class _Server(NamedTuple):
 
 
 class MotionActions:
-    """Tracks which actions that move the robot are executed, and which command is due. All times `now` are in ns."""
+    """Tracks the actions that move the robot, and the command that is due. `now` is simulated time in ns."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._parameters = graph, NodeParameters(graph, barrier)
@@ -88,11 +84,11 @@ class MotionActions:
         self._last_command, self._missing_since = now, None
 
     def wait_s(self, limit_s: float) -> float:
-        """Return the wall time to wait for a due command: `limit_s`, or less if the one before did not arrive."""
+        """Return the wall time to wait for a due command: `limit_s`, or NEXT_WAIT_S if the last one did not arrive."""
         return limit_s if self._missing_since is None else min(limit_s, NEXT_WAIT_S)
 
     def record_missing(self, now: int) -> OverdueCommand | None:
-        """Record that the due command did not arrive. Return it if none has arrived for MISSING_LIMIT_NS, or None."""
+        """Record that the due command did not arrive. Return it if no command has arrived for MISSING_LIMIT_NS."""
         overdue = self.overdue_command(now)
         self._missing_since = None if overdue is None else now if self._missing_since is None else self._missing_since
         is_late = self._missing_since is not None and now - self._missing_since >= MISSING_LIMIT_NS
@@ -118,7 +114,7 @@ class RecoveryReporter:
         self._excess_since: int | None = None
 
     def subscribe(self) -> None:
-        """Subscribe to the status of each of BEHAVIORS that has a server now."""
+        """Subscribe to the status of each of the BEHAVIORS that has a server now."""
         for behavior in BEHAVIORS:
             self._graph.subscribe_to_status(behavior, partial(self._process_statuses, behavior))
 
@@ -136,16 +132,16 @@ class RecoveryReporter:
             self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
 
     def update_count(self, number: int) -> None:
-        """Add new recoveries to the count; `number` is that of the feedback since the navigation action began."""
+        """Update the number of recoveries. `number` is `number_of_recoveries` of the current navigation action."""
         self._feedback_count += max(0, number - self._last_number)
         self._last_number = number
 
     def begin_goal(self) -> None:
-        """Expect feedback that counts from zero, because a new navigation action begins."""
+        """Begin a new navigation action, whose feedback counts recoveries from zero."""
         self._last_number = 0
 
     def report_clearing(self, now: int) -> None:
-        """Report recoveries that the feedback counts, but that were no behaviors, as costmap clearing; `now` in ns."""
+        """Report counted recoveries that were no behaviors as costmap clearing. `now` is simulated time in ns."""
         if self._feedback_count <= self._behavior_count:
             self._excess_since = None
             return

@@ -1,4 +1,4 @@
-"""Create CostmapFilterInfo messages, which tell Nav2's costmap filters what the masks with the scenario's zones mean.
+"""CostmapFilterInfo messages, which describe the masks of the scenario's zones to Nav2's costmap filters.
 
 The topics have the names of nav2_bringup (Kilted and later).
 """
@@ -21,7 +21,7 @@ KEEPOUT, SPEED_PERCENT, SPEED_ABSOLUTE = 0, 1, 2
 
 
 class FilterInfo:
-    """Messages that describe masks. `masks` is the value `zone_masks` of the protocol's HELLO."""
+    """CostmapFilterInfo messages. `masks` is the value `zone_masks` of the frame HELLO of the stack protocol."""
 
     def __init__(self, masks: Sequence[Mapping[str, Any]]) -> None:
         self._masks: Dict[str, Mapping[str, Any]] = {MASKS[mask["topic"]]: mask for mask in masks}
@@ -34,7 +34,7 @@ class FilterInfo:
         return [Topic(INFO_TOPICS[mask], INFO_TYPE) for mask in self._masks]
 
     def messages(self, names: Callable[[str], str]) -> List[Tuple[str, bytes]]:
-        """Return topics and serialized messages. `names` maps topics of the protocol to their names in the graph."""
+        """Return topics and serialized messages. `names` maps topics of the stack protocol to names in the graph."""
         from rclpy.serialization import serialize_message
 
         found = []

@@ -1,7 +1,6 @@
-"""Check whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
+"""Check of whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
 
-The same rules apply to parameter files and to running nodes. Names of parameters are those of Nav2's configuration
-guide (https://docs.nav2.org/configuration/).
+The rules apply to parameter files and to running nodes. https://docs.nav2.org/configuration/ describes the parameters.
 """
 
 from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
@@ -19,9 +18,12 @@ class ParameterProblem(NamedTuple):
 
 
 class PublishedNames(NamedTuple):
-    """Topics on which simscen publishes scans and odometry in the user's graph, and names of the robot's base frame.
+    """Names in the user's graph.
 
-    A parameter with a relative topic name is resolved in the robot's `namespace`, such as `/robot1`.
+    scans:      topics on which simscen publishes scans
+    odometry:   topic on which simscen publishes odometry
+    bases:      names of the robot's base frame
+    namespace:  namespace of relative topic names, such as `/robot1`
     """
 
     scans: Sequence[str]
@@ -44,8 +46,7 @@ def check(
     """Return all problems in the parameters of Nav2's nodes.
 
     Keys of `nodes` and `subscriptions` are node names without namespace. `subscriptions` is None for a parameter file.
-    If it is given, a wrong topic name is only a problem if the node subscribes to this topic. Otherwise, the topic has
-    been remapped.
+    In a running node, a wrong topic name is only a problem if the node subscribes to this topic.
     """
     problems: List[ParameterProblem] = []
     for name in sorted(nodes):
@@ -59,7 +60,7 @@ def check(
 
 
 def relevant_parameters(node: str, names: Iterable[str]) -> List[str]:
-    """Return those of the parameter `names` of a node that the rules use."""
+    """Return the parameters among `names` that the rules use for this node."""
     if node in COSTMAPS:
         ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
         return [name for name in names if name in _CHECKED or name == "plugins" or name.endswith(ends)]
@@ -76,7 +77,7 @@ _CHECKED = frozenset(
 
 
 class _Node(NamedTuple):
-    """The parameters of one node, with methods that check them and add problems to a list."""
+    """Parameters of one node, and checks that add problems to a list."""
 
     name: str
     parameters: Parameters

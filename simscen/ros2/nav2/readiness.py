@@ -1,4 +1,4 @@
-"""Check a running Nav2 before a run: missing nodes, and parameters that do not match what simscen publishes."""
+"""Check of a running Nav2 before a run: missing nodes, and parameters that do not match simscen's topics and frames."""
 
 from typing import Any, Dict, List, Optional, Sequence
 
@@ -17,7 +17,7 @@ class Nav2Readiness:
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, bases: Sequence[str]
     ) -> None:
-        """`topics` are those that simscen publishes. `bases` are the names of the base frame in the graph."""
+        """`topics` are published by simscen. `bases` are the names of the base frame in the graph."""
         self._graph, self._options = graph, options
         self._node_parameters = NodeParameters(graph, barrier)
         self.user_transforms: Optional[UserTransforms] = None
@@ -30,13 +30,13 @@ class Nav2Readiness:
         )
 
     def _published_names(self) -> parameter_rules.PublishedNames:
-        """Return the published names, with frames of the user's transforms as additional base frames."""
+        """Return the names in the user's graph. Frames of the user's transforms are additional base frames."""
         if self.user_transforms is None:
             return self._names
         return self._names._replace(bases=[*self._names.bases, *self.user_transforms.robot_frames])
 
     def missing_nodes(self) -> List[str]:
-        """Return the severe problems of the parameter file, and Nav2's nodes that do not exist, one text each."""
+        """Return one text for each severe problem of the parameter file and for each missing node."""
         found = self._severe_problems(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
         names = {name for name, _ in self._graph.nodes()}
         for name in parameter_rules.NODES:
@@ -47,7 +47,7 @@ class Nav2Readiness:
         return found
 
     def wrong_parameters(self) -> List[str]:
-        """Return the severe problems of the parameters of the running nodes, one text each."""
+        """Return one text for each severe problem of the parameters of the running nodes."""
         nodes = [node for node in self._graph.nodes() if node[0] in parameter_rules.RULES]
         values = {node[0]: self._parameters(full_name(node), node[0]) for node in nodes}
         return self._severe_problems(values, {node[0]: self._graph.subscribed_topics(node) for node in nodes}, "")

@@ -19,7 +19,7 @@ INFO, WARNING, ERROR = 20, 30, 40
 MAX_LISTED_ERRORS = 3
 """Maximum number of errors that `errors` returns."""
 ABORTED_BRING_UP = "Aborting bringup"
-"""Part of the error that Nav2's lifecycle manager logs when it gives up starting its nodes."""
+"""Text that Nav2's lifecycle manager logs when it gives up the start of its nodes."""
 NODES = (
     *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
     *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
@@ -27,7 +27,7 @@ NODES = (
 )
 """Names of the nodes whose parameters are recorded."""
 OMITTED = ("use_sim_time", "qos_overrides.")
-"""Prefixes of parameter names that are not recorded, because they do not affect navigation."""
+"""Prefixes of names of parameters that are not recorded."""
 
 
 class LogLine(NamedTuple):
@@ -52,7 +52,7 @@ class Nav2Report:
         """Name of the lifecycle manager that has given up starting its nodes; empty if none has."""
 
     def begin(self) -> None:
-        """Discard the lines until now, subscribe to the logs, and read the parameters of Nav2's nodes."""
+        """Discard the collected lines, subscribe to the logs, and read the parameters of Nav2's nodes."""
         self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._take_tree)
         self.follow_log()
         self._lines.clear()
@@ -62,17 +62,17 @@ class Nav2Report:
                 self.parameters[node] = self._node_parameters.values(node, names)
 
     def follow_log(self) -> None:
-        """Subscribe to /rosout if a node publishes it now. Call repeatedly until one does."""
+        """Subscribe to /rosout if a node publishes it. Call repeatedly until a node does."""
         if not self._follows_log:
             self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
 
     def errors(self) -> list[str]:
-        """Return the last distinct errors among the lines that have not been taken."""
+        """Return the last distinct errors among the lines since the last `take_lines`."""
         errors = dict.fromkeys(f"{line.name}: {line.text}" for line in self._lines if line.level >= ERROR)
         return list(errors)[-MAX_LISTED_ERRORS:]
 
     def take_lines(self) -> list[LogLine]:
-        """Return the lines since the last call, sorted by logger, because the order between nodes is random."""
+        """Return the lines since the last call, sorted by logger."""
         lines, self._lines = self._lines, []
         return sorted(lines, key=lambda line: line.name)
 
