@@ -1,1 +1,1 @@
-"""Judgment of a run by its trace: verdicts of criteria, metrics, likely causes, and the result. Needs no simulator."""
+"""Judgment of a run by its trace (recorded states and events): verdicts, metrics, causes of failures, and result."""

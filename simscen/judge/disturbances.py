@@ -1,7 +1,7 @@
-"""Outcomes of disturbances, and failing verdicts on required disturbances that had no effect.
+"""Outcomes of disturbances (events and faults of a scenario), and verdicts on disturbances that had no effect.
 
-A trigger that fires is not enough. An action can find no object to act on, a fault can end before its sensor sends a
-message, and a disturbance in the last step of a run disturbs nothing.
+A disturbance can have no effect although its trigger fired. For example, an action finds no object to act on, or a
+fault ends before its sensor sends a message.
 """
 
 from collections import Counter
@@ -16,7 +16,7 @@ from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
 FINDING_NAME = "disturbance did not happen"
-"""`what` of the finding on a missing disturbance."""
+"""`Finding.what` for a missing disturbance."""
 
 
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
@@ -25,18 +25,17 @@ def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, 
         _event_outcome(trace, case, disturbance, entry)
         if disturbance.kind == "event"
         else _fault_outcome(trace, disturbance, entry)
-        for entry, disturbance in _with_entries(case.disturbances)
+        for entry, disturbance in _enumerate_by_kind(case.disturbances)
     )
 
 
 def missing_disturbances(
     trace: Trace, outcomes: Sequence[DisturbanceOutcome], others: Sequence[Verdict] = ()
 ) -> tuple[tuple[Verdict, int], ...]:
-    """Return a verdict for each required disturbance that did not happen, with its line in the scenario.
+    """Return a verdict for each required disturbance that did not happen, with the line of the disturbance.
 
-    The verdict is inconclusive if the log is truncated, because the disturbance might have happened later. Only
-    the first missing step of a sequence gets a verdict. The ID of the verdict is the name of the disturbance, with a
-    number if another verdict, also one of `others`, has this name.
+    The verdict is inconclusive if the log is truncated. Only the first missing step of a sequence gets a verdict. The
+    ID is the name of the disturbance, with a number if another verdict (also of `others`) has this ID.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
     seen = Counter(verdict.id for verdict in others)
@@ -50,7 +49,7 @@ def missing_disturbances(
 
 
 def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
-    """Return whether a step could not happen because an earlier step, which has the verdict, did not happen."""
+    """Return whether the disturbance is a step of a sequence of which an earlier step did not happen."""
     after = one.disturbance.after
     if after is None or one.fired:
         return False
@@ -58,8 +57,8 @@ def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[Disturbance
     return not before.fired and (before.missing or _is_reported_earlier(before, outcomes))
 
 
-def _with_entries(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Yield each disturbance with its number among those of its kind, which is the `entry` of its events in the log."""
+def _enumerate_by_kind(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
+    """Yield each disturbance after its index among the events or faults, which the log contains as `entry`."""
     counts = {"event": 0, "fault": 0}
     for one in disturbances:
         yield counts[one.kind], one
@@ -103,10 +102,7 @@ def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: in
 
 
 def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
-    """Return since when a missing step of a sequence was due, or which earlier step was missing, as text.
-
-    Returns "" if the event is not a later step of a sequence.
-    """
+    """Return text on when a step of a sequence was due, or which earlier step was missing; "" for other events."""
     if disturbance.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
@@ -120,7 +116,7 @@ def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:
-    """Return, for each action of an event, whether it took effect, and a description of the effect or the reason."""
+    """Return for each action of an event whether it took effect, and a text on its effect or the reason for none."""
     effects = ended.data.get("effects")
     assert isinstance(effects, list)
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]

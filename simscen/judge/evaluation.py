@@ -1,4 +1,4 @@
-"""Evaluation of the criteria of a run, each independently of the others."""
+"""Evaluation of the criteria of a run."""
 
 import math
 from collections.abc import Sequence, Set
@@ -28,10 +28,9 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    If a criterion raises an exception, its verdict is an error, and the others are not affected. The verdict is
-    inconclusive if the log lacks the evidence that the criterion needs. It is also inconclusive instead of a pass if
-    the log is truncated or empty, or if the evidence covers only a part of the run: the criterion might have failed in
-    the rest.
+    A criterion that raises an exception gets the verdict error. A verdict is inconclusive if the log lacks the evidence
+    that the criterion needs. A pass becomes inconclusive if the log is truncated or empty, or if the evidence covers
+    only a part of the run.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -40,35 +39,31 @@ def judge(
 
 
 def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
-    """Return the evidence that a criterion needs; all kinds of evidence if it does not declare any."""
+    """Return the evidence (kinds of recorded information) that a criterion needs; all kinds if it declares none."""
     own = getattr(entry.chosen, "evidence", None)
     return frozenset(Evidence) if own is None else frozenset(own)
 
 
 def missing_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
-    """Return which of the required evidence the log lacks, in words; "" if it has all of it."""
+    """Return a text on the required evidence that the log lacks; "" if nothing is missing."""
     missing = coverage.lacking(required)
     return f"the log lacks {' and '.join(evidence.value for evidence in missing)}" if missing else ""
 
 
 def partial_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
-    """Return why the required evidence covers only a part of the run; "" if it covers the whole run."""
+    """Return the reasons why the required evidence covers only a part of the run; "" if it covers the whole run."""
     return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
 
 
 def findings_defect(findings: object) -> str:
-    """Return what is wrong with the findings that a criterion returned; "" if they are valid.
-
-    The criterion of a plugin could return no findings, or a margin that is not a number or contradicts the status. This
-    must not become a verdict.
-    """
+    """Return a description of what is wrong with the findings of a criterion; "" if they are valid."""
     if not isinstance(findings, Sequence) or not findings:
         return "it checked nothing"
     return next((defect for finding in findings if (defect := _defect(finding))), "")
 
 
 def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCoverage) -> tuple[Finding, ...]:
-    """Return the findings of one criterion, or one finding with the reason why it cannot be judged."""
+    """Return the findings of one criterion, or one finding with the reason why the criterion cannot be judged."""
     criterion, required = entry.chosen, required_evidence(entry)
     assert isinstance(criterion, Criterion)
     try:
@@ -91,12 +86,12 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
 
 
 def _error(entry: AnyCriterion, what: str) -> Finding:
-    """Return the finding of a criterion that could not judge. It names the package of a plugin."""
+    """Return the finding for a criterion that failed with the error `what`."""
     return Finding(Status.ERROR, entry.kind, f"{what}{entry.plugin_suffix}", "a judgment")
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """Return the findings with each pass turned into inconclusive, and with the reason after the measured value."""
+    """Return the findings with inconclusive instead of pass, and the reason `because` after the measured value."""
     return tuple(
         replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
         if finding.status is Status.PASS
@@ -106,13 +101,13 @@ def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, .
 
 
 def _is_empty(trace: Trace) -> bool:
-    """Return True if nothing was recorded but the end of the run."""
+    """Return whether nothing was recorded except the end of the run."""
     signals = (trace.truth, trace.belief, trace.odometry, trace.command)
     return not any(map(len, signals)) and all(event.kind == EventKind.RUN_ENDED for event in trace.events)
 
 
 def _defect(finding: object) -> str:
-    """Return what is wrong with one finding; "" if it is valid."""
+    """Return a description of what is wrong with one finding; "" if it is valid."""
     if not isinstance(finding, Finding) or finding.status not in _STATUSES:
         return f"it returned an invalid finding of type {type(finding).__name__}"
     if not all(isinstance(text, str) for text in (finding.what, finding.measured, finding.limit, finding.unit)):

@@ -1,8 +1,7 @@
 """Likely causes of failed findings, found in the trace of the run and added to the findings as lines of text.
 
-Lines with "why" follow from geometry or physics: an object that blocks the path, an object that was spawned in front of
-the robot, a robot that was kidnapped. Lines with "meanwhile" list other faults and events that were active and may be
-the cause. There are no lines without evidence.
+Lines with "why" state a cause that follows from geometry or physics, such as an object that blocks the path. Lines with
+"meanwhile" list faults and events that were active at the time of the failure.
 """
 
 import math
@@ -15,14 +14,14 @@ from simscen.core.records.case import Case
 from simscen.core.records.events import BELIEF, WHEELS, Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.goal_failure_causes import MovableObject, diagnose_goal_failure, movable_objects
+from simscen.judge.goal_failure_causes import Diagnosis, MovableObject, diagnose_goal_failure, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
 """Criteria that can fail because something blocks the robot."""
 LOCALIZATION_CRITERIA = frozenset({"localization_error", "relocalized_within", "no_false_success", *GOAL_CRITERIA})
 """Criteria that can fail because the estimated pose is wrong."""
 MAX_LINES = 6
-"""Maximum number of lines for a finding, so that a report remains readable."""
+"""Maximum number of lines for a finding."""
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
@@ -43,7 +42,7 @@ def _with_causes(criterion: str, finding: Finding, trace: Trace, case: Case) -> 
 
 
 def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
-    """Return lines about the likely causes if a criterion failed at a tick; at most MAX_LINES."""
+    """Return at most MAX_LINES lines about the likely causes of the failure of a criterion at `tick`."""
     lines: list[str] = []
     named: set[str] = set()
     diagnoses = [
@@ -61,19 +60,17 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
 
 
 RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
-"""Time in s for which a fault is listed after its end, and an event after it happened."""
+"""Time for which a fault is listed after its end, and time for which an event is listed after it happened."""
 
 
 def concurrent_disturbances(trace: Trace, tick: int, excluded: Set[str] = frozenset()) -> list[str]:
-    """Return sentences on the faults, then on the events, at or shortly before a tick, in the order of their start.
-
-    `excluded` are names of disturbances that other lines already mention.
-    """
-    return [text for name, text in (*_faults(trace, tick), *_events(trace, tick)) if name not in excluded]
+    """Return sentences on the faults and events at or shortly before `tick`, except disturbances named `excluded`."""
+    texts = (*_recent_faults(trace, tick), *_recent_events(trace, tick))
+    return [text for name, text in texts if name not in excluded]
 
 
-def _faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
-    """Yield the name of each fault that was active and had an effect until the tick, and a sentence on it."""
+def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
+    """Yield name and description of each fault that had an effect and was active at or shortly before `tick`."""
     effects = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
     for start in trace.of_kind(EventKind.FAULT_STARTED):
         end = _end_tick(trace, start)
@@ -96,8 +93,8 @@ def _is_same_entry(one: Event, other: Event) -> bool:
     return (one.name, one.data.get("entry")) == (other.name, other.data.get("entry"))
 
 
-def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
-    """Yield the name of each event that changed something shortly before the tick, and a sentence on it."""
+def _recent_events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
+    """Yield name and description of each event that had an effect shortly before `tick`."""
     for event in trace.of_kind(EventKind.EVENT_ENDED):
         ago = trace.seconds(tick - event.tick)
         effects = event.data.get("effects")
@@ -109,16 +106,13 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
 
 
 OBJECT_MOVING_SPEED_M_S = 0.0625
-"""Speed in m/s above which an object is said to move."""
+"""Speed from which an object counts as moving."""
 OBJECT_SPEED_WINDOW_S = 0.25
-"""Time in s before a collision over which the speed of an object is averaged."""
+"""Time before a collision over which the speed of an object is averaged."""
 
 
-def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
-    """Return sentences on the movable objects that the robot began to touch at `tick`.
-
-    Also returns the names of the events that spawned or moved these objects.
-    """
+def diagnose_collision(trace: Trace, tick: int) -> Diagnosis:
+    """Return sentences on the movable objects that the robot began to touch at `tick`, and their events."""
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
     touched = [each for each in movable_objects(trace, tick) if each.name in hits]
     described = [(each, _describe_hit(trace, each, hits[each.name])) for each in touched]
@@ -126,7 +120,7 @@ def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
-    """Return a sentence on how an object came into contact with the robot; "" if it simply stood there."""
+    """Return a sentence on how an object came into contact with the robot; "" for an object that never moved."""
     ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
     if touched.event:
@@ -143,12 +137,12 @@ def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
 
 
 def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
-    """Return the distance in m from the robot's center at which the object was spawned."""
+    """Return the distance in m between the spawned object and the robot's center at that time."""
     return float(spawned.distance(np.array([trace.place(spawned.since)]))[0])
 
 
 def _speed(trace: Trace, name: str, tick: int) -> float:
-    """Return the speed of an object in m/s until a tick."""
+    """Return the mean speed of an object in m/s during OBJECT_SPEED_WINDOW_S before `tick`."""
     samples = trace.objects.get(name)
     if samples is None:
         return 0.0
@@ -158,17 +152,17 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Faults whose error remains in the odometry after their end, if they affect ODOMETRY_TARGETS."""
+"""Faults whose error remains in the odometry after the end of the fault."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
-"""Values of `affects` of faults of the odometry."""
+"""Kinds of targets of ODOMETRY_FAULTS."""
 LOST_DISTANCE_M = 0.5
-"""Localization error in m from which a robot counts as lost: the diameter of a small robot."""
+"""Localization error from which a robot counts as lost."""
 
 
-def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> tuple[list[str], set[str]]:
-    """Return sentences on a large localization error and its causes, and the names of these events and faults.
+def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> Diagnosis:
+    """Return sentences on a large localization error and its causes, and the disturbances that caused it.
 
-    With `error_is_reported`, the failed finding itself states the error, and only the causes are returned.
+    With `error_is_reported`, there is no sentence on the error itself, because the failed finding states it.
     """
     error = _position_error(trace, tick)
     if not error >= LOST_DISTANCE_M:  # also for nan: unknown
@@ -203,7 +197,7 @@ def _position_error(trace: Trace, tick: int) -> float:
 
 
 def _falsified(trace: Trace, label: str) -> str:
-    """Return what a fault falsified: "its belief", "its odometry", or "" for other faults."""
+    """Return the quantity that a fault falsified: "its belief", "its odometry", or "" for other quantities."""
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
     if not starts:
         return ""

@@ -1,4 +1,4 @@
-"""Texts of findings and disturbances for all reports, and margins relative to their limits."""
+"""Texts of findings and disturbances for reports, and relative margins (distances of values from their limits)."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -8,13 +8,12 @@ from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
-"""Criterion name of the verdicts on missing events and faults; their ID is the name of the event or fault."""
+"""Criterion name of verdicts on missing events and faults. The ID is the name of the event or fault."""
 ARRIVAL = "goals_reached"
-"""Name of the criterion on the distance from a goal."""
 MAX_TIMES_SHOWN = 5
 """Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
-"""Relation of the measured value to the limit, if the limit holds and if it is violated, by the start of the limit."""
+"""Relations of the measured value to a limit that holds and to a limit that is violated, by the start of the limit."""
 
 
 def comparison(finding: Finding) -> str:
@@ -38,7 +37,7 @@ def time_and_place(finding: Finding, tick_rate: int) -> str:
 
 
 def subject(verdict: Verdict, finding: Finding) -> str:
-    """Return the criterion and the item that it checks, e.g. "goals_reached: goal shelf"."""
+    """Return the criterion and the checked item, e.g. "goals_reached: goal shelf"."""
     if verdict.criterion == DISTURBANCE:  # its ID, the name of an event or fault, could be mistaken for a criterion
         return finding.what
     rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
@@ -46,20 +45,20 @@ def subject(verdict: Verdict, finding: Finding) -> str:
 
 
 def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
-    """Return the line for a finding, e.g. "stuck: 8.00 s > 5.00 s, at t = 10.84 s, (2.10, 3.41)"."""
+    """Return the text of a finding, e.g. "stuck: 8.00 s > 5.00 s, at t = 10.84 s, (2.10, 3.41)"."""
     parts = (f"{subject(verdict, finding)}: {comparison(finding)}", time_and_place(finding, tick_rate))
     return ", ".join(part for part in parts if part)
 
 
 def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """Return when an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more", or "never"."""
+    """Return the times at which a disturbance began, e.g. "t = 10.00 s, 12.50 s and 3 more", or "never"."""
     times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:MAX_TIMES_SHOWN]]
     more = f" and {len(one.fired) - MAX_TIMES_SHOWN} more" if len(one.fired) > MAX_TIMES_SHOWN else ""
     return f"t = {', '.join(times)}{more}" if times else "never"
 
 
 def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """Return the line for a disturbance, e.g. "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    """Return the text of a disturbance, e.g. "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     parts = (
         disturbance_times(one, tick_rate) if one.fired else "",
         one.effect,
@@ -69,16 +68,16 @@ def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the findings that prevent the verdict from being a pass, in order."""
+    """Return the findings that are not a pass, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
     """Return the smallest relative margin of a pass, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Counts of events are left out, because they have no unit. The distance from a goal and the waiting time there are
-    left out as well: they are always near their limits, because a robot stops as soon as it is close enough.
+    Values without a unit are left out, and so are the distance from a goal and the waiting time there.
     """
+    # Robots always stop near the limit of the distance from a goal.
     tightest = _tightest_finding(verdicts)
     if tightest is None:
         return ""
@@ -88,9 +87,9 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 
 
 def run_margin(result: RunResult) -> float:
-    """Return the smallest margin of a run relative to its limit, from -1; negative unless the run passed.
+    """Return the smallest relative margin of a run, limited to at least 0 if the run passed.
 
-    It is 1 for a run that passed and has no margin, and -1 for a run that did not pass and has no negative margin.
+    For other runs, the margin is negative and at least -1. Without a margin, returns 1 for a pass and otherwise -1.
     """
     if result.outcome is Outcome.PASSED:
         tightest = _tightest_finding(result.verdicts)
@@ -107,7 +106,7 @@ def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | 
 
 
 def _is_about_arrival(verdict: Verdict, finding: Finding) -> bool:
-    """Return whether the finding is about where the robot stopped or how long it waited there."""
+    """Return whether the finding is on the distance from a goal or on the waiting time there."""
     return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 

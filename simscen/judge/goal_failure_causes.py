@@ -1,8 +1,4 @@
-"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot.
-
-The functions return sentences, and some of them also the names of the events that spawned or moved the objects in these
-sentences, or "" for objects that were there from the start.
-"""
+"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot."""
 
 import math
 from collections import Counter
@@ -20,17 +16,18 @@ from simscen.core.records.trace import Trace
 from simscen.criteria.error_codes import code_of
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 
+Diagnosis = tuple[list[str], set[str]]
+"""Sentences on causes, and names of the disturbances in these sentences ("" for an object from the start)."""
+
 
 @dataclass(frozen=True)
 class MovableObject:
-    """Movable object at a certain tick.
+    """State of a movable object at a tick.
 
-    Attributes:
-        name: Name of the object.
-        outlines: Outlines of its parts in the world, each with corners (n, 2).
-        event: Name of the event that spawned the object or last moved it; "" if no event did.
-        since: Tick at which it was spawned or last moved.
-        was_moved: True if it was moved after it was spawned.
+    outlines:   corners (n, 2) in m of each part of the object in the world frame
+    event:      name of the event that spawned or last moved the object; "" if no event did
+    since:      tick at which the object was spawned or last moved
+    was_moved:  whether the object was moved after it was spawned
     """
 
     name: str
@@ -40,14 +37,14 @@ class MovableObject:
     was_moved: bool
 
     def describe(self, trace: Trace) -> str:
-        """Return the name, and how the object came here: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+        """Return the name and the last change, e.g. "crate (spawned by event `crate falls` at t = 1.00 s)"."""
         if not self.event:
             return self.name
         verb = "moved" if self.was_moved else "spawned"
         return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
 
     def distance(self, points: Array) -> Array:
-        """Return the distances in m (n,) from points (n, 2) to the object; 0 inside."""
+        """Return the distances in m (n,) from points (n, 2) to the object; 0 inside the object."""
         nearest: Array = np.min([_distance(points, outline) for outline in self.outlines], axis=0)
         return nearest
 
@@ -77,7 +74,7 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
 
 
 def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
-    """Return the pose at `tick` of the object that the event `spawned`."""
+    """Return the pose at `tick` of an object. `spawned` is the event that spawned the object."""
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:
@@ -111,14 +108,11 @@ def _distance(points: Array, corners: Array) -> Array:
 
 
 NEAR_ROBOT_M = 0.3
-"""Maximum distance in m between the robot's hull and an object that may block it."""
+"""Maximum distance between the robot and an object that may block the robot."""
 
 
-def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
-    """Return sentences on what prevents the robot from reaching its current goal at `tick`, and the events behind it.
-
-    Both are empty if no goal is current.
-    """
+def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
+    """Return why the robot does not reach its current goal at `tick`. Both parts are empty without a current goal."""
     outcome = _current_goal(trace, case, tick)
     if outcome is None:
         return [], set()
@@ -136,20 +130,20 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str
 
 
 def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """Return the outcome of the last goal accepted up to `tick`; None if there is none, or if it is over."""
+    """Return the outcome of the last goal that was accepted until `tick`; None without a goal or if it is over."""
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     return started[-1] if started and not _is_over(started[-1], tick) else None
 
 
 def _is_over(outcome: GoalOutcome, tick: int) -> bool:
-    """Return whether the goal was reached at `tick` or canceled before. Failed goals do not count."""
+    """Return whether the goal was reached until `tick` or canceled before. A failed goal is not over."""
     if outcome.reached is not None:
         return outcome.reached <= tick
     return outcome.end is not None and outcome.end.kind == EventKind.GOAL_CANCELED and outcome.end.tick < tick
 
 
 def _unreachable(case: Case, goal: Goal) -> list[str]:
-    """Return a sentence if even the static world has no path to the goal."""
+    """Return a sentence if the static world has no path to the goal."""
     if case.shortest.get(goal.name) != math.inf:
         return []
     needed = 2 * case.inscribed_radius
@@ -159,7 +153,7 @@ def _unreachable(case: Case, goal: Goal) -> list[str]:
 
 
 def _stopped(trace: Trace, tick: int) -> list[str]:
-    """Return a sentence with the reason that the stack reported for holding the robot, unless it has been released."""
+    """Return a sentence with the reported reason if the stack holds the robot at `tick`."""
     last = [
         event
         for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
@@ -174,7 +168,7 @@ def _stopped(trace: Trace, tick: int) -> list[str]:
 
 
 def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Return a sentence on what the stack reported when it gave up the goal, and which recoveries it had tried."""
+    """Return a sentence with the stack's message if it gave up the goal, and with the recoveries before."""
     end = outcome.end
     if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
         return []
@@ -186,7 +180,7 @@ def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
 
 
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Return a sentence on the recovery behaviors that failed on the way to this goal, with their error codes."""
+    """Return a sentence on the recoveries that failed on the way to this goal, with their error codes."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
     counted = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
@@ -204,8 +198,8 @@ def _touching(trace: Trace, tick: int) -> list[str]:
     return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
 
 
-def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> tuple[list[str], set[str]]:
-    """Return a sentence on the object that occupies the goal, and the event that put it there."""
+def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> Diagnosis:
+    """Return a sentence on an object that occupies the goal."""
     place = np.array([[goal.pose.x, goal.pose.y]])
     for each in objects:
         distance = float(each.distance(place)[0])
@@ -215,8 +209,8 @@ def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]
     return [], set()
 
 
-def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> tuple[list[str], set[str]]:
-    """Return a sentence on the object nearest to the robot, if it is very close, and the event that put it there."""
+def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> Diagnosis:
+    """Return a sentence on the object nearest to the robot, if it is within NEAR_ROBOT_M."""
     if not objects or not len(trace.truth):
         return [], set()
     place = np.array([trace.place(tick)])
@@ -228,20 +222,19 @@ def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -
 
 
 SEARCH_STEP_M = 0.005
-"""Distance in m between the points of a passage at which its free width is measured."""
+"""Distance between the sample points of the free width of a passage."""
 NEGLIGIBLE_WIDTH_M = 0.02
-"""Width in m that is negligible, both as the free width of a passage and as a change of its width."""
+"""Smaller widths and changes of widths are ignored."""
 ON_PATH_DISTANCE_M = 0.5
-"""Maximum distance in m from the nearest passage for a robot on the path. Passages are 0.25 m apart."""
+"""Maximum distance between the nearest passage and a robot on the path."""
 
 
 def diagnose_blocked_path(
     trace: Trace, case: Case, goal: str, tick: int, objects: Sequence[MovableObject]
-) -> tuple[list[str], set[str]]:
-    """Return a sentence on the objects that close or narrow the shortest path to `goal` most, and their events.
+) -> Diagnosis:
+    """Return a sentence on the narrowest passage of the shortest path to `goal` that objects close or narrow.
 
-    An object closes a passage if not even the inscribed circle of the robot can pass, and narrows it if the robot
-    cannot turn there.
+    A passage is closed if the inscribed circle of the robot cannot pass. It is narrowed if the robot cannot turn there.
     """
     needed, turning = 2 * case.inscribed_radius, 2 * _circumscribed_radius(case)
     widths = [(free_width(passage, objects), passage) for passage in _remaining_passages(trace, case, goal, tick)]
@@ -260,7 +253,7 @@ def diagnose_blocked_path(
 
 
 def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
-    """Return the diameter in m of the largest circle that can pass between the ends of a passage and the objects."""
+    """Return the diameter in m of the largest circle that can pass between the objects and the ends of a passage."""
     ends = np.array(passage.ends)
     share = np.linspace(0.0, 1.0, 2 + round(passage.width / SEARCH_STEP_M))[:, None]
     centers = ends[0] + share * (ends[1] - ends[0])
@@ -270,13 +263,13 @@ def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
 
 
 def _blocking_objects(passage: Passage, objects: Sequence[MovableObject], needed: float) -> list[MovableObject]:
-    """Return the last object that alone leaves less than `needed`; otherwise, all objects that narrow the passage."""
+    """Return the last object that alone leaves less than `needed` m, or else all objects that narrow the passage."""
     single = [each for each in objects if free_width(passage, [each]) < needed]
     return single[-1:] or [each for each in objects if free_width(passage, [each]) < passage.width - NEGLIGIBLE_WIDTH_M]
 
 
 def _remaining_passages(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
-    """Return the passages on the path to `goal` that the robot still has to cross; all if it is not on this path."""
+    """Return the passages ahead of the robot on the path to `goal`; all passages if the robot is not on this path."""
     found = [passage for passage in case.passages if passage.goal == goal]
     if not found or not len(trace.truth):
         return found

@@ -1,4 +1,4 @@
-"""Outcome of a run from its verdicts, also for a run that is expected to fail."""
+"""Outcome of a run from its verdicts, including runs that are expected to fail."""
 
 from collections.abc import Sequence
 
@@ -11,8 +11,8 @@ from simscen.judge.finding_text import DISTURBANCE
 def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
     """Return the outcome of a completed run.
 
-    Only verdicts of severity `fail` can fail the run, and inconclusive counts as failed. An error of any criterion,
-    whatever its severity, makes the run an error; so does a run without any verdict.
+    The run is an error if any verdict is an error or if there are no verdicts. Otherwise, the run passes if all
+    verdicts of severity `fail` pass; an inconclusive verdict does not pass.
     """
     if not verdicts or any(verdict.status is Status.ERROR for verdict in verdicts):
         return Outcome.ERROR
@@ -21,7 +21,7 @@ def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
 
 
 EXPECTED = "expected"
-"""Criterion name of the verdict that states whether an expected failure took place."""
+"""Criterion name of the verdict on an expected failure."""
 
 
 def apply_expectation(
@@ -29,11 +29,11 @@ def apply_expectation(
 ) -> tuple[Outcome, Verdict | None]:
     """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
 
-    `verdicts` and `outcome` are those of the run without the expectation. Without an expectation, or if the outcome is
-    an error or the log is not complete, return the `outcome` unchanged and None.
+    Returns `outcome` and None if nothing is expected, if `outcome` is an error, or if the log is not complete.
 
-    This is strict like pytest's `xfail(strict=True)`: the run fails if nothing fails, if a listed criterion passes, and
-    if a criterion that is not listed does not pass. A missing disturbance is only expected if its name is listed.
+    As with pytest's `xfail(strict=True)`, the run fails if no criterion fails. If the expectation lists criteria, the
+    run also fails if one of them passes or if another criterion does not pass. A missing disturbance is only expected
+    if its name is listed.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None

@@ -1,8 +1,7 @@
-"""Statistical tests of a claim: that a robot passes at least the share `min` of all runs.
+"""Statistical tests of a claim that the pass rate of a scenario is at least `min`.
 
-The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Whatever the
-true pass rate is, each test keeps the stated error rate: if the rate is below `min`, the claim is held with a
-probability of at most 1 - `confidence`.
+The runs must be independent. If the true pass rate is below `min`, a test accepts the claim with a probability of at
+most 1 - `confidence`.
 """
 
 import math
@@ -14,10 +13,10 @@ from simscen.model.acceptance import PassRate
 
 
 def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult:
-    """Return the result of a claim after these runs, which must be in the order of their seeds.
+    """Return the result of a claim after runs in the order of their seeds.
 
-    A sequential test ends at the first run that decides it; later runs do not count. A crash or time-out of the stack
-    under test counts as a failed run. Any other error blocks the claim.
+    A sequential test ends at the first run that decides the claim; later runs do not count. A crash or timeout of the
+    stack under test counts as a failed run. Other errors block the claim.
     """
     outcomes = [result.outcome is Outcome.PASSED for result in results if is_counted(result)]
     errors = len(results) - len(outcomes)
@@ -39,15 +38,14 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
 
 
 def is_counted(result: RunResult) -> bool:
-    """Return whether a run counts for the pass rate: it was judged, or the stack under test crashed."""
+    """Return whether a run counts for the pass rate: a judged run, or a run that the stack under test ended."""
     return result.outcome is not Outcome.ERROR or (result.error is not None and result.error.by_stack)
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
-    """Return the number of runs after which the claim is decided, and the decision.
+    """Return the number of runs after which the claim is decided (all runs if undecided), and the decision.
 
-    If it is undecided, this is the number of all runs. `outcomes` are True for passed runs, in order; there are at most
-    `claim.max_runs`.
+    `outcomes` are True for passed runs, in order, and at most `claim.max_runs`.
     """
     if claim.method == "fixed":
         runs = len(outcomes)
@@ -64,6 +62,7 @@ def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]
 
 
 def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
+    """Return the decision of the method `fixed`, which uses the `clopper_pearson_limits`."""
     low, high = clopper_pearson_limits(passed, runs, claim.confidence)
     if low >= claim.min:
         return ClaimStatus.HELD
@@ -71,7 +70,7 @@ def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
 
 
 def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    """Return the decision of the method `anytime`: the claim is decided when `min` is outside the `anytime_limits`."""
+    """Return the decision of the method `anytime`: undecided while `min` is within the `anytime_limits`."""
     if _is_compatible(claim.min, passed, runs, claim.confidence):
         return ClaimStatus.UNDECIDED
     return ClaimStatus.HELD if passed > claim.min * runs else ClaimStatus.REFUTED
@@ -80,9 +79,9 @@ def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
 def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
     """Return the decision of the method `sprt`, which compares the likelihoods of the rates `target` and `min`.
 
-    The limits 1 / alpha and beta are those of Wald's inequalities: they bound each error rate, while Wald's usual
-    approximation (1 - beta) / alpha only bounds their sum. (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
+    (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
     """
+    # The thresholds 1 / alpha and beta bound each error rate. Wald's approximation (1 - beta) / alpha bounds their sum.
     assert claim.target is not None
     ratio = passed * math.log(claim.target / claim.min)
     ratio += (runs - passed) * math.log((1 - claim.target) / (1 - claim.min))
@@ -92,7 +91,7 @@ def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus
 
 
 def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, float] | None:
-    """Return the lower and the upper confidence limit of the pass rate by the method of the claim; None for `sprt`."""
+    """Return the lower and upper confidence limit of the pass rate; None for the method `sprt`."""
     if claim.method == "sprt":
         return None
     limits = anytime_limits if claim.method == "anytime" else clopper_pearson_limits
@@ -100,7 +99,7 @@ def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, f
 
 
 def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return the exact lower and upper limit of a rate; each of them holds with the probability `confidence`.
+    """Return the exact lower and upper limit of a rate, each with the one-sided `confidence`.
 
     (Clopper and Pearson: The Use of Confidence or Fiducial Limits Illustrated in the Case of the Binomial, 1934.)
     """
@@ -112,11 +111,10 @@ def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[f
 
 
 def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return a lower and an upper limit of a rate, computed after any run of a sequence of runs.
+    """Return a lower and an upper limit of a rate that remain valid if the limits are computed after every run.
 
-    With the probability `confidence`, the limits after all of these runs are valid at the same time. They contain the
-    rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a uniform prior.
-    (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
+    Method: beta-binomial mixture with a uniform prior. (Robbins: Statistical Methods Related to the Law of the Iterated
+    Logarithm, 1970.)
     """
     rate = passed / runs
     low = _boundary(passed, runs, confidence, inside=rate, outside=0.0) if passed else 0.0
@@ -125,10 +123,7 @@ def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, fl
 
 
 def _boundary(passed: int, runs: int, confidence: float, inside: float, outside: float) -> float:
-    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection.
-
-    Which rates are compatible is defined by `_is_compatible`.
-    """
+    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection."""
     while (middle := (inside + outside) / 2) not in (inside, outside):
         if _is_compatible(middle, passed, runs, confidence):
             inside = middle
@@ -138,6 +133,9 @@ def _boundary(passed: int, runs: int, confidence: float, inside: float, outside:
 
 
 def _is_compatible(rate: float, passed: int, runs: int, confidence: float) -> bool:
-    """Return whether (runs + 1) · P(passed | runs, rate) > 1 - confidence. 0 < rate < 1."""
+    """Return whether the rate (between 0 and 1) is within the `anytime_limits`.
+
+    The condition is (runs + 1) · P(passed | runs, rate) > 1 - confidence.
+    """
     log_count = math.lgamma(runs + 2) - math.lgamma(passed + 1) - math.lgamma(runs - passed + 1)
     return log_count + passed * math.log(rate) + (runs - passed) * math.log1p(-rate) > math.log(1 - confidence)

@@ -1,4 +1,4 @@
-"""Conversion of the result of a run to result.json and back. The file depends only on the run, not on the machine."""
+"""Conversion of the result of a run to result.json and back."""
 
 import json
 import math
@@ -13,16 +13,16 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence
 
 FORMAT = 2
-"""Version of the format; other versions are rejected. Keys that were added later have defaults."""
+"""Version of the format. Other versions are rejected."""
 
 
 def to_json(result: RunResult) -> str:
-    """Return the content of result.json: sorted, indented JSON. Equal results give equal text."""
+    """Return the content of result.json."""
     return json.dumps(result_data(result), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def result_data(result: RunResult) -> dict[str, Any]:
-    """Return a result as JSON data, for result.json and for files with several results."""
+    """Return a result as JSON data."""
     lines = result.lines or (0,) * len(result.verdicts)
     error = result.error
     return {
@@ -88,10 +88,8 @@ def from_data(data: dict[str, Any]) -> RunResult:
 
 
 def read_key(data: dict[str, Any]) -> RunKey:
-    """Return the key of a run from the JSON data of its result.
-
-    Also reads old files without `stack_name`, in which `variation` is the name of the stack.
-    """
+    """Return the key of a run from the JSON data of its result."""
+    # In old files without `stack_name`, `variation` is the name of the stack.
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
     return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 
@@ -118,7 +116,7 @@ def _read_disturbance(data: dict[str, Any]) -> DisturbanceOutcome:
 
 
 def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
-    """Return a verdict with its findings as JSON data. `line` is the line of the criterion, 0 if unknown."""
+    """Return a verdict with its findings as JSON data. `line` is the criterion's line in the scenario, 0 if unknown."""
     return {
         "criterion": verdict.criterion,
         "id": verdict.id,

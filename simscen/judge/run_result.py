@@ -1,4 +1,4 @@
-"""Judgment of the run of one robot: combines verdicts, disturbances, and metrics to the result of the run."""
+"""Judgment of the run of one robot: verdicts, outcomes of disturbances, and metrics."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -32,12 +32,14 @@ def judge_run(
 ) -> RunResult:
     """Return the result of a run.
 
-    `path` is the scenario file. `lines` has the line of each criterion in this file; () if the criteria are elsewhere.
-    `coverage` states which evidence the log lacks. `metrics` are those of plugins, which are computed in addition to
-    those of every run. `expected` is set if the run is expected to fail.
+    Verdicts on required disturbances that did not happen come first. A criterion is inconclusive instead of passed if
+    the signals that it needs have gaps.
 
-    A required disturbance that did not happen gets a failing verdict, before the others, because it often explains
-    them. No criterion passes if the signals that it needs have gaps (`time_gaps`).
+    path:      scenario file
+    lines:     line of each criterion in the scenario file; () if the criteria come from another file
+    coverage:  evidence that the log contains
+    metrics:   additional metrics of plugins
+    expected:  expected failure of the run; None to expect success
     """
     coverage = coverage.with_gaps(time_gaps(trace))
     verdicts = explain_failures(judge(criteria, trace, case, coverage), trace, case)
@@ -75,5 +77,6 @@ def judge_run(
 
 
 def _judging_failure(verdicts: tuple[Verdict, ...]) -> RunFailure:
+    """Return the failure of a run whose criteria raised exceptions, or that has no criteria."""
     broken = [f"{v.id}: {v.tightest.measured}" for v in verdicts if v.status is Status.ERROR and v.tightest]
     return RunFailure("invalid", "; ".join(broken) or "no criterion judged this run")

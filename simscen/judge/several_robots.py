@@ -1,4 +1,4 @@
-"""Combination of the results of the robots of a run to one result."""
+"""Combination of the results of several robots of a run to one result."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -15,19 +15,19 @@ from simscen.judge.outcome import apply_expectation
 
 T = TypeVar("T")
 SUCCESS = "success"
-"""Metric that the run has as well as each robot."""
+"""Metric of each robot and of the run."""
 WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
-"""Prefixes of the kinds of events of the world. The trace of each robot contains these events."""
+"""Prefixes of kinds of events that the traces of all robots contain."""
 
 
 def combine_robots(
     results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
 ) -> RunResult:
-    """Return the result of a run from the results and traces of its robots, both by the name of the robot.
+    """Return the result of a run from the results and traces of its robots, by name of the robot.
 
-    The run passes if all robots pass. Verdicts, metrics and faults of a robot get the name `robot/name`. Events of the
-    world, and verdicts on them, are listed once and without a robot. The metric `success` also exists for the run: the
-    smallest of the robots. `expected` is set if the run is expected to fail.
+    The run passes if all robots pass. Verdicts, metrics, and faults of a robot get the name `robot/name`. Events of the
+    world and verdicts on them are listed once. The metric `success` of the run is the smallest of its robots.
+    `expected` is the expected failure of the run; None to expect success.
     """
     first = next(iter(results.values()))
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
@@ -63,7 +63,7 @@ def _verdicts_with_lines(result: RunResult) -> list[tuple[Verdict, int]]:
 
 
 def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
-    """Return the verdict with the name of the robot in its ID, and in the text on a missing fault."""
+    """Return the verdict with the name of the robot in the ID and in the text of a missing fault."""
     findings = verdict.findings
     if verdict.criterion == DISTURBANCE:
         findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)
@@ -71,7 +71,7 @@ def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
 
 
 def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
-    """Return whether the verdict is on a missing event of the scenario. `events` are the names of all events."""
+    """Return whether the verdict is on a missing event. `events` are the names of all events of the scenario."""
     return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
@@ -85,7 +85,7 @@ def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
 
 
 def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """Return the number of events by kind. Events of the world count once, but not those of the other robots."""
+    """Return the number of events by kind. Events of the world count once."""
     first = next(iter(traces.values()))
     counts = Counter(str(event.kind) for event in first.events if _is_world_event(event) and event.name not in traces)
     for trace in traces.values():

@@ -1,4 +1,4 @@
-"""Tests of which changes between a baseline and another stack or session are significant, from paired runs."""
+"""Significance tests of changes between a baseline and another stack or session, from paired runs."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,16 +7,15 @@ from simscen.core.records.comparison import ScenarioChange
 from simscen.core.statistics import holm, sign_test
 
 PASS_RATE = "pass rate"
-"""`what` of a PairedSample whose values are 1 for a passed and 0 for a failed run."""
+"""`PairedSample.what` for values of 1 for a passed and 0 for a failed run."""
 
 
 @dataclass(frozen=True)
 class Significance:
     """Conditions under which a change is significant.
 
-    Attributes:
-        alpha: Largest p-value, after Holm's correction for the number of tests.
-        min_effect: Smallest change of the mean that matters, relative to the mean of the baseline.
+    alpha:       largest p-value, after Holm's correction for the number of tests
+    min_effect:  smallest change of the mean, relative to the mean of the baseline
     """
 
     alpha: float = 0.05
@@ -27,8 +26,9 @@ class Significance:
 class PairedSample:
     """Values of one quantity in pairs of runs (baseline, other).
 
-    `what` is PASS_RATE or the name of a metric, and `scenario` a scenario or all of them. `higher_is_better` is None if
-    neither direction is better.
+    scenario:          name of a scenario, or text for all scenarios
+    what:              PASS_RATE or the name of a metric
+    higher_is_better:  None if neither direction is better
     """
 
     scenario: str
@@ -38,7 +38,7 @@ class PairedSample:
     higher_is_better: bool | None
 
     def p_value(self) -> float:
-        """Return the p-value of McNemar's exact test for the pass rate, of the signed-rank test for a metric."""
+        """Return the p-value: of McNemar's exact test for the pass rate, of the signed-rank test for a metric."""
         if self.what == PASS_RATE:
             return sign_test(self.pairs.count((0.0, 1.0)), self.pairs.count((1.0, 0.0)))
         return signed_rank_test([two - one for one, two in self.pairs])
@@ -47,8 +47,7 @@ class PairedSample:
 def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
     """Return the changes that are significant and large enough, with p-values adjusted by Holm's correction.
 
-    If nothing has changed, the probability of finding any change is at most `alpha`. Samples without any difference
-    cannot be significant, and do not count in the correction.
+    Samples without any difference do not count in the correction.
     """
     tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
     found = []
@@ -67,7 +66,7 @@ def significant_changes(samples: Iterable[PairedSample], significance: Significa
 def signed_rank_test(differences: Sequence[float]) -> float:
     """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences.
 
-    Pairs without a difference do not count. The p-value is 1 if there is no difference at all.
+    Differences of 0 do not count. The p-value is 1 if all differences are 0.
     (Wilcoxon: Individual Comparisons by Ranking Methods, 1945.)
     """
     if not any(differences):

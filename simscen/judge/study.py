@@ -1,4 +1,4 @@
-"""Evaluation of a study: its claim, pass rates by parameter, and effects of parameters on margins."""
+"""Evaluation of a study (many runs of one scenario): claim, pass rates by parameter, and effects of parameters."""
 
 import math
 from collections import defaultdict
@@ -15,24 +15,24 @@ from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
-"""Minimum number of runs for effects. With fewer, no rank correlation of several parameters is significant."""
+"""Minimum number of runs for which effects of parameters are computed."""
 RANGE_COUNT = 4
-"""Number of ranges, each with about the same number of runs, into which many different numbers are divided."""
+"""Number of ranges for a parameter with many different numbers. Ranges have about the same number of runs."""
 MAX_LISTED_VALUES = 10
-"""Maximum number of different values of a parameter that are listed individually."""
+"""Maximum number of different values of a parameter without ranges."""
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """Plan of a study: how its runs are chosen, and its claim.
+    """Plan of a study.
 
     Attributes:
         scenario: ID of the scenario.
         is_random: True if each run has its own seed and random values.
         claim: Claim about the pass rate; None if the scenario has no `acceptance`.
-        values: Values of the varied parameters by run, each by the path of the parameter in the scenario.
-        is_designed_in_pairs: True if the values are chosen so that all pairs of values of two parameters occur.
-        drawn: Number of draws that were needed to get values that meet `require`; 0 without `require`.
+        values: Values of the varied parameters, by run and by path of the parameter in the scenario.
+        is_designed_in_pairs: True for pairwise testing: all pairs of values of two parameters occur.
+        drawn: Number of random draws until all runs met the condition `require`; 0 without `require`.
         stops_early: True if the study ends when it has found enough failures.
     """
 
@@ -81,12 +81,12 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
 
 
 def in_seed_order(results: Iterable[RunResult]) -> list[RunResult]:
-    """Return the results in the order of their seeds, in which a study makes its runs."""
+    """Return the results in the order of their seeds."""
     return sorted(results, key=lambda result: (result.key.seed, result.key))
 
 
 def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
-    """Return the smallest margin of each criterion and its unit, by the ID of the verdict."""
+    """Return the smallest margin of each criterion and its unit, by verdict ID."""
     found: dict[str, tuple[float, str]] = {}
     for verdict in result.verdicts:
         margins = [(one.margin, one.unit) for one in verdict.findings if one.margin is not None]
@@ -96,7 +96,7 @@ def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
 
 
 def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[str, tuple[RunKey, float, str]]:
-    """Return the run with the smallest margin, this margin, and its unit, for each criterion."""
+    """Return for each criterion the run with the smallest margin, this margin, and its unit."""
     worst: dict[str, tuple[RunKey, float, str]] = {}
     for key, own in margins.items():
         for criterion, (margin, unit) in own.items():
@@ -106,9 +106,9 @@ def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[st
 
 
 def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
-    """Yield the pass rate for each value, or range of values, of each parameter.
+    """Yield the pass rate for each value or range of values of each parameter.
 
-    The rates have no confidence limits if the runs are not random, or if their number depends on their outcomes.
+    The rates have no confidence limits if the runs are not random or if their number depends on their outcomes.
     """
     has_limits = plan.is_random and plan.has_fixed_runs
     for path in _paths(plan):
@@ -123,7 +123,7 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
 
 
 def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
-    """Return a key function that sorts labels by the smallest value that they stand for, texts after numbers."""
+    """Return a key function that sorts labels by their smallest value, and texts after numbers."""
     least: dict[str, tuple[int, float, str]] = {}
     for label, result in zip(labels, results, strict=True):
         value = si_number(plan.values.get(result.key, {}).get(path))
@@ -133,7 +133,7 @@ def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Seq
 
 
 def _labels(values: Sequence[Any]) -> list[str]:
-    """Return the label of each value: its text, or the range that it is in if there are many different numbers."""
+    """Return the label of each value: its text, or its range if there are many different numbers."""
     texts = [value_text(value) for value in values]
     numbers = [si_number(value) for value in values]
     if len(set(texts)) <= MAX_LISTED_VALUES or not all(map(_is_number, numbers)):
@@ -155,7 +155,7 @@ def _short(value: Any) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Return a value of a parameter as one line of text. None means that the scenario's own value is used."""
+    """Return a value of a parameter as one line of text. None stands for the value in the scenario file."""
     match value:
         case None:
             return "unchanged"
@@ -227,10 +227,7 @@ def _paths(plan: StudyPlan) -> list[str]:
 
 
 def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | None:
-    """Return the share of all pairs of values of two parameters that occurred in a run.
-
-    Returns None if the values are not designed in pairs.
-    """
+    """Return the share of all pairs of values of two parameters that occurred; None without pairwise testing."""
     paths = _paths(plan)
     if not plan.is_designed_in_pairs or len(paths) < 2:
         return None

@@ -14,7 +14,7 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
-from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
+from simscen.judge.metrics.session_summary import SessionSummary, SessionSummaryBuilder, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study import study_data
 from simscen.report.display_text import escape_ci_markers_in_json, relative_path
@@ -95,7 +95,7 @@ def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
     summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
     if len(summaries) > 1:
         return {"suites": summaries}
-    return {"suite": next(iter(summaries.values()), session_summary_data(SessionFigures().summary()))}
+    return {"suite": next(iter(summaries.values()), session_summary_data(SessionSummaryBuilder().summary()))}
 
 
 def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
@@ -103,10 +103,10 @@ def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]
 
     The keys are the names of the stacks in order of appearance; "" if there is only one stack.
     """
-    figures_by_stack: dict[str, SessionFigures] = {}
+    figures_by_stack: dict[str, SessionSummaryBuilder] = {}
     for run in runs:
         if not run.key.repeats:
-            figures_by_stack.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
+            figures_by_stack.setdefault(run.key.stack_name, SessionSummaryBuilder()).add(run.result)
     return {stack: figures.summary() for stack, figures in figures_by_stack.items()}
 
 

@@ -1,4 +1,4 @@
-"""Catalog of the metrics of every run: names, units, and definitions, for `simscen explain metrics` and the docs."""
+"""Catalog of the metrics of every run: names, units, and definitions."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -10,8 +10,10 @@ from simscen.core.records.verdict import POSITION, Evidence
 class Metric:
     """Definition of a metric.
 
-    `unit` is an SI unit, "" for none. `text` defines the metric for users, and `source` names the paper or program that
-    the definition is from, "" for our own. `evidence` is what a log must contain to compute the metric.
+    unit:      SI unit; "" for none
+    text:      definition for users
+    source:    paper or program that defines the metric; "" for simscen
+    evidence:  kinds of information that a log must contain to compute the metric
     """
 
     unit: str
@@ -34,7 +36,7 @@ _ERRORS = {
     "median": "median",
     "max": "largest",
 }
-"""Statistics of pose errors: the end of the name of a metric, and its text."""
+"""Statistics of pose errors: suffix of the metric's name, and text."""
 
 METRICS: dict[str, Metric] = {
     "success": Metric(
@@ -172,7 +174,7 @@ METRICS: dict[str, Metric] = {
         evidence=_BELIEF | {Evidence.COVARIANCE},
     ),
 }
-"""Metrics by name, in the order of the reference."""
+"""Metrics by name, in the order of the reference page."""
 
 ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.metrics.compute:compute_metrics")
-"""Module and function of each shipped metric, for the registry. Plugins must not use the names of these metrics."""
+"""Module and function that computes each metric."""

@@ -21,22 +21,22 @@ COMPARED_METRICS = (
 )
 """Metrics that are compared, in the order of the table. Metrics of plugins follow."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
-"""Compared metrics for which a higher value is better; for the others, a lower value is."""
+"""Compared metrics for which a higher value is better. For the other COMPARED_METRICS, a lower value is better."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
-"""Metrics that are compared in all pairs of runs. The others would favor stacks that give up early."""
+"""Metrics that are compared in all pairs of runs. Other metrics are only compared if both runs reach the same goals."""
 ALL_SCENARIOS = "all scenarios"
-"""`scenario` of the changes over all scenarios together."""
+"""Scenario name of changes over all scenarios."""
 _SEED = 1
-"""Seed of the bootstrap: the same runs give the same intervals."""
+"""Seed of the bootstrap."""
 
 Pair = tuple[RunResult, RunResult]
 """Results of the baseline and of the other stack or session for the same scenario and seed."""
 
 
 def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
-    """Compare each of the `stacks` (NAME=VALUE) with the first one. Returns None if there are fewer than two.
+    """Compare each of the `stacks` (NAME=VALUE) with the first one. Returns None for fewer than two stacks.
 
-    The order of the results does not matter. Repetitions of a run, which check determinism, do not count.
+    Repetitions of a run are left out.
     """
     if len(stacks) < 2:
         return None
@@ -47,19 +47,18 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
 def compare_sessions(
     sessions: Mapping[str, Sequence[RunResult]], folders: Mapping[str, str], significance: Significance
 ) -> Comparison:
-    """Compare the runs of two sessions, of which the first one is the baseline.
+    """Compare the runs of two sessions with the same stack. The first session is the baseline.
 
-    `sessions` has the results, and `folders` the output folders, by the name of the session. If the sessions have runs
-    of several stacks, runs with the same stack are compared.
+    `sessions` are the results and `folders` the output folders, by name of the session.
     """
     runs = [replace(run, key=labeled_key(run.key, name)) for name, own in sessions.items() for run in own]
     return _compare(runs, folders, significance)
 
 
 def labeled_key(key: RunKey, session: str) -> RunKey:
-    """Return a key for comparing sessions, in which the session takes the place of the stack.
+    """Return the key of a run with the session as its stack, and with the stack as part of the scenario name.
 
-    The name of the stack becomes a part of the name of the scenario. Keys of repetitions are returned unchanged.
+    Keys of repetitions are returned unchanged.
     """
     if key.repeats:
         return key
@@ -78,13 +77,13 @@ def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significan
 
 
 def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, OutcomeCounts]:
-    """Return the outcomes of a scenario or variation, by stack."""
+    """Return the numbers of outcomes of a scenario or variation, by stack."""
     own = [run for key, run in runs.items() if key.test == test]
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
 def _own_outcome(run: RunResult) -> Outcome:
-    """Return the outcome that the run would have if it were not expected to fail."""
+    """Return the outcome of the run without its expected failure."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
@@ -136,9 +135,9 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
 
 
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
-    """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric of each scenario.
+    """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric by scenario.
 
-    `same_arrival` are the pairs in which the same robots reached their last goals.
+    `completed` are the pairs without errors. `same_arrival` are the pairs in which the same robots reached their goals.
     """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:
@@ -157,12 +156,12 @@ def _passed(run: RunResult) -> float:
 
 
 def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
-    """Return the pairs in which a metric can be compared: see OUTCOME_INDEPENDENT."""
+    """Return the pairs in which a metric can be compared: `completed` for OUTCOME_INDEPENDENT metrics."""
     return completed if _kind(name) in OUTCOME_INDEPENDENT else same_arrival
 
 
 def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
-    """Return the values of a metric in the pairs in which both runs have it."""
+    """Return the values of a metric in the pairs of runs that both have the metric."""
     both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
     return [(one, two) for one, two in both if one is not None and two is not None]
 
@@ -177,24 +176,24 @@ def _unit(name: str) -> str:
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of the COMPARED_METRICS that the runs have, grouped by robot."""
+    """Return the names of the COMPARED_METRICS of the runs, grouped by robot."""
     names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED_METRICS}
     return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_kind(name))))
 
 
 def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of metrics from installed packages."""
+    """Return the names of metrics of plugins."""
     return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
 
 
 def _arrived(run: RunResult) -> set[str]:
-    """Return the robots that reached their last goals; a single robot has the name ""."""
+    """Return the robots that reached their last goals. A single robot has the name ""."""
     times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
 
 def _flip(pair: Pair) -> Flip | None:
-    """Return the difference of the outcomes of a pair; None if they are equal."""
+    """Return the flip if only one run of the pair passed, otherwise None."""
     one, two = pair
     if _own_outcome(one) is _own_outcome(two):
         return None
@@ -214,7 +213,7 @@ def _first_violation(run: RunResult) -> str:
 
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
-    """Return the difference of a metric, or None if no pair has it."""
+    """Return the difference of a metric; None if no pair has the metric."""
     known = _values(name, pairs)
     if not known:
         return None
@@ -236,7 +235,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:
-    """Return the comparison as JSON data, with stacks and scenarios as ordered lists."""
+    """Return the comparison as JSON data."""
     return {
         "baseline": comparison.baseline,
         "stacks": [

@@ -1,4 +1,4 @@
-"""Computation of the metrics of a run: all of the catalog, and those of plugins that a scenario requests."""
+"""Computation of the metrics of a run: all metrics of the catalog, and metrics of plugins that a scenario requests."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -29,17 +29,17 @@ from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
 STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
-"""Speed and turn rate below which a robot does not move, as in HuNavSim, which uses the signed turn rate."""
+"""Speed and absolute turn rate below which a robot stands still."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""Speed with which BARN computes the optimal time for the reference path."""
+"""Speed of the optimal time in the BARN score."""
 
 ZONES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Smallest and largest distance in m of each of Hall's zones around a person."""
+"""Hall's zones around a person: smallest and largest distance in m."""
 
 _SHORTEST = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION = ("success", "path_length", "time_to_goal", *_SHORTEST)
@@ -48,12 +48,12 @@ _MOTION = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS
 _CLEARANCE = ("min_clearance", "mean_clearance")
 _PEOPLE = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
 _EVENTS = ("collisions", "contact_time", "replans", "recoveries")
-"""Names of metrics that are computed together."""
+"""Groups of metrics that are computed together."""
 
 
 @dataclass(frozen=True)
 class MetricValues:
-    """Values of metrics by name, in SI units. An undefined metric is None, and `undefined` has the reason by name."""
+    """Values of metrics in SI units, and reasons for undefined metrics (value None), both by name."""
 
     values: Mapping[str, float | None]
     undefined: Mapping[str, str]
@@ -62,8 +62,7 @@ class MetricValues:
 def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
     """Return all metrics of the catalog.
 
-    A metric is undefined if the log lacks its evidence for all or part of the run, or if one of its signals is unknown
-    or not finite. An undefined metric does not fail the run; a criterion that needs the signal does.
+    A metric is undefined if the log lacks the evidence for a part of the run, or if one of its signals is not finite.
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
@@ -86,7 +85,7 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
 
 
 def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
-    """Return the metrics that `compute` returns, or for each of `names` the reason why they cannot be computed."""
+    """Return the metrics that `compute` returns, or the reason why they cannot be computed for each of `names`."""
     try:
         return compute()
     except (InvalidTrace, MissingEvidence, SignalUnavailable) as reason:
@@ -94,18 +93,16 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
 
 
 def _missing_evidence(name: str, coverage: LogCoverage) -> str:
-    """Return which evidence of a metric the log lacks for all or part of the run, in words; "" if it is complete."""
+    """Return a text on the evidence of a metric that the log lacks; "" if the log has all of it."""
     required = METRICS[name].evidence
     return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
 
 def barn_score(success: bool, seconds: float, reference_length: float) -> float:
-    """Return the BARN score of a run that took `seconds`: 0 without success.
+    """Return the BARN score: optimal time / time, limited to the range from 1/8 to 1/2; 0 without success.
 
-    With success, the score is from 0.125, for at least 8 times the optimal time, to 0.5, for at most twice this time.
-    The optimal time is that of driving the `reference_length` in m at BARN_OPTIMAL_SPEED_M_S. Raises ValueError unless
-    the reference length is positive. BARN's own code for moving obstacles computes this length as a difference of
-    coordinates, which is negative, so that every success scores 0.125 there.
+    The optimal time is `reference_length` in m / BARN_OPTIMAL_SPEED_M_S. Raises ValueError if the length is not
+    positive.
     """
     if not reference_length > 0:
         raise ValueError(f"the length of the reference path must be positive, but is {reference_length:g} m")
@@ -198,7 +195,7 @@ def _clearance(trace: Trace) -> Values:
 
 
 def _events(trace: Trace) -> Values:
-    """Return the counts of events, and the time during which at least one contact lasts."""
+    """Return the counts of events, and the time with at least one contact."""
     events = trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED)
     steps = [1 if event.kind == EventKind.COLLISION_STARTED else -1 for event in events]
     # The end of a contact that began before the log must not cancel another one.
@@ -214,7 +211,7 @@ def _events(trace: Trace) -> Values:
 
 
 def person_metrics(trace: Trace, case: Case) -> Values:
-    """Return the smallest gap to a pedestrian, and the share of the run in each of Hall's zones."""
+    """Return the smallest gap to a pedestrian in m, and the share of the run in each of the ZONES."""
     gaps = pedestrian_gap(trace, case)
     durations = np.diff(np.append(trace.truth.ticks, trace.end))
     total = max(int(durations.sum()), 1)
@@ -227,9 +224,9 @@ def person_metrics(trace: Trace, case: Case) -> Values:
 def add_plugin_metrics(
     computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: LogCoverage
 ) -> MetricValues:
-    """Return the metrics together with the plugin metrics that a scenario requests.
+    """Return the `computed` metrics and the plugin metrics that a scenario requests.
 
-    Raises InvalidTrace if one of these raises an exception or is not finite, because the scenario needs it.
+    Raises InvalidTrace if a plugin metric raises an exception or is not finite.
     """
     values, undefined = dict(computed.values), dict(computed.undefined)
     for entry in metrics:

@@ -1,4 +1,4 @@
-"""Statistics of all runs of a session, as in publications of navigation benchmarks: success rate, SPL, collisions."""
+"""Statistics of all runs of a session, as in navigation benchmarks: success rate, SPL, collisions."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,20 +9,18 @@ from simscen.core.statistics import wilson_interval
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """Statistics of a session. A value is None if there are no runs to compute it from.
-
-    Each robot of a run counts like a run, except in `runs`, `measured_runs`, and successes.
+    """Statistics of a session. A value is None if no run has it.
 
     Attributes:
         runs: Number of runs that were not skipped.
-        success_rate: Share of the `runs`, including those with errors, in which all robots succeeded.
+        success_rate: Share of the `runs` in which all robots succeeded.
         success_interval: 95 % Wilson interval of the success rate.
-        spl: Mean of the metric `spl` over the `spl_runs`.
-        soft_spl: Mean of the metric `soft_spl`.
-        spl_runs: Number of runs that have the metric `spl`.
-        collisions: Number of collisions in the `measured_runs`.
-        kilometers: Distance driven in the `measured_runs`.
-        hours: Simulated time of the robots in the `measured_runs`.
+        spl: Mean of the metric `spl` over all robots.
+        soft_spl: Mean of the metric `soft_spl` over all robots.
+        spl_runs: Number of values of `spl`.
+        collisions: Number of collisions of all robots.
+        kilometers: Distance driven by all robots.
+        hours: Simulated time of all robots.
         measured_runs: Number of runs that have metrics.
     """
 
@@ -48,25 +46,25 @@ class SessionSummary:
         return self.collisions / self.hours if self.hours > 0 else None
 
 
-class SessionFigures:
-    """Collector of the numbers of each run that the statistics of a session need."""
+class SessionSummaryBuilder:
+    """Collects numbers of runs for a SessionSummary."""
 
     def __init__(self) -> None:
-        self._runs: list[tuple[tuple[str, str, int, str], RunFigures | None]] = []
+        self._runs: list[tuple[tuple[str, str, int, str], RunNumbers | None]] = []
 
     def add(self, result: RunResult) -> None:
-        """Add a run. A skipped run does not count."""
+        """Add a run. Skipped runs are ignored."""
         if result.outcome is not Outcome.SKIPPED:
             key = result.key
             order = key.scenario, key.variation, key.seed, key.stack_name
-            self._runs.append((order, RunFigures.from_result(result) if result.metrics else None))
+            self._runs.append((order, RunNumbers.from_result(result) if result.metrics else None))
 
     def summary(self) -> SessionSummary:
-        """Return the statistics. The order in which runs were added does not matter."""
-        measured = [figures for _, figures in sorted(self._runs, key=lambda run: run[0]) if figures is not None]
-        successes = sum(figures.success for figures in measured)
-        spl = [value for figures in measured for value in figures.spl]
-        soft_spl = [value for figures in measured for value in figures.soft_spl]
+        """Return the statistics of the added runs."""
+        measured = [run for _, run in sorted(self._runs, key=lambda run: run[0]) if run is not None]
+        successes = sum(run.success for run in measured)
+        spl = [value for run in measured for value in run.spl]
+        soft_spl = [value for run in measured for value in run.soft_spl]
         runs = len(self._runs)
         return SessionSummary(
             runs=runs,
@@ -75,17 +73,18 @@ class SessionFigures:
             spl=_mean(spl),
             soft_spl=_mean(soft_spl),
             spl_runs=len(spl),
-            collisions=round(sum(value for figures in measured for value in figures.collisions)),
-            kilometers=sum(value for figures in measured for value in figures.path_lengths) / 1000.0,
-            hours=sum(figures.robot_seconds for figures in measured) / 3600.0,
+            collisions=round(sum(value for run in measured for value in run.collisions)),
+            kilometers=sum(value for run in measured for value in run.path_lengths) / 1000.0,
+            hours=sum(run.robot_seconds for run in measured) / 3600.0,
             measured_runs=len(measured),
         )
 
 
-class RunFigures(NamedTuple):
-    """Numbers of a run for the statistics of a session.
+class RunNumbers(NamedTuple):
+    """Numbers of one run for the statistics of a session.
 
-    The tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots.
+    Tuples have one value for each robot that has the metric. `robot_seconds` is the sum of the simulated times of all
+    robots.
     """
 
     success: bool
@@ -96,7 +95,7 @@ class RunFigures(NamedTuple):
     robot_seconds: float
 
     @classmethod
-    def from_result(cls, run: RunResult) -> "RunFigures":
+    def from_result(cls, run: RunResult) -> "RunNumbers":
         """Return the numbers from the metrics of a run."""
         robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
         return cls(
@@ -129,7 +128,7 @@ def session_summary_data(summary: SessionSummary) -> dict[str, float | list[floa
 
 
 def session_summary_line(summary: SessionSummary) -> str:
-    """Return one line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
+    """Return one line, e.g. "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h"."""
     parts = []
     if summary.success_interval is not None:
         assert summary.success_rate is not None
@@ -149,12 +148,12 @@ def _runs(number: int) -> str:
 
 
 def _known(run: RunResult, name: str) -> tuple[float, ...]:
-    """Return the defined values of a metric, of the only robot or of each robot (`a/collisions`)."""
+    """Return the defined values of a metric for all robots."""
     return tuple(value for metric, value in run.metrics.items() if _is_metric(metric, name) and value is not None)
 
 
 def _is_metric(metric: str, name: str) -> bool:
-    """Return whether `metric` is the metric `name` of any robot."""
+    """Return whether `metric` is `name` or, with several robots, `robot/name`."""
     return metric.rpartition("/")[2] == name
 
 

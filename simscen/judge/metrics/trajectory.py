@@ -9,7 +9,7 @@ from simscen.criteria.trace_signals.estimation_errors import nees_samples, pose_
 from simscen.criteria.trace_signals.ground_truth import DrivenPath, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
-"""Minimum distance in m between points for computing the curvature, as in bench-mr. Closer points are noise."""
+"""Minimum distance between the points from which the curvature is computed, as in bench-mr."""
 
 Values = dict[str, float | str]
 """Metrics by name. A value is a number, or the reason why the metric is undefined."""
@@ -20,7 +20,7 @@ PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
 
 
 def path_metrics(trace: Trace, path: DrivenPath) -> Values:
-    """Return the metrics on turns and curvature of the driven path, without teleportations."""
+    """Return the PATH_METRICS of the driven path, without teleportations."""
     segments = path_segments(trace, path)
     total_turn = heading_change(trace)
     return {
@@ -41,17 +41,14 @@ def path_segments(trace: Trace, path: DrivenPath) -> list[Array]:
 
 
 def heading_change(trace: Trace) -> float:
-    """Return the sum of the absolute changes of the true heading in rad, without teleportations.
-
-    Unlike in Arena, a change from π to -π is 0.
-    """
+    """Return the sum of the absolute changes of the true heading in rad, without teleportations."""
     changes = np.abs(wrap_array(np.diff(truth(trace).values[:, 2])))
     changes[[k - 1 for k in teleport_samples(trace) if 0 < k <= len(changes)]] = 0.0
     return float(changes.sum())
 
 
 def _irregularity(trace: Trace, total_turn: float) -> float | str:
-    """Return the turns in rad beyond those of the first plan to each goal, as in SEAN, or why they are undefined."""
+    """Return `total_turn` minus the turns of the first plan to each goal in rad, or why the metric is undefined."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
@@ -67,7 +64,7 @@ def _slope_changes(segment: Array) -> float:
 
 
 def _curvature(segments: list[Array]) -> Values:
-    """Return the metrics on curvature: 1 / radius of the circle through three consecutive resampled points."""
+    """Return the metrics on curvature. Curvature is 1 / radius of the circle through three consecutive points."""
     weighted, curvatures = 0.0, []
     for segment in segments:
         points = _resample(segment)
@@ -86,7 +83,7 @@ def _curvature(segments: list[Array]) -> Values:
 
 
 def _resample(segment: Array) -> Array:
-    """Return a selection of the points in which each is at least CURVATURE_SPACING_M from the previous one."""
+    """Return a subset of the points with distances of at least CURVATURE_SPACING_M."""
     indices = [0]
     xs, ys = segment[:, 0].tolist(), segment[:, 1].tolist()
     for k in range(1, len(xs)):
@@ -97,14 +94,14 @@ def _resample(segment: Array) -> Array:
 
 
 RPE_DELTA_M = 1.0
-"""Driven distance in m between the two poses of a relative pose error."""
+"""Driven distance between the two poses of a relative pose error (RPE)."""
 
 _STATISTICS = ("rmse", "mean", "median", "max")
 NO_BELIEF = "the robot never reported an estimated pose"
 
 
 def pose_metrics(trace: Trace) -> Values:
-    """Return the metrics on errors of the estimated pose: APE, RPE over RPE_DELTA_M, and NEES."""
+    """Return the POSE_METRICS: absolute and relative errors of the estimated pose (APE, RPE), and NEES."""
     error = pose_error(trace)
     if not len(error):
         return dict.fromkeys(POSE_METRICS, NO_BELIEF)
@@ -128,9 +125,9 @@ def _statistics(name: str, errors: Array) -> Values:
 
 
 def _relative_errors(trace: Trace) -> Values:
-    """Return the RPE metrics, from (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with truth Q and belief P.
+    """Return the RPE metrics: statistics of (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with true poses Q and estimated poses P.
 
-    The samples i and j are RPE_DELTA_M of driving apart.
+    The robot drives RPE_DELTA_M between the samples i and j.
     """
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
@@ -149,9 +146,9 @@ def _relative_errors(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return the first and the second index of pairs of samples between which the steps add up to RPE_DELTA_M.
+    """Return the first and second indices of pairs of samples that are RPE_DELTA_M of driving apart.
 
-    `steps` are the distances in m between consecutive samples. evo calls this filter_pairs_by_path.
+    `steps` are the distances in m between consecutive samples.
     """
     ids, length = [0], 0.0
     for k, step in enumerate(steps.tolist(), start=1):
@@ -170,7 +167,7 @@ def _between(origin: Array, poses: Array) -> Array:
 
 
 def _truth_at_beliefs(trace: Trace) -> Array:
-    """Return the true poses (n, 3) at the ticks of the belief, by interpolation."""
+    """Return the true poses (n, 3) at the ticks of the estimated poses, by interpolation."""
     poses, ticks = truth(trace), trace.belief.ticks
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     return np.column_stack((x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))))

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.judge.metrics.session_summary import (
-    SessionFigures,
+    SessionSummaryBuilder,
     SessionSummary,
     session_summary_data,
     session_summary_line,
@@ -14,7 +14,7 @@ from simscen.judge.metrics.session_summary import (
 
 
 def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
-    figures = SessionFigures()
+    figures = SessionSummaryBuilder()
     for result in results:
         figures.add(result)
     return figures.summary()
