@@ -1,4 +1,4 @@
-"""Checks of an edited text that may not be saved yet: the same as those of `simscen validate`."""
+"""Checks of an edited text, which need not be saved. They are the checks of `simscen validate`."""
 
 from dataclasses import dataclass, field
 
@@ -26,8 +26,9 @@ MAX_WORLDS = 8
 class TextChecks:
     """Loads and checks texts of one file.
 
-    Built worlds and shortest paths are cached, because they rarely differ between two texts. `lenient` has the meaning
-    of the option --lenient. `stack` replaces the stack of the scenario, unless it is None.
+    lenient:  value of the option --lenient
+    stack:    stack that replaces the stack of the scenario; None to keep it
+    cache:    cache of built worlds and shortest paths
     """
 
     file: EditedFile
@@ -36,7 +37,7 @@ class TextChecks:
     cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
 
     def load(self, text: str) -> tuple[LoadedScenario, ...] | list[Problem]:
-        """Return the first variations of the scenario in a text, or the problems that prevent loading it."""
+        """Return the variations CHECKED_VARIATIONS of the scenario in a text, or the problems that prevent loading."""
         file, unsaved = self.file, {self.file.path: text}
         loaded = try_variations(file.path, file.root, file.world_path, self.stack, CHECKED_VARIATIONS, unsaved)
         if isinstance(loaded, list):
@@ -62,7 +63,7 @@ class TextChecks:
         return merge_problems(checked)
 
     def _variation_problems(self, loaded: LoadedScenario) -> list[Problem]:
-        """Return the problems of one variation, including those in its world, such as a start inside of a wall."""
+        """Return the problems of one variation and of its world, such as a start inside a wall."""
         try:
             return [*loaded.notes, *check_in_world(loaded, self.cache)]
         except InvalidInput as error:

@@ -1,4 +1,4 @@
-"""Reading and saving of the edited file, which is not overwritten if another program has changed it meanwhile."""
+"""Reading and saving of the edited file, with a check for changes by other programs."""
 
 import hashlib
 import stat
@@ -15,13 +15,13 @@ from simscen.run.sessions.output_folder import write_atomically
 
 @dataclass(frozen=True)
 class EditedFile:
-    """The file that is edited, and the folders whose files it may refer to.
+    """The edited file, and the folders whose files it may refer to.
 
     Attributes:
         path: Absolute path of the file.
         kind: "scenario" or "world".
-        root: Root of the scenario.
-        world_path: Further folders with worlds and maps.
+        root: Folder that all files of the scenario must lie in.
+        world_path: Additional folders with worlds and maps.
     """
 
     path: Path
@@ -31,11 +31,11 @@ class EditedFile:
 
     @property
     def display_name(self) -> str:
-        """Name of the file in messages: its path relative to the root or to one of the further folders."""
+        """Name of the file in messages: its path relative to `root` or to a folder of `world_path`."""
         return PathSandbox.around(self.root, self.world_path).display_name(self.path)
 
     def library(self, text: str) -> Library:
-        """Return a reader of the files in these folders that reads `text` instead of the content of this file."""
+        """Return a reader of the files in these folders. It returns `text` as the content of the edited file."""
         return Library(PathSandbox.around(self.root, self.world_path), unsaved={self.path: text})
 
 
@@ -52,7 +52,7 @@ class Content(NamedTuple):
 
 
 class ChangedMeanwhile(Exception):
-    """The file was changed, created, or deleted after the editor read it; `content` is its present content."""
+    """The file was changed, created, or deleted after the editor read it. `content` is its current content."""
 
     def __init__(self, message: str, content: Content) -> None:
         super().__init__(message)
@@ -61,9 +61,9 @@ class ChangedMeanwhile(Exception):
 
 @dataclass
 class Document:
-    """Reads and saves a text file. `display_name` is its name in messages.
+    """Reads and saves a text file. Line breaks (\\n or \\r\\n) and a byte order mark are preserved.
 
-    The kind of line breaks (\\n or \\r\\n) and a byte order mark are preserved.
+    `display_name` is the name of the file in messages.
     """
 
     path: Path
@@ -72,7 +72,7 @@ class Document:
     _mark: bytes = b""
 
     def read(self) -> Content:
-        """Return the content of the file. Raises InvalidInput if it is no text file, or mixes kinds of line breaks."""
+        """Return the content of the file. Raises InvalidInput if the file is not text or mixes kinds of line breaks."""
         text = read_text(self.path, self.display_name)
         if isinstance(text, Problem):
             raise InvalidInput([text])
@@ -88,8 +88,8 @@ class Document:
     def save(self, text: str, version: str, overwrite: bool = False) -> str:
         """Replace the content of the file atomically and return its new version.
 
-        `version` is the version on which the text is based. Raises ChangedMeanwhile if the file has another version
-        now, unless `overwrite` is true; UsageError if the file cannot be written.
+        `version` is the version that was edited. Raises ChangedMeanwhile if the file now has another version and
+        `overwrite` is False. Raises UsageError if the file cannot be written.
         """
         if not overwrite and (now := self._current_version()) != version:
             raise ChangedMeanwhile(self._change_message(version, now), self._content_of_version(now))
@@ -110,7 +110,7 @@ class Document:
             return NEW
 
     def _content_of_version(self, version: str) -> Content:
-        """Return the present content of the file, whose version is known; the text is "" if it cannot be read."""
+        """Return the current content of the file with the current `version`. Its text is "" if it cannot be read."""
         text = read_text(self.path, self.display_name) if version != NEW else ""
         return Content(text if isinstance(text, str) else "", version)
 

@@ -1,7 +1,7 @@
 """Forms for editing the values of a file, made from its JSON Schema.
 
-`keys` are the path to a value in the file: keys of mappings and indices of lists. `data` is the plain content of the
-file, on which the choice between alternatives of the schema depends.
+`keys` are the path to a value in the file: keys of mappings and indices of lists. `data` is the content of the file as
+dicts, lists, and scalars.
 """
 
 import json
@@ -34,7 +34,7 @@ def schema_of_kind(kind: str) -> Schema:
 
 
 def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
-    """Return the schema of the value at `keys`; {} if it is unknown. `root` is the schema of the file."""
+    """Return the schema of the value at `keys`; {} for an unknown key. `root` is the schema of the file."""
     schema = resolve_schema(root, root, data)
     for key in keys:
         child = value_at(data, (key,))
@@ -44,7 +44,7 @@ def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
 
 
 def child_schema(schema: Schema, key: Key) -> Schema:
-    """Return the schema of the value of a key, or of the item with an index; {} if there is none."""
+    """Return the schema of the value of a key, or of the item with an index; {} if the schema has none."""
     if isinstance(key, int):
         prefix = schema.get("prefixItems", [])
         found = prefix[key] if key < len(prefix) else schema.get("items", {})
@@ -55,10 +55,7 @@ def child_schema(schema: Schema, key: Key) -> Schema:
 
 
 def resolve_schema(root: Schema, schema: Schema, data: Any) -> Schema:
-    """Return a schema in which references, conditions, and alternatives are replaced by the schemas that apply.
-
-    `data` is the value to which they must apply.
-    """
+    """Return the schema with its references, conditions, and alternatives resolved for the value `data`."""
     for _ in range(MAX_REFERENCES):
         if "$ref" in schema:
             target = root["$defs"][schema["$ref"].rpartition("/")[2]]
@@ -74,7 +71,7 @@ def resolve_schema(root: Schema, schema: Schema, data: Any) -> Schema:
 
 
 def value_at(data: Any, keys: Sequence[Key]) -> Any:
-    """Return the value at `keys`; None if there is none."""
+    """Return the value at `keys`; None if the data have no such value."""
     for key in keys:
         if isinstance(data, dict):
             data = data.get(str(key))
@@ -86,23 +83,23 @@ def value_at(data: Any, keys: Sequence[Key]) -> Any:
 
 
 def alternatives(schema: Schema) -> list[str]:
-    """Return the keys of which a mapping must have exactly one, such as the kinds of triggers; [] if there are none."""
+    """Return the keys of which a mapping must have exactly one, such as kinds of triggers; [] without such keys."""
     options = [one.get("required", []) for one in schema.get("oneOf", []) if isinstance(one, dict)]
     return [option[0] for option in options if len(option) == 1]
 
 
 def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
-    """Return a schema without the keys `without`, to which a branch is added. The outer description has priority."""
+    """Return the schema without the keys `without`, merged with a branch. Its own description has priority."""
     outer = {key: value for key, value in schema.items() if key not in without}
     description = outer.get("description") or branch.get("description", "")
     return {**outer, **branch, "description": description}
 
 
 def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
-    """Yield the branches of allOf, oneOf, and anyOf that apply to the data, best first.
+    """Yield the branches of allOf, oneOf, and anyOf that apply to the data.
 
-    These are branches whose condition is true, then references to a schema whose `type` is that in the data, then the
-    first reference as a default.
+    Branches whose condition is true come first, then references to schemas with the `type` of the data. The first
+    reference is the default at the end.
     """
     unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
     conditional = [union for union in unions if "if" in union and "then" in union]
@@ -118,7 +115,7 @@ def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Sc
 
 
 def _applies(condition: Schema, data: Any) -> bool:
-    """Return whether an `if` of a schema is true for the data. Supports only what the schemas of simscen use."""
+    """Return whether the data meet an `if` of a schema. Supports the keywords of simscen's schemas."""
     wanted = condition.get("type")
     if wanted is not None and not isinstance(data, _TYPES[wanted]):
         return False
@@ -132,13 +129,13 @@ def _applies(condition: Schema, data: Any) -> bool:
 
 
 MAX_REFERENCES = 8
-"""Maximum number of references and conditions that lead to a schema, so that a circle of references ends."""
+"""Maximum number of references and conditions in sequence."""
 MAX_DEPTH = 4
-"""Maximum depth of nested fields in a form. Deeper values are edited in the text."""
+"""Maximum depth of nested fields in a form."""
 MAX_ITEMS = 12
-"""Maximum number of items of a list in a form. Longer lists are edited in the text or on the map."""
+"""Maximum number of items of a list in a form. Longer lists have no fields."""
 MAX_TEXT_FIELD_CHARACTERS = 60
-"""Longer strings, and strings with line breaks, get a field with several lines."""
+"""Maximum length of a string in a field with one line."""
 FIRST_VALUE_OF_KEY = {
     "name": "new",
     "description": "description",
@@ -146,7 +143,7 @@ FIRST_VALUE_OF_KEY = {
     "through": [[0, 0]],
     "points": [[0, 0], [1, 0]],
 }
-"""Values of new keys, where the schema suggests none that is useful."""
+"""Initial values of new keys, with priority over the schema."""
 
 Keys = tuple[Key, ...]
 _EXAMPLE_OF_QUANTITY = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
@@ -155,8 +152,8 @@ _EXAMPLE_OF_QUANTITY = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
 def form_data(kind: str, text: str, data: Any, keys: Keys) -> dict[str, Any]:
     """Return the form of the value at `keys` as JSON data: its help, its fields, and the keys that can be added.
 
-    `data` is the content of the `text` including the files that it extends. The form of the complete file, whose `keys`
-    are (), has no nested fields.
+    `data` is the content of the `text`, including content that it inherits from other files. The form of the complete
+    file (`keys` are empty) has no nested fields.
     """
     root = schema_of_kind(kind)
     schema = schema_at(root, keys, data)
@@ -172,10 +169,7 @@ class _Form:
         self._root, self._text, self._source, self._max_depth = root, text, source, max_depth
 
     def field(self, keys: Keys, schema: Schema, value: Any, required: bool, depth: int) -> dict[str, Any]:
-        """Return the field of the value at `keys`, with the fields of its keys or items.
-
-        `depth` is 0 for the value of the form itself.
-        """
+        """Return the field of the value at `keys`, including nested fields. `depth` is 0 for the top-level field."""
         help_, example = _help_and_example(schema)
         written = None if self._source is None or not keys else source_at(self._source, keys)
         base = {
@@ -204,7 +198,7 @@ class _Form:
         return {"fields": fields, "addable": self._addable(keys, schema, value)}
 
     def _addable(self, keys: Keys, schema: Schema, value: dict[str, Any]) -> list[dict[str, Any]]:
-        """Return the keys that can be added to a mapping, each with its help and a value for the new key."""
+        """Return the keys that can be added to a mapping, with their help and initial value."""
         choices = alternatives(schema)
         has_choice = any(choice in value for choice in choices)
         found = []
@@ -243,7 +237,7 @@ class _Form:
 
 
 def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> Any:
-    """Return a value for a new key or item that is valid according to the schema; None if there is no simple one.
+    """Return a valid initial value for a new key or item; None if no simple value is valid.
 
     `depth` is the number of mappings and lists around the value, at most MAX_DEPTH.
     """
@@ -273,7 +267,7 @@ def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> 
 
 
 def _first_mapping(root: Schema, schema: Schema, depth: int) -> dict[str, Any] | None:
-    """Return a mapping with the required keys; None if one of them has no simple value."""
+    """Return a mapping with the required keys; None if a required key has no simple value."""
     if depth >= MAX_DEPTH:
         return None
     properties, made = schema.get("properties", {}), dict[str, Any]()
@@ -294,7 +288,7 @@ def _first_number(schema: Schema) -> float:
 
 
 def _help_and_example(schema: Schema) -> tuple[str, str]:
-    """Return the description of a value, and the example of a quantity at its end, such as "0.5 m"; "" for none."""
+    """Return the description of a value without its example, and the example, such as "0.5 m"; "" if missing."""
     paragraphs = str(schema.get("description", "")).split("\n\n")
     text = "\n\n".join(" ".join(part.split()) for part in paragraphs).strip()
     match = _EXAMPLE_OF_QUANTITY.search(text)

@@ -1,4 +1,4 @@
-"""Text of a new scenario in a given world or on a map: a robot, a goal that the robot can reach, and two criteria."""
+"""Text of a new scenario in a given world: a robot, a reachable goal, and two criteria."""
 
 import os
 from pathlib import Path
@@ -15,18 +15,18 @@ from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedWorld
 
 LIDAR_HEIGHT_M = 0.2
-"""Height at which the map of a world is made."""
+"""Height of the horizontal section through the world that yields its map."""
 PREFERRED_CLEARANCE_M = 0.5
-"""Minimum distance of start and goal from walls. If no position has it, half of it is tried, and then none."""
-CANDIDATES = 200
+"""Preferred minimum distance of start and goal from walls. If no position has it, smaller distances are tried."""
+MAX_CANDIDATES = 200
 """Maximum number of free positions from which start and goal are chosen."""
 
 
 def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tuple[Path, ...], lenient: bool) -> str:
     """Return the text of a new scenario `file` in the world of `world_file`.
 
-    `world_file` is a world file, a ROS map, or an SDF file; InvalidInput is raised if it is invalid. `root` and
-    `world_path` are the folders whose files it may refer to. If `lenient`, unusable elements of SDF are left out.
+    `world_file` is a world file, a ROS map, or an SDF file. It may refer to files in the folders `root` and
+    `world_path`. With `lenient`, unsupported SDF elements are left out. Raises InvalidInput if `world_file` is invalid.
     """
     from simscen.worlds.built_world import build_world_and_map
 
@@ -54,9 +54,9 @@ def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tupl
 
 
 def _world_lines(source: LoadedWorld, path_text: str) -> list[str]:
-    """Return the lines of the key `world`; `path_text` is the path of the world file, quoted if YAML requires it.
+    """Return the YAML lines of the key `world`: an inline world for a map or an SDF file.
 
-    For a map or an SDF file, the lines contain an inline world, to which users can add obstacles, objects, and regions.
+    `path_text` is the path of the world file as YAML.
     """
     if source.spec is not None:
         return [f"world: {path_text}"]
@@ -68,10 +68,7 @@ def _pose_text(pose: Pose2) -> str:
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
-    """Return two free positions that are far apart, and between which the robot can drive.
-
-    Return the origin twice if there is no free space.
-    """
+    """Return two free positions that are far apart and have a path between them; two origins without free space."""
     points = _free_points(built)
     if not len(points):
         return Pose2(0.0, 0.0), Pose2(0.0, 0.0)
@@ -86,7 +83,7 @@ def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
 
 
 def _free_points(built: BuiltWorld) -> Array:
-    """Return at most CANDIDATES free positions (n, 2) in m in the order of cells, far from walls if possible."""
+    """Return at most MAX_CANDIDATES free positions (n, 2) in m, if possible with PREFERRED_CLEARANCE_M."""
     from scipy import ndimage
 
     grid = built.map
@@ -95,13 +92,13 @@ def _free_points(built: BuiltWorld) -> Array:
     for min_clearance in (PREFERRED_CLEARANCE_M, PREFERRED_CLEARANCE_M / 2, 0.0):
         cells = _in_bounds(np.argwhere(clearance > min_clearance), built)
         if len(cells):
-            chosen = cells[np.linspace(0, len(cells) - 1, min(CANDIDATES, len(cells))).astype(np.int64)]
+            chosen = cells[np.linspace(0, len(cells) - 1, min(MAX_CANDIDATES, len(cells))).astype(np.int64)]
             return np.round(grid.center_of(chosen), 2)
     return np.zeros((0, 2))
 
 
 def _in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[np.int64]:
-    """Return the cells (n, 2) inside the bounds of the world, where goals may be; all cells if the world has a map."""
+    """Return the cells (n, 2) inside the bounds of the world; all cells if the world has a map."""
     if built.world.grid is not None:
         return cells
     left, low, right, high = built.world.bounds

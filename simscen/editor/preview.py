@@ -1,4 +1,4 @@
-"""Shortest paths and clearances of a scenario's robots, which the page shows while the user drags something."""
+"""Shortest paths and clearances of a scenario's robots, which the editor page shows while the user drags an object."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,18 +20,17 @@ from simscen.loading.robot_size import RobotSize, blocking_world, robot_size
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 OUTLINE_STEP_M = 0.05
-"""Distance between the points of a footprint at which the clearance is measured."""
+"""Distance between the points of the footprint from which the clearance is computed."""
 MAX_LEGS = 40
-"""Maximum number of paths from one stop to the next that are shown for each robot."""
+"""Maximum number of legs (paths from the start to a goal or between goals) of each robot."""
 MAX_CLEARANCE_M = 1000.0
-"""Larger clearances are not shown, because there is nothing around."""
+"""Maximum clearance that is shown."""
 
 
 def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
-    """Return the data of each robot by its key in the text: footprint, path through its goals, and clearances.
+    """Return JSON data with the footprint, legs, and clearances at start and goals of each robot, by its key.
 
-    The stops of the path are the start and the goals. If the text has problems, there are no robots, and `reason` says
-    why; otherwise it is "".
+    If the text has problems, there are no robots, and `reason` is the first problem.
     """
     loaded = checks.load(text)
     if isinstance(loaded, list):
@@ -47,7 +46,7 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
 
 
 def _reason(problems: Sequence[Problem]) -> str:
-    """Return the first problem of the text as the reason why no path is shown."""
+    """Return the text of the first problem, as the reason why no path is shown."""
     first = min(problems)
     return f"No path is shown until this is corrected: line {first.line}: {first.message}"
 
@@ -69,16 +68,14 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
 
 
 def _static_solids(scene: Scene) -> tuple[Solid, ...]:
-    """Return the solids that block the robot: those of the world, and bodies that nothing moves.
-
-    Without such bodies, this is the tuple of the world itself, because the cache of shortest paths compares identities.
-    """
+    """Return the solids that block the robot: solids of the world, and immovable bodies."""
+    # Without such bodies, returns the same tuple: the cache of shortest paths compares identities.
     immovable = scene.immovable_bodies
     return (*scene.world.solids, *immovable) if immovable else scene.world.solids
 
 
 def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
-    """Return the points and the length in m of the shortest path; a straight line without length if there is none."""
+    """Return the points and the length in m of the shortest path; a straight line and None without a path."""
     path = paths.path(start, goal)
     if path is None:
         return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}
@@ -86,9 +83,9 @@ def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
 
 
 def _clearance(paths: ShortestPaths, size: RobotSize, pose: Pose2) -> float | None:
-    """Return the distance in m from the footprint at a pose to the nearest solid; None if nothing is near.
+    """Return the distance in m from the footprint at a pose to the nearest solid; None above MAX_CLEARANCE_M.
 
-    The distance is negative if they overlap.
+    The distance is negative if both overlap.
     """
     if size.radius is not None:
         nearest = float(paths.clearances(np.array([[pose.x, pose.y]]))[0]) - size.radius

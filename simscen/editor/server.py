@@ -1,7 +1,4 @@
-"""Local HTTP server of the editor: its page, the requests of the page, and the files that are edited.
-
-The server answers only requests whose address contains its secret token.
-"""
+"""Local HTTP server of the editor. It answers only requests whose URL contains its secret token."""
 
 import json
 import re
@@ -25,11 +22,10 @@ _WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
 
 
 class OpenFiles:
-    """The editor sessions of a server: the main file, and the world files that the main file refers to.
+    """Editor sessions of the main file and of the world files that it refers to.
 
-    The page of the n-th world file has the address `world-n/`; its session starts when the page is first requested. The
-    number of a world file never changes, so that a page cannot save into another file when the scenario is changed to
-    refer to another world.
+    The page of world file number n has the path `world-n/`. The number of a world file never changes. The session of a
+    world file starts when its page is first requested.
     """
 
     def __init__(self, main: EditorSession) -> None:
@@ -40,7 +36,7 @@ class OpenFiles:
         main.world_page_address = self._page_address
 
     def resolve(self, name: str) -> tuple[EditorSession, str] | None:
-        """Return the session that a requested path belongs to, and the rest of the path; None for an unknown file."""
+        """Return the session of a requested path, and the rest of the path; None for an unknown world file."""
         first, slash, rest = name.partition("/")
         match = _WORLD_PAGE.fullmatch(first) if slash else None
         if match is None:
@@ -54,12 +50,12 @@ class OpenFiles:
             session.runs.close()
 
     def _page_address(self, world: Path) -> str:
-        """Return the address of the page of a world file, and give the file a number if it has none."""
+        """Return the path of the page of a world file. A new file gets the next number."""
         with self._lock:
             return f"world-{self._worlds.setdefault(world, len(self._worlds) + 1)}/"
 
     def _session(self, number: int) -> EditorSession | None:
-        """Return the session of a world file, and start it if necessary; None if the file cannot be opened."""
+        """Return the session of world file `number`, and start it if necessary; None if the file cannot be read."""
         with self._lock:
             if number not in self._sessions:
                 path = next((path for path, known in self._worlds.items() if known == number), None)
@@ -76,7 +72,7 @@ ADDRESS = "127.0.0.1"
 PAGE_FOLDER = PACKAGE / "data" / "editor"
 REPLAY_FOLDER = PACKAGE / "data" / "replay"
 SHARED_MODULES = ("camera.js", "dom.js")
-"""JavaScript modules of the replay page that this page uses as well."""
+"""JavaScript modules in REPLAY_FOLDER that the editor page uses as well."""
 MAX_REQUEST_BYTES = 4 << 20
 """Maximum size of the body of a request."""
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
@@ -89,7 +85,7 @@ _POLICY_OF_PAGE = re.compile(r'http-equiv="Content-Security-Policy" content="([^
 
 
 class Response(NamedTuple):
-    """HTTP response. `policy` is its Content-Security-Policy."""
+    """HTTP response. `policy` is the Content-Security-Policy."""
 
     body: bytes
     content_type: str
@@ -98,7 +94,7 @@ class Response(NamedTuple):
 
 
 class EditorServer(ThreadingHTTPServer):
-    """Serves the page of a session at `url`, only for programs on this machine."""
+    """HTTP server of an editor session, only for programs on this machine."""
 
     daemon_threads = True
 
@@ -112,12 +108,12 @@ class EditorServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Address of the page, with the token."""
+        """URL of the page, with the token."""
         return f"http://{ADDRESS}:{self.server_port}/{self.token}/"
 
     @property
     def session(self) -> EditorSession:
-        """Session of the file that the command `simscen edit` names."""
+        """Session of the main file."""
         return self.open_files.main
 
     def stop_runs(self) -> None:
@@ -137,12 +133,12 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 60
 
     def do_GET(self) -> None:
-        """Send a file of the editor page, or the replay page of a run."""
+        """Send a file of the editor page or the replay page of a run."""
         if (requested := self._authorized()) is not None:
             self._send(self._file(*requested))
 
     def do_POST(self) -> None:
-        """Answer a request of the page: JSON to one of the `requests` of a session."""
+        """Answer a JSON request of the page, one of the `requests` of a session."""
         body = self._body()
         if (requested := self._authorized()) is None:
             return
@@ -154,12 +150,12 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(_response(*requested, body))
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Print nothing, because the address contains the token."""
+        """Print nothing, because the URL contains the token."""
 
     def _authorized(self) -> tuple[EditorSession, str] | None:
-        """Return the session of a request, and the path of the request within this session.
+        """Return the session of a request and the path within this session.
 
-        If the request is not allowed, send an error, and return None.
+        If the request is not allowed, send an error and return None.
         """
         origin, host = self.headers.get("Origin"), self.headers.get("Host", "")
         if host not in self.server.hosts:
@@ -180,7 +176,7 @@ class _Handler(BaseHTTPRequestHandler):
         return requested
 
     def _body(self) -> bytes | None:
-        """Return the body of a request. If it is too large or has no length, close the connection and return None."""
+        """Return the body of a request. If it is too large or has no length, send an error and return None."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > MAX_REQUEST_BYTES:
             self.close_connection = True
@@ -217,7 +213,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _replay(session: EditorSession, number: int) -> Response:
-    """Return the replay page of a run with the policy that the page itself contains."""
+    """Return the replay page of a run, with the Content-Security-Policy in the page."""
     trial = session.runs.trial(number)
     if trial is None or not trial.replay.is_file():
         return _error("there is no such replay", HTTPStatus.NOT_FOUND)
@@ -228,7 +224,7 @@ def _replay(session: EditorSession, number: int) -> Response:
 
 
 def _response(session: EditorSession, name: str, body: bytes) -> Response:
-    """Return the answer of a session to the request `api/NAME` with a JSON object as its body."""
+    """Return the answer of a session to the request `name` ("api/…") with a JSON object as `body`."""
     handler = session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
     if handler is None:
         return _error("no such request", HTTPStatus.NOT_FOUND)

@@ -1,6 +1,6 @@
-"""Answers the requests of the editor page: one method for each, with JSON data as argument and result.
+"""Answers to the requests of the editor page.
 
-The page holds the edited text, and sends it with each request as `text`. "The map" is the page's drawing of the world.
+The page holds the edited text and sends it as `text` with each request. The page also shows a map of the world.
 """
 
 import threading
@@ -30,7 +30,7 @@ from simscen.run.process.jobs import Backend
 Data = dict[str, Any]
 """JSON object."""
 CommandResolver = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
-"""Function that returns a scenario with the commands of its external stacks, and problems if they are unknown."""
+"""Function that returns a scenario with the commands of its external stacks, and problems with these commands."""
 
 
 def _without_commands(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
@@ -38,7 +38,7 @@ def _without_commands(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Prob
 
 
 class RequestRefused(Exception):
-    """The request cannot be answered. `status` is the HTTP status, `data` are further keys of the answer."""
+    """The request cannot be answered. `status` is the HTTP status, `data` are additional keys of the answer."""
 
     def __init__(self, message: str, status: int = 400, data: Data | None = None) -> None:
         super().__init__(message)
@@ -48,8 +48,8 @@ class RequestRefused(Exception):
 class EditorSession:
     """Answers the requests about one edited file.
 
-    The attribute `requests` maps the name of each request to the method that answers it. These methods raise
-    RequestRefused if the request cannot be answered.
+    `requests` maps the name of each request to its method, with JSON data as argument and result. The methods raise
+    RequestRefused if a request cannot be answered.
     """
 
     def __init__(
@@ -61,10 +61,13 @@ class EditorSession:
         stack: StackChoice | None = None,
         resolve_commands: CommandResolver = _without_commands,
     ) -> None:
-        """Open a file. `new_text` is the text of a file that does not exist yet; "" for an existing file.
+        """Open a file. Raises InvalidInput if the file cannot be read.
 
-        `backend_factory` makes the processes of runs. `lenient` has the meaning of the option --lenient. Runs use
-        `stack` instead of the stack of the scenario, unless it is None. Raises InvalidInput if the file cannot be read.
+        backend_factory:   creates the backend that starts the process of a run
+        new_text:          text of a file that does not exist yet; "" for an existing file
+        lenient:           value of the option --lenient
+        stack:             stack that replaces the stack of the scenario; None to keep it
+        resolve_commands:  returns the scenario with the commands of external stacks
         """
         self.file = file
         self.runs = TrialRuns(backend_factory)
@@ -92,11 +95,11 @@ class EditorSession:
         }
 
     def open_other(self, file: EditedFile) -> "EditorSession":
-        """Return a session for another file with the same options. Raises InvalidInput if it cannot be read."""
+        """Return a session for another file with the same options. Raises InvalidInput if the file cannot be read."""
         return EditorSession(file, self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
-        """Return the present text of the file, or the text that was read last if the file can no longer be read."""
+        """Return the text of the file, or the last text if the file can no longer be read."""
         if self._opened.version != NEW:
             with suppress(InvalidInput, OSError):
                 self._opened = self._document.read()
@@ -111,9 +114,9 @@ class EditorSession:
         return self._opened_data(self._opened)
 
     def scene(self, request: Data) -> Data:
-        """Return what to draw on the map for a text: the background and the objects.
+        """Return the background and the objects of the map.
 
-        `known` in the request is the ID of the background that the page already has. If the background is the same,
+        `known` in the request is the ID of the background that the page already has. If it has not changed,
         `background` in the answer is None.
         """
         with self._scene_lock:
@@ -127,7 +130,7 @@ class EditorSession:
         return data
 
     def problems(self, request: Data) -> Data:
-        """Return the problems of a text, each with the ID of the object on the map in whose YAML it is."""
+        """Return the problems of the text, with the IDs of the affected objects on the map."""
         text = _text(request)
         with self._check_lock:
             found = self._checks.problems(text)
@@ -137,7 +140,7 @@ class EditorSession:
         return {"problems": [self._problem_data(one, objects, source, text) for one in found]}
 
     def edit(self, request: Data) -> Data:
-        """Return the text after `edits` that were made on the map or in a form."""
+        """Return the text after `edits` on the map or in a form."""
         text = _text(request)
         return {"text": self._edited_text(text, request.get("edits"))}
 
@@ -152,7 +155,7 @@ class EditorSession:
         return form_data(self.file.kind, text, parts.tree.plain, tuple(keys))
 
     def preview(self, request: Data) -> Data:
-        """Return the paths and clearances of the robots as they would be after `edits`."""
+        """Return the paths and clearances of the robots after `edits`."""
         if self.file.kind != "scenario":
             return {"reason": "", "robots": {}}
         text = self._edited_text(_text(request), request.get("edits", []))
@@ -162,7 +165,7 @@ class EditorSession:
     def save(self, request: Data) -> Data:
         """Write the text to the file, and return the new version.
 
-        Refused if the file no longer has the `version` that the page has read, unless `overwrite` is true.
+        The request is refused if the version of the file is not `version` and `overwrite` is false.
         """
         text, version = _text(request), request.get("version")
         try:
@@ -174,7 +177,7 @@ class EditorSession:
         return {"version": saved}
 
     def run(self, request: Data) -> Data:
-        """Start a run of the scenario, or of its first variation. Refused if the text has errors."""
+        """Start a run of the scenario or its first variation. The request is refused if the text has errors."""
         if self.file.kind != "scenario":
             raise RequestRefused("only a scenario can run")
         with self._check_lock:
@@ -238,7 +241,7 @@ class EditorSession:
 
 
 def _text(request: Data) -> str:
-    """Return the text of a request. Raises RequestRefused if there is none, or if it is too large."""
+    """Return the text of a request. Raises RequestRefused if the text is missing or too large."""
     text = request.get("text")
     if not isinstance(text, str):
         raise RequestRefused("the request has no text")
@@ -253,6 +256,6 @@ def _first_message(problems: list[Problem]) -> str:
 
 
 def _run_number(request: Data) -> int:
-    """Return the number of the run that a request names; 0 if it names none."""
+    """Return the number of the run in a request; 0 if it is missing."""
     number = request.get("run")
     return number if isinstance(number, int) else 0

@@ -1,4 +1,4 @@
-"""Trial runs of the text in the editor, in a process of their own, so that the text need not be saved."""
+"""Trial runs of the text in the editor, which need not be saved."""
 
 import shutil
 import tempfile
@@ -19,7 +19,7 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 WALL_LIMIT_S = 300.0
 """Maximum wall time of a run."""
 STOP_TIMEOUT_S = 5.0
-"""Maximum wall time to wait for a run to stop. Its process ends with the process of the editor at the latest."""
+"""Maximum wall time to wait for a run to stop."""
 REPLAY_FILE = "replay.html"
 
 
@@ -29,16 +29,16 @@ class _Canceled(Exception):
 
 @dataclass
 class Trial:
-    """State of one run, which changes while the run takes place.
+    """State of one run, which is updated during the run.
 
     Attributes:
         number: Number of the run, starting at 1.
-        folder: Folder of its files.
+        folder: Folder with the files of the run.
         limit: Maximum simulated time in s.
         seconds: Simulated time so far in s.
         state: "running", then the outcome of the run, "canceled", or "error".
-        message: Reason of the end or the error; "" while the run takes place.
-        verdicts: Verdicts after the end, each with `id`, `status`, `text`, and `line`.
+        message: Reason of the end or error message; "" during the run.
+        verdicts: Verdicts after the run, each with `id`, `status`, `text`, and `line`.
         is_canceled: Whether the run must stop.
     """
 
@@ -52,7 +52,7 @@ class Trial:
     is_canceled: bool = False
 
     def data(self) -> dict[str, Any]:
-        """Return the state as JSON data. Its key `replay` states whether there is a replay page."""
+        """Return the state as JSON data. The key `replay` states whether the replay page exists."""
         return {
             "run": self.number,
             "state": self.state,
@@ -65,15 +65,12 @@ class Trial:
 
     @property
     def replay(self) -> Path:
-        """The replay page of the run."""
+        """Path of the replay page of the run."""
         return self.folder / REPLAY_FILE
 
 
 class TrialRuns:
-    """Runs scenarios one after the other, with files in a temporary folder that `close` deletes.
-
-    `backend_factory` makes the processes of a run.
-    """
+    """Runs scenarios one after the other. `backend_factory` creates the backend that starts the process of a run."""
 
     def __init__(self, backend_factory: Callable[[], Backend]) -> None:
         self._backend_factory = backend_factory
@@ -82,7 +79,7 @@ class TrialRuns:
         self._lock = threading.Lock()
 
     def start(self, loaded: LoadedScenario) -> Trial:
-        """Start a run in a thread, after canceling all earlier runs, and return its state."""
+        """Cancel all earlier runs, start a run in a thread, and return its state."""
         for trial in self._trials:
             trial.is_canceled = True
         self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
@@ -107,7 +104,7 @@ class TrialRuns:
             self._lock.release()
 
     def _run(self, loaded: LoadedScenario, trial: Trial) -> None:
-        """Simulate a scenario after the runs before it have ended, and write its progress and result to `trial`."""
+        """Wait for earlier runs, simulate a scenario, and write its progress and result to `trial`."""
 
         def listen(event: SessionEvent) -> None:
             if trial.is_canceled:
@@ -126,7 +123,7 @@ class TrialRuns:
             trial.state, trial.message = "error", one_line(str(error))
 
     def _finish(self, trial: Trial, result: RunResult) -> None:
-        """Write the result to `trial`; the state last, because the page then shows the rest."""
+        """Write the result to `trial`."""
         lines = result.lines or (0,) * len(result.verdicts)
         for verdict, line in zip(result.verdicts, lines, strict=False):
             finding = verdict.tightest
@@ -135,4 +132,4 @@ class TrialRuns:
             trial.verdicts.append({"id": one_line(verdict.id), "status": status, "text": text, "line": line})
         trial.message = one_line(result.error.message if result.error else result.ended)
         trial.seconds = result.simulated
-        trial.state = result.outcome.value
+        trial.state = result.outcome.value  # last, because the page then shows the result

@@ -1,4 +1,4 @@
-"""Background of the map, below the objects that can be edited: a ROS map as an image, or an SDF world as lines."""
+"""Background of the editor's map: a ROS map as an image, or an SDF world as lines."""
 
 import base64
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.loaded import LoadedWorld
 
 SECTION_HEIGHT_M = 0.2
-"""Height of the cross section through an SDF world: a usual height of a lidar."""
+"""Height of the horizontal section through an SDF world, as of a lidar."""
 MAX_IMAGE_SIDE_PX = 2048
 """Maximum width and height of the image of a map. Larger maps are scaled down."""
 MAX_SEGMENTS = 40_000
@@ -25,7 +25,7 @@ UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 128, 255, 0
 
 @dataclass
 class Backgrounds:
-    """Makes backgrounds, and caches the last one, because most edits do not change it."""
+    """Creates backgrounds, and caches the last one. `root` and `world_path` are the folders with worlds and maps."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
@@ -35,9 +35,10 @@ class Backgrounds:
     def background(self, source: LoadedWorld | None) -> dict[str, Any]:
         """Return the background of a world as JSON data.
 
-        Its `id` changes with the files of the map or SDF world; "" for a world without such files. `bounds` are the
-        lowest x and y and the highest x and y in m; None if there is nothing to show. `image` is a map, `segments` are
-        lines (x, y, x, y) in m.
+        id:        text that changes with the files of the map or SDF world; "" for a world without such files
+        bounds:    lowest x, lowest y, highest x, highest y in m; None without a background
+        image:     image of the map
+        segments:  lines (x, y, x, y) in m of the SDF world
         """
         files = (
             ()
@@ -86,7 +87,7 @@ class Backgrounds:
 
 
 def _image_part(grid: OccupancyGrid) -> dict[str, Any]:
-    """Return the bounds of a grid and its image: a PNG in a data URL, the size in m, and the pose of its origin."""
+    """Return `bounds` and `image` of a map: a PNG as data URL, its size in m, and the pose of its origin."""
     from PIL import Image
 
     shades = np.array([UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY], dtype=np.uint8)

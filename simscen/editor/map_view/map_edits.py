@@ -1,4 +1,4 @@
-"""Conversion of changes that the user makes on the map or in a form into edits of the text."""
+"""Conversion of the user's changes on the map or in a form to edits of the text."""
 
 import math
 from collections.abc import Iterator
@@ -12,11 +12,11 @@ from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_a
 
 
 def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
-    """Return the edits of a `text` that a request of the page describes. `kind` is "scenario" or "world".
+    """Return the edits of `text` for a list of changes in `request`. `kind` is "scenario" or "world".
 
-    Each change in the list `request` is a mapping with `op` and `keys`. `set`, `add`, and `remove` change any value;
-    `pose`, `point`, and `keyframe` set a position in m and a heading in rad. Raises EditRefused for a malformed
-    request.
+    A change is a mapping with the operation `op`, the path `keys`, and further arguments. The operations `set`, `add`,
+    and `remove` change any value. `pose`, `point`, and `keyframe` set a position in m and a heading in rad. Raises
+    EditRefused for a malformed request.
     """
     if not isinstance(request, list):
         raise EditRefused("the request has no list of edits")
@@ -26,7 +26,7 @@ def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
 
 
 def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
-    """Yield the edits for one change. `source` is the syntax tree of the text, `order` as in SetValue."""
+    """Yield the edits for one change. `source` is the syntax tree of the text; `order` is the order of new keys."""
     if not isinstance(one, dict):
         raise EditRefused("an edit must be a mapping")
     keys = _keys(one.get("keys"))
@@ -53,9 +53,9 @@ def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) ->
 def _pose_edits(
     keys: Keys, x: float, y: float, yaw: float | None, source: SourceNode | None, order: tuple[str, ...]
 ) -> Iterator[Edit]:
-    """Yield edits that set a pose: its x, y, and yaw if the text contains a mapping, otherwise a new mapping.
+    """Yield edits that set x, y, and yaw of an existing mapping, or that set a new mapping.
 
-    `yaw` None leaves the heading as it is.
+    `yaw` is None to keep the heading.
     """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "mapping":
@@ -73,7 +73,7 @@ def _pose_edits(
 
 
 def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
-    """Yield edits that set numbers of a list, such as [x, y] or [t, x, y, yaw]. `axes` are the numbers by index."""
+    """Yield edits that set numbers of a list, such as [x, y] or [t, x, y, yaw]. `axes` has the new numbers by index."""
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
         for index, value in axes.items():
@@ -105,5 +105,5 @@ def _number(one: dict[str, Any], key: str) -> float:
 
 
 def _yaw(one: dict[str, Any]) -> float | None:
-    """Return the heading of a change in rad; None if it has none."""
+    """Return the heading of a change in rad; None if the change has no heading."""
     return None if one.get("yaw") is None else _number(one, "yaw")

@@ -1,7 +1,7 @@
-"""Objects on the map of the editor, their handles and shapes, and the reading of those of a world.
+"""Objects on the map of the editor, and functions that read them from the data of a world.
 
-Objects are read from plain data, not from a valid specification, so that the map also shows a file with problems.
-Values that cannot be read are ignored. `keys` are always the path to a value in the file.
+The data are dicts, lists, and scalars that need not be valid. Values that cannot be read are ignored. `keys` are the
+path to a value in the file.
 """
 
 import math
@@ -17,7 +17,7 @@ from simscen.spec.quantities import si_number
 Keys = tuple[Key, ...]
 """Path to a value in a YAML file: keys of mappings and indices of lists."""
 Notation = Literal["pose", "point", "keyframe"]
-"""Notation of a position in the file: a mapping with x, y, and yaw; a list [x, y]; or a list [t, x, y, yaw]."""
+"""Notation of a position in the file: mapping with x, y, and yaw; list [x, y]; or list [t, x, y, yaw]."""
 Corners = list[tuple[float, float]]
 """Corners (x, y) of a polygon in m."""
 CIRCLE_CORNERS = 24
@@ -37,7 +37,7 @@ class Handle:
         x: Position in m.
         y: Position in m.
         yaw: Heading in rad; None for a position without heading.
-        place: Name of the place if the file contains it instead of numbers; otherwise "".
+        place: Name of the place (named pose) that the file contains instead of numbers; "" for numbers.
     """
 
     keys: Keys
@@ -50,21 +50,21 @@ class Handle:
 
 @dataclass(frozen=True)
 class MapObject:
-    """Object on the map. An object without handles and region is only in the list of the page.
+    """Object on the map and in the list of objects. Without handles and region, it is only in the list.
 
     Attributes:
-        keys: Path to the value that the form of the object shows.
-        kind: Kind of the object, such as "robot" or "wall", by which the page chooses its color.
+        keys: Path to the value that defines the object.
+        kind: Kind of the object, such as "robot" or "wall".
         label: Name of the object on the map.
         handles: Positions that can be dragged.
         parts: Outlines in the frame of the first handle.
-        line: Whether a line connects the handles: "" for no line, "open", or "closed" from the last to the first.
+        line: Line through the handles: "" for no line, "open", or "closed".
         radius: Radius in m of a circle around the first handle; None for no circle.
         radius_keys: Path to the radius if it can be changed; otherwise ().
         region: Name of the region that the object refers to; "" for none.
-        follows: Name of the moving object at which the circle is, instead of a handle; "" for none.
+        follows: Name of a moving object that is the center of the circle; "" for the first handle.
         moves_as_one: Whether dragging the object moves all its handles.
-        origin: Point (x, y) in m at which the line begins, before the first handle; None for no such point.
+        origin: First point (x, y) in m of the line, before the handles; None if the line starts at the first handle.
         points_keys: Path to the list of the handles if handles can be added and removed; otherwise ().
         width: Width of the line in m.
     """
@@ -86,28 +86,28 @@ class MapObject:
 
 
 Places = Mapping[str, tuple[float, float, float]]
-"""Pose (x, y, yaw) in m and rad of each place of the world by name."""
+"""Poses (x, y, yaw) in m and rad of the places of a world, by name."""
 
 
 def number(value: Any) -> float | None:
-    """Return a finite number, or a quantity such as "2 cm" in SI units; None for anything else."""
+    """Return a finite number, or a quantity such as "2 cm" in SI units; None for other values."""
     found = si_number(value)
     usable = isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found)
     return float(found) if usable else None
 
 
 def items(value: Any) -> list[Any]:
-    """Return a list, or an empty list for anything else."""
+    """Return `value` if it is a list, otherwise an empty list."""
     return value if isinstance(value, list) else []
 
 
 def mapping(value: Any) -> dict[str, Any]:
-    """Return a mapping, or an empty mapping for anything else."""
+    """Return `value` if it is a dict, otherwise an empty dict."""
     return value if isinstance(value, dict) else {}
 
 
 def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return one handle for a pose or the name of a place; () if the value is neither."""
+    """Return one handle for a pose or the name of a place; () for other values."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "pose", *found, value),) if found else ()
@@ -123,7 +123,7 @@ def point_handles(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 
 
 def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return one handle for a point [x, y] or the name of a place; () if the value is neither."""
+    """Return one handle for a point [x, y] or the name of a place; () for other values."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "point", found[0], found[1], None, value),) if found else ()
@@ -144,7 +144,7 @@ def keyframe_handles(value: Any, keys: Keys) -> tuple[Handle, ...]:
 
 
 def outline(thing: Mapping[str, Any]) -> list[Corners]:
-    """Return the outline of an object with the key `box`, `cylinder`, or `polygon` in its own frame; otherwise []."""
+    """Return the outline of a `box`, `cylinder`, or `polygon` in the frame of the object; [] without these keys."""
     box = [number(side) for side in items(thing.get("box"))]
     if len(box) == 3 and box[0] and box[1]:
         x, y = box[0] / 2, box[1] / 2
@@ -167,7 +167,7 @@ def motion_path(
 ) -> Iterator[MapObject]:
     """Yield an object for the path of a motion through waypoints or keyframes; nothing for another motion.
 
-    `origin` is the position at which the moving object starts.
+    `origin` is the start position of the moving object.
     """
     motion = mapping(value)
     start = None if origin is None else (origin.x, origin.y)
@@ -180,10 +180,10 @@ def motion_path(
 
 
 def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
-    """Return the ID of the object with the shortest text that contains the position of a problem.
+    """Return the ID of the object whose YAML contains a problem; "" if no object does.
 
-    If there is none, the problem may be at a key: then return the one with the shortest text that begins later in the
-    same line, or "" without one. `source` is the syntax tree of the `text`.
+    Of several objects, returns the one with the shortest YAML. A problem at a key belongs to the value after the key.
+    `source` is the syntax tree of `text`.
     """
     if not problem.line or source is None:
         return ""
@@ -198,7 +198,7 @@ def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: So
 
 
 def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
-    """Return the places of a world, which is plain data, by name."""
+    """Return the places in the data of a world, by name."""
     found = {}
     for name, pose in mapping(mapping(world).get("places")).items():
         for handle in pose_handle(pose, (), {}):
@@ -207,7 +207,7 @@ def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
 
 
 def world_objects(world: Any, keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield the objects of a world, which is plain data at `keys` of the file."""
+    """Yield the objects in the data of a world at `keys` of the file."""
     data = mapping(world)
     yield from _regions(data, keys)
     yield from _lines(data, keys, places)

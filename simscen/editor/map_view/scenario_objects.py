@@ -1,6 +1,6 @@
-"""Objects of a scenario on the map and in the list of the page: robots, goals, events, triggers, zones, and faults.
+"""Functions that read the objects on the map from the data of a scenario: robots, goals, events, zones, faults.
 
-They are read from plain data, in which anything can be missing or wrong. `keys` are the path to a value in the file.
+The data are dicts, lists, and scalars that need not be valid. `keys` are the path to a value in the file.
 """
 
 from collections.abc import Iterator
@@ -24,15 +24,15 @@ from simscen.editor.map_view.map_objects import (
 )
 
 SETTINGS = "settings"
-"""Kind of the object that stands for the keys of the scenario itself."""
+"""Kind of the object for the top-level keys of the scenario."""
 KIND_OF_POSE_ACTION = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
-"""Kind of the object for each action with a pose."""
+"""Kinds of the objects for actions with a pose."""
 COMBINED_TRIGGERS = {"all", "any"}
 """Triggers that contain a list of triggers."""
 
 
 def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject]:
-    """Yield the objects of a scenario without those of its world, in the order of the language."""
+    """Yield the objects of a scenario without the objects of its world."""
     yield MapObject((), SETTINGS, str(data.get("name", "scenario")))
     robots = mapping(data.get("robots"))
     if not robots:
@@ -68,7 +68,7 @@ def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Ite
 
 
 def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapObject]:
-    """Yield an object for each goal in a list. `prefix` is the beginning of its label."""
+    """Yield an object for each goal in a list. `prefix` is the beginning of the label."""
     for index, goal in enumerate(items(value)):
         own = (*keys, index)
         pose = goal if isinstance(goal, str) else mapping(goal).get("pose")
@@ -94,7 +94,7 @@ def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Ite
 
 
 def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: Places) -> Iterator[MapObject]:
-    """Yield the objects for an action of the event with the name `event`; nothing for the key `robot`."""
+    """Yield the objects for an action of the event `event`; nothing for the key `robot`, which is not an action."""
     handle = pose_handle(action.get("pose"), (*keys, "pose"), places)
     name = str(action.get("name", ""))
     if kind == "spawn":
@@ -115,7 +115,7 @@ def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: P
 
 
 def _area_action(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
-    """Return an object without label for an action on a region or on a disc of the floor."""
+    """Return an object without label for an action in a region or a circle."""
     region = action.get("region", action.get("start"))
     center = point_handle(action.get("at"), (*keys, "at"), places)
     radius = number(action.get("radius")) if center else None
@@ -125,7 +125,7 @@ def _area_action(action: dict[str, Any], keys: Keys, places: Places) -> MapObjec
 
 
 def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
-    """Yield the regions and circles at which a trigger, or a trigger in a combined one, becomes true."""
+    """Yield objects for the regions and circles of a trigger, including nested triggers."""
     for kind, condition in mapping(value).items():
         own, said = (*keys, kind), mapping(condition)
         if kind in COMBINED_TRIGGERS:
@@ -169,12 +169,12 @@ def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObj
 
 
 def _first_key(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
-    """Return the first key that is not in `without`: the name of the criterion or the fault."""
+    """Return the first key that is not in `without`, which is the kind of the criterion or fault."""
     return next((key for key in entry if key not in without), "entry")
 
 
 def _region_of(criterion: dict[str, Any]) -> str:
-    """Return the name of the region that a criterion refers to; "" for none."""
+    """Return the name of the region of a criterion; "" for none."""
     chosen = mapping(criterion.get(_first_key(criterion)))
     region = chosen.get("region", chosen.get("in"))
     return region if isinstance(region, str) else ""

@@ -1,4 +1,4 @@
-"""Scene of a text, which the page shows: objects of the scenario and its world, background, and lines in the text."""
+"""Scene that the editor page shows for a text: objects of the scenario and its world, and the background."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,15 +26,14 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class SceneParts:
-    """A text with the files that it refers to, as far as they can be read.
+    """The edited text, and the world that it contains or refers to.
 
     Attributes:
-        file: File that is edited.
-        text: Its text in the editor.
-        tree: Syntax tree of the text, with the content that it inherits from other files.
+        text: Text in the editor.
+        tree: Syntax tree of the text, including content that it inherits from other files.
         assets: Reader of the files that the text refers to.
         world: World of the scenario, or the edited world; None if it cannot be read.
-        is_inline: Whether the world is in the text itself, because it is a world file or an inline world.
+        is_inline: Whether the world is defined in the text, not in another file.
     """
 
     file: EditedFile
@@ -46,7 +45,7 @@ class SceneParts:
 
     @property
     def world_data(self) -> dict[str, Any]:
-        """Plain data of the world file or of the inline world; {} if it cannot be read."""
+        """Content of the world file or inline world; {} if it cannot be read."""
         if self.is_inline:
             return mapping(self.tree.plain if self.file.kind == "world" else mapping(self.tree.plain).get("world"))
         tree = None if self.world is None else self.world.tree
@@ -81,7 +80,7 @@ def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> Loaded
 
 
 def map_objects(parts: SceneParts) -> list[MapObject]:
-    """Return at most MAX_OBJECTS objects that the map or the list of the page shows, in the order of the language."""
+    """Return at most MAX_OBJECTS objects of the map and the list of objects."""
     data, places = parts.tree.plain, world_places(parts.world_data)
     found: list[MapObject] = []
     if parts.file.kind == "scenario":
@@ -91,7 +90,7 @@ def map_objects(parts: SceneParts) -> list[MapObject]:
 
 
 def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
-    """Return the objects, regions, places, and background as JSON data, and the name of the world file."""
+    """Return the objects, regions, places, background, and name of the world file as JSON data."""
     source = parse_source(parts.text)
     display_name = parts.file.display_name
     return {
@@ -113,15 +112,12 @@ def _world_keys(parts: SceneParts) -> Keys:
     return () if parts.file.kind == "world" else ("world",)
 
 
-def _world_file(parts: SceneParts, shown: str) -> str:
-    """Return the name of the world file if the objects of the world are written there; otherwise "".
-
-    `shown` is the name of the edited file.
-    """
+def _world_file(parts: SceneParts, edited_name: str) -> str:
+    """Return the name of the world file if it is not the edited file, and "" for a map or SDF file."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
-    return "" if name == shown or parts.world.spec is None else name
+    return "" if name == edited_name or parts.world.spec is None else name
 
 
 def _object_data(one: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
@@ -159,7 +155,7 @@ def _handle_data(handle: Handle) -> dict[str, Any]:
 
 
 def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
-    """Return whether the object at `keys` can be edited in this text, and its line; 0 if it is in another file.
+    """Return whether the object at `keys` can be edited in this text, and its line, or 0 if it is in another file.
 
     `source` is the syntax tree of the text without inherited content; None if the text is invalid.
     """
@@ -174,5 +170,5 @@ def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple
 
 
 def _position(tree: MappingNode, keys: Keys) -> Position:
-    """Return the position of a key, or of a list item, in the file that contains it."""
+    """Return the file position of the key or list item at `keys`."""
     return key_position(tree, keys) if keys and isinstance(keys[-1], str) else value_position(tree, keys)

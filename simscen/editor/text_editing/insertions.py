@@ -1,7 +1,7 @@
-"""Insertion of keys and list items into a YAML text in the style of their siblings, and their removal.
+"""Insertion and removal of keys and list items of a YAML text, in the style of the existing entries.
 
-Functions return a Splice of the text, which they do not change themselves. A block mapping or list has one entry per
-line; a flow mapping or list is in braces or brackets.
+Functions return a Splice (replacement of a part of the text). In YAML's block style, each entry has its own line. In
+flow style, entries are in braces or brackets.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ INDENT = 2
 def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
     """Return the splice that adds a key with a value to a mapping.
 
-    The new key follows the last key of the mapping that comes before it in `order`, or the last key if there is none.
+    `order` is the preferred order of keys. Without it, the new key is inserted at the end.
     """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))
@@ -38,7 +38,7 @@ def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Se
 
 
 def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None = None) -> Splice:
-    """Return the splice that inserts an item into a list: before the item `index`, or for None at the end."""
+    """Return the splice that inserts an item into a list before the item `index`, or at the end for None."""
     items = sequence.items
     if not items:
         return Splice(sequence.start, sequence.end, f"[{flow_text(value)}]")
@@ -60,12 +60,12 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
 
 
 def dash_before(text: str, start: int) -> int:
-    """Return the index in the text of the dash before the list item that starts at `start`."""
+    """Return the position of the dash before the list item that starts at `start`."""
     return text.rfind("-", 0, start)
 
 
 def _block_entry(key: str, value: Any, indent: int) -> str:
-    """Return the text of a new entry of a block mapping. A list that contains mappings gets one line for each item."""
+    """Return the text of a new entry of a block mapping. Items of a list of mappings get their own lines."""
     if isinstance(value, list) and any(isinstance(item, dict) for item in value):
         items = [f"\n{' ' * (indent + INDENT)}- {flow_text(item)}" for item in value]
         return f"{string_text(key)}:{''.join(items)}"
@@ -73,7 +73,7 @@ def _block_entry(key: str, value: Any, indent: int) -> str:
 
 
 def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
-    """Return the text of a new list item: in block style if its sibling `like` is a block mapping, else on one line."""
+    """Return the text of a new list item in the style of the sibling `like`."""
     if like.kind != "mapping" or like.flow or not isinstance(value, dict) or not value:
         return flow_text(value)
     lines = []
@@ -88,13 +88,13 @@ def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
 
 
 def _separator(text: str, items: Sequence[SourceNode]) -> str:
-    """Return the text between the last two items, such as a comma and a line break; ", " if it contains a comment."""
+    """Return the text between the last two items, such as a comma and a line break. The default is ", "."""
     between = text[items[-2].end : items[-1].start] if len(items) > 1 else ", "
     return between if between.count(",") == 1 and not between.replace(",", "").strip() else ", "
 
 
 def _has_blank_line(text: str, start: int, end: int) -> bool:
-    """Return whether there is a blank line between two indices of a text."""
+    """Return whether there is a blank line between the positions `start` and `end`."""
     return any(not line.strip() for line in text[start:end].split("\n")[1:-1])
 
 
@@ -126,9 +126,9 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
 
 
 def _remove_from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Return the splice that removes a part of a flow list or mapping, with the comma before or after it.
+    """Return the splice that removes the part `number` of a flow list or mapping, including a comma.
 
-    `parts` are the start and end of all parts, and `number` is the index of the part to remove.
+    `parts` are the start and end of all parts.
     """
     start, end = parts[number]
     if len(parts) == 1:
@@ -139,9 +139,9 @@ def _remove_from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: 
 
 
 def _remove_from_block(text: str, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Return the splice that removes the lines of a part of a block list or mapping.
+    """Return the splice that removes the part `number` of a block list or mapping.
 
-    If the part begins within a line, such as the first key after a dash, the text up to the next part is removed.
+    `parts` are the start and end of all parts.
     """
     start, end = parts[number]
     begin = line_start(text, start)

@@ -1,4 +1,4 @@
-"""Splices, which are replacements of parts of a text, and positions of lines in a text."""
+"""Splices (replacements of parts of a text), and positions of lines in a text."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,11 +7,11 @@ from simscen.loading.yaml.tree import Key, dotted_path
 
 
 class EditRefused(Exception):
-    """The edit cannot be made, or not without changing other parts of the text. The message says why."""
+    """The edit is impossible without changes of other parts of the text. The message states the reason."""
 
 
 class Splice(NamedTuple):
-    """Replacement of the characters `start` to `end` (exclusive) of a text by the new `text`."""
+    """Replacement of the characters from `start` to `end` (exclusive) by `text`."""
 
     start: int
     end: int
@@ -19,14 +19,14 @@ class Splice(NamedTuple):
 
 
 def apply_splices(text: str, splices: Sequence[Splice]) -> str:
-    """Return a text after all replacements. They must not overlap; all indices refer to the old text."""
+    """Return a text after all splices. Splices must not overlap; their indices refer to the original text."""
     for splice in sorted(splices, reverse=True):
         text = text[: splice.start] + splice.text + text[splice.end :]
     return text
 
 
 def path_text(keys: Sequence[Key]) -> str:
-    """Return the path to a value as messages show it, for example "`goals[0].pose`" with the quotes."""
+    """Return the path to a value for messages, e.g. "`goals[0].pose`" including backquotes."""
     return f"`{dotted_path(keys)}`"
 
 

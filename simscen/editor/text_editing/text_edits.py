@@ -1,6 +1,6 @@
 """Edits of a YAML text that set a value, insert a list item, or remove a part, and preserve every other character.
 
-Each new text is parsed again. If its content is not exactly the old content with the edit, the edit is refused.
+The new text is parsed to verify the edit. If any other value has changed, the edit is refused.
 """
 
 import copy
@@ -18,9 +18,9 @@ from simscen.loading.yaml.tree import Key
 
 @dataclass(frozen=True)
 class SetValue:
-    """Edit that sets the value at `keys`, and creates the missing mappings around it.
+    """Edit that sets the value at `keys`, and creates missing mappings around the value.
 
-    `order` are all possible keys of the file in the order of the language, which determines the position of a new key.
+    `order` is the preferred order of keys, which determines the position of a new key.
     """
 
     keys: tuple[Key, ...]
@@ -30,9 +30,9 @@ class SetValue:
 
 @dataclass(frozen=True)
 class AddItem:
-    """Edit that inserts an item into the list at `keys`: before the item `index`, or for None at the end.
+    """Edit that inserts an item into the list at `keys` before the item `index`, or at the end for None.
 
-    A missing list is created. `order` is as in SetValue.
+    A missing list is created. `order` is the preferred order of keys, as in SetValue.
     """
 
     keys: tuple[Key, ...]
@@ -52,17 +52,14 @@ Edit = SetValue | AddItem | RemovePart
 
 
 class EditedText(NamedTuple):
-    """A text after some edits, and the replacements in the order in which they were made.
-
-    The indices of a splice refer to the text before it.
-    """
+    """The text after edits, and the splices in their order. The indices of a splice refer to the text before it."""
 
     text: str
     splices: tuple[Splice, ...]
 
 
 def apply_edits(text: str, edits: Sequence[Edit]) -> EditedText:
-    """Make edits one after the other, and return the new text. Raises EditRefused if one of them is impossible."""
+    """Apply edits one after the other, and return the new text. Raises EditRefused if an edit is impossible."""
     done: list[Splice] = []
     remaining = list(edits)
     while remaining:
@@ -88,7 +85,7 @@ def _parse(text: str) -> SourceNode:
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
-    """Return the splices of the first edits that each replace another scalar, so that one parse is enough for them."""
+    """Return the splices of the leading edits that replace different scalars, and can share one syntax tree."""
     found: list[Splice] = []
     for edit in edits:
         node = source_at(source, edit.keys) if isinstance(edit, SetValue) else None
@@ -123,7 +120,7 @@ def _splice(text: str, source: SourceNode, edit: Edit) -> Splice:
 
 
 def _set_value(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order: tuple[str, ...]) -> Splice:
-    """Return the splice that replaces a value, or inserts it into the deepest mapping around it that exists."""
+    """Return the splice that replaces a value, or inserts it into the innermost existing mapping."""
     if (node := source_at(source, keys)) is not None:
         return _replacement(text, node, value)
     for depth in range(len(keys) - 1, -1, -1):
@@ -158,7 +155,7 @@ def _replacement(text: str, node: SourceNode, value: Any) -> Splice:
 
 
 def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
-    """Raise EditRefused unless the content of the new text is that of the old text with the edits."""
+    """Raise EditRefused if the new text differs from the old text by more than the edits."""
     before, after = parse_yaml(old, "")[0], parse_yaml(new, "")[0]
     if before is None or after is None:
         raise EditRefused("this cannot be changed on the map without changing other text; edit the text")
@@ -170,7 +167,7 @@ def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
 
 
 def _edited_data(plain: Any, edit: Edit) -> Any:
-    """Return a copy of the plain content of a text after an edit."""
+    """Return a copy of the parsed content `plain` after an edit."""
     plain = copy.deepcopy(plain)
     holder = {"": plain}
     node: Any = holder

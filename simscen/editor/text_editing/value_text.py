@@ -1,4 +1,4 @@
-"""Conversion of values to YAML text, if possible in the notation of the text that they replace."""
+"""Conversion of values to YAML text, if possible in the notation of the replaced text."""
 
 import json
 import math
@@ -10,13 +10,13 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, UNITS, si_number
 
 LINE_WIDTH = 120
-"""Maximum length of the lines of a folded text (`>`), in characters."""
+"""Maximum number of characters in a line of a folded block scalar (`>`)."""
 MAX_DECIMALS = 6
-"""Maximum number of decimal places of a number, in the unit of its text."""
+"""Maximum number of decimal places of a number."""
 MAX_PADDED_DECIMALS = 3
-"""Maximum number of decimal places that a number keeps from the number that it replaces: 1.50 becomes 2.00."""
+"""Maximum number of decimal places to which trailing zeros are added."""
 NUMBER_TOLERANCE = 2e-6
-"""Maximum difference between equal numbers, in the unit of their text; more than rounding to MAX_DECIMALS causes."""
+"""Maximum difference between equal numbers, in the unit of their text."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
@@ -32,7 +32,7 @@ def flow_text(value: Any) -> str:
 
 
 def scalar_text(value: Any) -> str:
-    """Return a scalar as YAML on one line that is valid in block and flow style."""
+    """Return a scalar as YAML on one line, valid in block and flow style."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -43,9 +43,9 @@ def scalar_text(value: Any) -> str:
 
 
 def replacement_text(value: Any, old: str, style: str) -> str:
-    """Return a scalar as YAML in the notation of the text `old`: with its unit, its decimal places, and its quotes.
+    """Return a scalar as YAML with the unit, decimal places, and quotes of the text `old`.
 
-    Numbers are in SI units. `style` is the YAML style of `old`: a quote, `>`, `|`, or "" for plain text.
+    A number `value` is in SI units. `style` is the YAML style of `old`: a quote, `>`, `|`, or "" for plain text.
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
         quote = style if style in ("'", '"') else ""
@@ -76,7 +76,7 @@ def quantity_text(value: float, old: str) -> str:
 
 
 def number_text(value: float, decimals: int = 0) -> str:
-    """Return a number with the decimal places that it needs, padded to `decimals`, but at most MAX_PADDED_DECIMALS."""
+    """Return a number as text with at least min(`decimals`, MAX_PADDED_DECIMALS) decimal places."""
     if not math.isfinite(value) or abs(value) >= 1e9 or 0 < abs(value) < 10.0 ** (1 - MAX_DECIMALS):
         return _special_number_text(value)
     number, _, places = f"{value:.{MAX_DECIMALS}f}".partition(".")
@@ -108,7 +108,7 @@ def quoted_text(text: str) -> str:
 
 
 def string_text(text: str) -> str:
-    """Return a string as YAML: without quotes if a parser then reads the same string, also in brackets and braces."""
+    """Return a string as YAML, without quotes if that is valid in block and flow style."""
     if "\n" in text or _UNSAFE.search(text) or text != text.strip():
         return quoted_text(text)
     tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
@@ -118,7 +118,7 @@ def string_text(text: str) -> str:
 
 
 def _unit(text: str) -> str:
-    """Return the unit of a text such as "2.5 m"; "" if it has no unit or an unknown one."""
+    """Return the unit of a text such as "2.5 m"; "" without a known unit."""
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(text)
     return match[2] if match and _scale(match[2]) else ""
 
@@ -144,9 +144,9 @@ def _special_number_text(value: float) -> str:
 
 
 def block_scalar_text(value: str, old: str, indent: int) -> str | None:
-    """Return a string in the style of the block scalar `old` (`>` or `|`); None if this style cannot represent it.
+    """Return a string in the style of the block scalar `old` (`>` or `|`); None if the style cannot represent it.
 
-    `indent` is the number of spaces before the lines of the string.
+    `indent` is the number of spaces before each line.
     """
     header = old.split("\n", 1)[0].split("#", maxsplit=1)[0].strip()
     body = value.removesuffix("\n")
@@ -161,7 +161,7 @@ def block_scalar_text(value: str, old: str, indent: int) -> str | None:
 
 
 def _folded_lines(text: str, width: int) -> list[str]:
-    """Return the lines of a folded text (`>`), in which an empty line stands for a line break."""
+    """Return the lines of a folded block scalar (`>`), in which an empty line represents a line break."""
     lines: list[str] = []
     for number, paragraph in enumerate(text.split("\n")):
         lines += [""] if number else []
