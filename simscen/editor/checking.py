@@ -16,7 +16,7 @@ from simscen.loading.variations.variation_problems import VariationProblems, mer
 from simscen.loading.world_cache import WorldCache
 
 CHECKED_VARIATIONS = range(1, 4)
-"""Numbers of the variations that are checked while a text is edited. `simscen validate` checks all variations."""
+"""Numbers of the variations (sets of values of a scenario) that the editor checks."""
 
 MAX_WORLDS = 8
 """Maximum number of cached worlds. Each change of an inline world makes a new one."""

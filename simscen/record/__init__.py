@@ -1,1 +1,1 @@
-"""Recording of runs to MCAP logs that ROS 2 tools can open, and reading of logs as traces."""
+"""Recording of runs to MCAP logs that ROS 2 tools can open, and reading of logs."""

@@ -1,15 +1,14 @@
 """Names of the coordinate frames in a log (ROS REP 105)."""
 
 MAP, ODOM, BASE, TRUTH = "map", "odom", "base_link", "base_link_truth"
-"""The frames of REP 105, and the true pose of the base, which only the log contains."""
+"""Frames of REP 105, and the frame of the true pose of the base."""
 _OBJECT_PREFIX = "object/"
 
 
 class RobotFrames:
-    """Names that the frames of one robot have in the log.
+    """Names of the frames of one robot in the log.
 
-    With several robots, each frame has the robot's name as a prefix, so that all robots are in one tf tree. The frame
-    `map` and the frames of moving objects have no prefix.
+    With several robots, frames have the robot's name as a prefix, except `map` and the frames of moving objects.
     """
 
     def __init__(self, robot: str = "") -> None:
@@ -18,20 +17,20 @@ class RobotFrames:
         self.odom, self.base, self.truth = self.log_frame(ODOM), self.log_frame(BASE), self.log_frame(TRUTH)
 
     def log_frame(self, frame: str) -> str:
-        """Return the name in the log for a frame of the robot's stack."""
+        """Return the name in the log of a frame of the robot's stack."""
         return frame if frame == MAP else f"{self._prefix}{frame}"
 
     def sensor_frame(self, sensor: str) -> str:
-        """Return the name in the log for the frame of a sensor."""
+        """Return the name in the log of the frame of a sensor."""
         return self.log_frame(sensor_frame(sensor))
 
     def stack_frame(self, frame: str) -> str:
-        """Return the name in the stack for a frame of the log: without the prefix, which older logs do not have."""
+        """Return the name in the robot's stack of a frame of the log: without the prefix."""
         return frame.removeprefix(self._prefix)
 
 
 def sensor_frame(sensor: str) -> str:
-    """Return the name of a sensor's frame: the name of the sensor, with `_link` if another frame has this name."""
+    """Return the name of a sensor's frame: the name of the sensor, or `NAME_link` if another frame has this name."""
     return f"{sensor}_link" if sensor in (MAP, ODOM, BASE, TRUTH) else sensor
 
 
@@ -41,5 +40,5 @@ def object_frame(name: str) -> str:
 
 
 def object_in_frame(frame: str) -> str | None:
-    """Return the name of the moving object whose frame this is; None for other frames."""
+    """Return the name of the moving object that the frame belongs to; None for other frames."""
     return frame[len(_OBJECT_PREFIX) :] if frame.startswith(_OBJECT_PREFIX) else None

@@ -1,4 +1,4 @@
-"""Conversion of the MCAP records of a log to its contents: header, trace, sensor messages and result."""
+"""Conversion of the MCAP records of a log to its contents: header, trace (signals and events), and sensor messages."""
 
 import json
 from collections.abc import Callable
@@ -20,10 +20,10 @@ from simscen.record.sensor_messages import SensorMessages
 from simscen.record.trace_builder import TraceRows
 
 _MERGED = "; a log that was merged from several cannot be judged"
-"""End of the message about a record that exists twice."""
+"""End of the error message for a record that exists twice."""
 
 Handler = Callable[[int, bytes], None]
-"""Function that processes a message. Its arguments are the tick of logging, and the serialized message."""
+"""Function (tick of logging, serialized message) that processes a message."""
 
 
 class NotSimscenLog(ValueError):
@@ -31,10 +31,9 @@ class NotSimscenLog(ValueError):
 
 
 class LogContents:
-    """Collects the records of a log, which must be added in the order of the file.
+    """Collects the records of a log. Methods raise ValueError or KeyError if the log is damaged.
 
-    With `with_sensors`, also collects the messages that are not part of a Trace. With several robots, `robots` has the
-    contents of the log of each robot, by name. The methods raise ValueError or KeyError if the log is damaged.
+    With `with_sensors`, also collects the messages that are not part of a Trace.
     """
 
     def __init__(self, with_sensors: bool = False) -> None:
@@ -59,7 +58,7 @@ class LogContents:
         self.robots: dict[str, LogContents] = {}
 
     def add(self, record: records.McapRecord) -> None:
-        """Process one record."""
+        """Process one record. Records must be added in the order of the file."""
         match record:
             case records.Message():
                 self._add_message(record)
@@ -115,10 +114,7 @@ class LogContents:
         return {name: data for name, data in self._files.items() if name not in log_header.OWN_FILES}
 
     def trace(self) -> Trace:
-        """Return the Trace until the end of the run, or until the last message if the run was aborted.
-
-        With several robots, this is the Trace of the first robot.
-        """
+        """Return the Trace of the only or first robot. If the run was aborted, the Trace ends with the last message."""
         if self.robots:
             return self.traces()[next(iter(self.robots))]
         trace = self._rows.trace(self._time.rate, self._last_tick if self.end is None else self.end)
@@ -133,11 +129,11 @@ class LogContents:
         return {name: contents.trace() for name, contents in self.robots.items()}
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence that the log lacks because messages were removed; none for an aborted run."""
+        """Return the evidence that the log lacks because messages were removed. An aborted run lacks none."""
         return LogCoverage() if self.end is None else self._counts.coverage()
 
     def result(self) -> str:
-        """Return the result of the run (JSON), or "" if there is none."""
+        """Return the result of the run as JSON; "" if the log has none."""
         return str(self._files.get(log_header.RESULT, b""), "utf-8")
 
     def _set_facts(self, facts: dict[str, str]) -> None:

@@ -9,10 +9,9 @@ PARTIAL_SUFFIX = ".partial.mcap"
 
 
 class LogFile:
-    """File that is written as `run.partial.mcap` and renamed to `run.mcap` on `finish`.
+    """Unbuffered file with the name `run.partial.mcap` until `finish` renames it to `run.mcap`.
 
-    Nothing is buffered in the process, so that written data survives if the process is killed. The methods raise
-    RunError of kind "output" if the disk is full or the file cannot be written; `failed` is then True.
+    Methods raise RunError of kind "output" if the file cannot be written. `failed` is then True.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,7 +48,7 @@ class LogFile:
 
 
 def write_error(path: Path, error: OSError) -> RunError:
-    """Return a RunError of kind "output", with the reason why a log cannot be written."""
+    """Return the RunError of kind "output" for a failed write."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return RunError("output", f"no space left writing {path}")
     return RunError("output", f"cannot write {path}: {error.strerror}")

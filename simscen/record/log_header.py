@@ -1,4 +1,4 @@
-"""Header of a log: the metadata and attachments that are needed to judge or repeat the run, besides the messages."""
+"""Header of a log: metadata and attachments that are needed to judge or repeat the run."""
 
 import json
 import math
@@ -19,17 +19,16 @@ from simscen.core.records.run_result import RunKey
 FORMAT = "1"
 """Version of the log format. Logs of another version are rejected."""
 STACK_RECORD = "simscen.stack"
-"""Metadata record that describes the external stacks. Written at the end of the log, when all facts are known."""
+"""Metadata record at the end of the log that describes the external stacks."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Keys of `LogHeader.facts`: the value of --stack that replaced the scenario's stack, the name of the stack if several
-are compared, and the variation of the scenario. The keys differ from these terms because older logs use them."""
+"""Keys of `LogHeader.facts`: value of the option --stack, name of the stack if several are compared, and variation."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
 END, COUNT_PREFIX = "simscen.end", "messages:"
 """Metadata record at the end of a complete log, and the prefix of its keys for the number of messages of a topic."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
-"""Names of attachments that simscen itself writes; other files must not use them."""
+"""Names of attachments that are reserved for simscen."""
 _MEDIA_TYPES = {
     ".json": "application/json",
     ".pgm": "image/x-portable-graymap",
@@ -42,24 +41,23 @@ _CASES = TypeAdapter(Case)
 
 @dataclass(frozen=True, eq=False)
 class LogHeader:
-    """Description of a run, which is written at the start of its log.
+    """Description of a run at the start of its log.
 
-    With several robots, `robots` has the header of each robot by name, and `case`, `map`, `robot_description`, `frames`
-    and `sensors` are those of the first robot. `files` and `facts` must not contain wall-clock times, host names or
-    process IDs, because logs of equal runs must be equal.
+    `files` and `facts` must not contain wall-clock times, host names, or process IDs, because logs of equal runs must
+    be equal.
 
     Attributes:
         name: ID of the scenario.
         seed: Seed of the run.
         case: Inputs of the criteria besides the trace.
         scenario: Resolved YAML text of the scenario.
-        map: Map that the stack gets; None if there is none.
+        map: Map that the stack receives; None without a map.
         robot_description: URDF of the robot.
-        frames: Poses of the sensors on the robot's base. The pose of a lidar that is missing here is that in its scans.
-        sensors: Reading types by sensor name, in the order in which sensors get their topics. Empty if read from a log.
+        frames: Poses of the sensors on the robot's base. Scans contain the poses of lidars that are missing here.
+        sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
         files: Attachments by name.
         facts: Additional metadata.
-        robots: Headers of the robots by name; empty for a single robot.
+        robots: Headers of several robots by name; empty for a single robot. Other attributes belong to the first robot.
     """
 
     name: str
@@ -86,7 +84,7 @@ def case_to_json(case: Case) -> str:
 
 
 def case_from_json(text: str | bytes) -> Case:
-    """Parse the JSON that `case_to_json` wrote. Raises ValueError if it is not a Case, or its poses are not finite."""
+    """Parse the JSON of `case_to_json`. Raises ValueError for other JSON or for poses that are not finite."""
     try:
         case = _CASES.validate_json(text)
     except ValidationError as error:
@@ -98,12 +96,12 @@ def case_from_json(text: str | bytes) -> Case:
 
 
 def media_type(name: str) -> str:
-    """Return the media type for a file name. The table is fixed, so that logs are equal on all operating systems."""
+    """Return the media type for a file name, which does not depend on the operating system."""
     return _MEDIA_TYPES.get(PurePosixPath(name).suffix, "application/octet-stream")
 
 
 def run_metadata(header: LogHeader, clock: Clock) -> dict[str, str]:
-    """Return the metadata record "simscen", with the exact resolution and origin of each map."""
+    """Return the metadata record "simscen", which includes the exact resolution and origin of each map."""
     metadata = {"format": FORMAT, "scenario": header.name, "seed": str(header.seed), "tick_rate": str(clock.rate)}
     metadata |= {ROBOTS: json.dumps(list(header.robots))} if header.robots else _map_facts(header)
     for name, robot_header in header.robots.items():
@@ -119,19 +117,19 @@ def _map_facts(header: LogHeader) -> dict[str, str]:
 
 
 def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the metadata record "simscen" for one of several robots: with the resolution and origin of its map."""
+    """Return the metadata record "simscen" for one of several robots, with the resolution and origin of its map."""
     own = {fact: run_metadata[f"{robot}.{fact}"] for fact in (RESOLUTION, ORIGIN) if f"{robot}.{fact}" in run_metadata}
     return {**run_metadata, **own}
 
 
 def stack_facts(facts: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the facts about the external stack of one of several robots, from those about all stacks."""
+    """Return the facts about the external stack of one of several robots. `facts` has `ROBOT.` before each key."""
     prefix = f"{robot}."
     return {name.removeprefix(prefix): fact for name, fact in facts.items() if name.startswith(prefix)}
 
 
 def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
-    """Return the value of `LogHeader.facts` from the metadata record "simscen"."""
+    """Return `LogHeader.facts` from the metadata record "simscen"."""
     return {name[len(_FACT_PREFIX) :]: value for name, value in run_metadata.items() if name.startswith(_FACT_PREFIX)}
 
 
@@ -147,7 +145,7 @@ def attachments(header: LogHeader) -> dict[str, bytes]:
 
 
 SCENERY_FILE = "scenery.json"
-"""Attachment with what pictures and markers show besides the trace."""
+"""Attachment with the Scenery: objects that pictures and markers show in addition to the trace."""
 _SCENERIES = TypeAdapter(Scenery)
 
 
@@ -157,7 +155,7 @@ def scenery_to_json(scenery: Scenery) -> bytes:
 
 
 def scenery_from_header(header: LogHeader) -> Scenery:
-    """Return the attached scenery, or an empty one for logs of older versions. Raises ValueError if it is invalid."""
+    """Return the attached scenery, or an empty Scenery if it is missing. Raises ValueError if it is invalid."""
     data = header.files.get(SCENERY_FILE)
     if data is None:
         return Scenery()

@@ -1,4 +1,4 @@
-"""Reader of logs that simscen recorded. Logs of real robots are read by simscen.record.foreign."""
+"""Reader of logs that simscen recorded."""
 
 import struct
 from collections.abc import Iterator, Mapping
@@ -31,7 +31,7 @@ _READ_ERRORS = (
     MemoryError,
     RecursionError,
 )
-"""Exceptions that the libraries and the decoders raise on damaged files."""
+"""Exceptions that libraries and decoders raise for damaged files."""
 
 
 def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
@@ -41,7 +41,7 @@ def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidI
 
 @contextmanager
 def unreadable_log_as_invalid_input(path: Path) -> Iterator[None]:
-    """Context manager that raises InvalidInput, with file and reason, for the exceptions of reading a log."""
+    """Context manager that converts exceptions of reading a log to InvalidInput with file and reason."""
     try:
         yield
     except OSError as error:
@@ -56,17 +56,15 @@ def unreadable_log_as_invalid_input(path: Path) -> Iterator[None]:
 class Log:
     """Contents of a log.
 
-    With several robots, `robots` has the contents for each robot by name, and `trace` is that of the first robot.
-
     Attributes:
         header: Description of the run.
-        trace: Signals and events of the run.
-        result: Content of result.json, or "" if the run was not judged.
-        complete: False if the run was aborted; the trace then ends with the last message.
-        sensors: Messages that are not part of the trace. Empty unless requested.
+        trace: Signals and events of the only or first robot.
+        result: Content of result.json; "" if the run was not judged.
+        complete: False if the run was aborted. The trace then ends with the last message.
+        robots: Contents for several robots by name; empty for a single robot.
+        sensors: Messages that are not part of the trace; empty unless requested.
         coverage: Evidence that the log lacks because messages were removed after the recording.
-        stack: Facts about the external stack, as in stack.json; `about` is JSON. Empty for the reference stack, and if
-            the run was aborted.
+        stack: Facts about the external stack, as in stack.json; empty for the reference stack and an aborted run.
     """
 
     header: LogHeader
@@ -80,15 +78,12 @@ class Log:
 
     @property
     def traces(self) -> list[Trace]:
-        """The trace of each robot, or of the only one."""
+        """Traces of all robots."""
         return [log.trace for log in self.robots.values()] or [self.trace]
 
 
 def read_run(path: Path, with_sensors: bool = False) -> Log:
-    """Read a log in order to judge or draw its run.
-
-    Raises InvalidInput as `read_log` does, and also if the log has no ground truth.
-    """
+    """Read a log with `read_log`. Raises InvalidInput also if the log has no ground truth."""
     log = read_log(path, with_sensors=with_sensors)
     if not len(log.trace.truth):
         raise invalid_log(path, "SC803", "the log has no ground truth: its run was aborted before the first step")
@@ -98,10 +93,10 @@ def read_run(path: Path, with_sensors: bool = False) -> Log:
 def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool = False) -> Log:
     """Read a log that a Recorder wrote.
 
-    The trace equals the one that a TraceBuilder builds from the same moments, to the last bit. `partial` determines
-    whether a truncated log is accepted; None means only if its name ends with `.partial.mcap`. With `with_sensors`,
-    also keep the messages that are not part of the trace. Raises InvalidInput if the file cannot be read, is not a log
-    of simscen, is damaged, or is truncated.
+    Raises InvalidInput if the file cannot be read, is not a log of simscen, is damaged, or is truncated.
+
+    partial:       whether a truncated log is accepted; None to accept it if the name ends with `.partial.mcap`
+    with_sensors:  whether to keep the messages that are not part of the trace
     """
     path = Path(path)
     accept_truncated = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
@@ -123,7 +118,7 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
 
 
 def _read(stream: IO[bytes], contents: LogContents) -> bool:
-    """Add all records to `contents`. Return whether the log reaches the end of the run."""
+    """Add all records to `contents`. Return whether the log is complete."""
     if stream.read(len(MAGIC)) != MAGIC:
         raise NotSimscenLog("it is not an MCAP file")
     stream.seek(0)

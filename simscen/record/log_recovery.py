@@ -1,4 +1,4 @@
-"""Recovery of the log of an aborted run: adds the index at the end of the file, which other tools need."""
+"""Recovery of the log of an aborted run: adds the index, which other tools need."""
 
 import os
 from pathlib import Path
@@ -15,10 +15,10 @@ from simscen.record.topics import MessageType
 
 
 def recover(path: Path) -> bool:
-    """Rewrite a log with an index, and return True; return False if the log already has an index.
+    """Rewrite a log with an index, and return True. Return False if the log already has an index.
 
-    The log keeps its name, and remains the log of an aborted run. Raises InvalidInput if the file cannot be read or is
-    not MCAP, and RunError of kind "output" if the new file cannot be written.
+    Raises InvalidInput if the file cannot be read or is not MCAP. Raises RunError of kind "output" if the new file
+    cannot be written.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with unreadable_log_as_invalid_input(path):
@@ -39,7 +39,7 @@ def recover(path: Path) -> bool:
 
 
 def _ends_with_magic(stream: IO[bytes]) -> bool:
-    """Return whether the file ends as a complete MCAP file does. Raises NotSimscenLog if it is not an MCAP file."""
+    """Return whether the file ends with the MCAP magic bytes. Raises NotSimscenLog if it is not an MCAP file."""
     if stream.read(len(MAGIC)) != MAGIC:
         raise NotSimscenLog("it is not an MCAP file")
     size = stream.seek(0, os.SEEK_END)
@@ -50,7 +50,7 @@ def _ends_with_magic(stream: IO[bytes]) -> bool:
 
 
 def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
-    """Write all complete records to `file`, with an index. Only the end of the file changes."""
+    """Write all complete records of `stream` to `file`, followed by an index."""
     writer: McapWriter | None = None
     types: dict[int, MessageType] = {}
     channels: dict[int, Channel] = {}

@@ -1,4 +1,4 @@
-"""Reader of MCAP files: of all records in order, or of an attached result only."""
+"""Readers of MCAP files: of all records, or of an attached result."""
 
 import errno
 import json
@@ -19,11 +19,11 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from simscen.record.log_header import RESULT
 
 MAX_RECORD_BYTES = 1 << 28
-"""Largest record or decompressed chunk in bytes, so that a damaged file cannot exhaust the memory."""
+"""Maximum size of a record or decompressed chunk."""
 
 
 def open_log(path: Path) -> IO[bytes]:
-    """Open a file for reading. Raises OSError, also if it is not a regular file: reading a FIFO would block."""
+    """Open a regular file for reading. Raises OSError for other files, such as a FIFO."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
@@ -46,8 +46,8 @@ def attached_result(path: Path) -> dict[str, Any] | None:
 class RecordReader:
     """Iterates over all records of an MCAP file, including those inside chunks.
 
-    The iteration stops before a truncated record; `is_truncated` is then True. It raises the exceptions of the mcap
-    library for bytes that are not MCAP, and ValueError if a chunk is too large.
+    The iteration ends before a truncated record. `is_truncated` is then True. The iteration raises exceptions of the
+    mcap library for bytes that are not MCAP, and ValueError for a chunk above MAX_RECORD_BYTES.
     """
 
     def __init__(self, stream: IO[bytes]) -> None:
@@ -68,10 +68,7 @@ class RecordReader:
 
 
 def _decompressed(chunk: records.Chunk) -> records.Chunk:
-    """Return a chunk, decompressed if it uses lz4. Raises ValueError if it has more than MAX_RECORD_BYTES.
-
-    The mcap library decompresses zstd itself.
-    """
+    """Return a chunk, decompressed if it uses lz4. Raises ValueError if the chunk has more than MAX_RECORD_BYTES."""
     if chunk.compression == "lz4":  # the library would decompress it without a limit
         data = LZ4FrameDecompressor().decompress(chunk.data, max_length=MAX_RECORD_BYTES + 1)
         chunk = replace(chunk, compression="", data=data, uncompressed_size=len(data))
@@ -81,7 +78,7 @@ def _decompressed(chunk: records.Chunk) -> records.Chunk:
 
 
 class _ExactStream:
-    """A stream that returns exactly the requested number of bytes, or raises EndOfFile."""
+    """Stream that returns exactly the requested number of bytes, or raises EndOfFile."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream

@@ -1,7 +1,6 @@
 """Writer of MCAP files that is fast enough for every simulation step.
 
-The mcap library encodes all records except messages, chunks, and their indexes. For these, the library takes twice as
-long as everything else in recording, also because its zstd compression level is fixed.
+It encodes messages, chunks, and their indexes itself, because the mcap library is too slow for these records.
 """
 
 import struct
@@ -19,16 +18,16 @@ from simscen.record.messages.template import Slot, Template
 from simscen.record.topics import MessageType
 
 MESSAGE_HEADER_BYTES = 31
-"""Size of a message record without the message."""
+"""Size of a Message record without the message."""
 _MESSAGE = int(Opcode.MESSAGE)
 _pack_head = struct.Struct("<BQHIQQ").pack_into
-"""Packs the header of a message record: opcode, record length, channel, sequence number, log time, publish time."""
+"""Packs the header of a Message record: opcode, record length, channel, sequence number, log time, publish time."""
 
 
 class Chunk:
-    """Buffer of records that will be compressed together, as an MCAP chunk.
+    """Buffer of the records of one MCAP chunk, which are compressed together.
 
-    When the buffer has more than `limit` bytes, a Channel calls `on_full`, which must write and clear the chunk.
+    A Channel calls `on_full` when the buffer exceeds `limit` bytes. `on_full` must write and clear the chunk.
     """
 
     def __init__(self, limit: int, on_full: Callable[[], None]) -> None:
@@ -54,7 +53,7 @@ class Chunk:
             self.view = larger
 
     def __bool__(self) -> bool:
-        """Return whether the chunk has messages. Without messages it need not be written: the summary has the rest."""
+        """Return whether the chunk has messages."""
         return bool(self.active_channels())
 
     def active_channels(self) -> "list[Channel]":
@@ -66,7 +65,7 @@ class Chunk:
         return self.view[: self.size]
 
     def time_span(self) -> tuple[int, int]:
-        """Return the times of the first and the last message. Messages are added in the order of their times."""
+        """Return the times of the first and the last message in ns."""
         active = self.active_channels()
         return min([channel.entries[0] for channel in active]), max([channel.entries[-2] for channel in active])
 
@@ -78,9 +77,9 @@ class Chunk:
 
 
 class Channel:
-    """Channel of one topic, which adds messages to the current chunk. `number` is its ID in the file.
+    """Channel of one topic, which adds messages to a chunk. `number` is the ID of the channel in the file.
 
-    `entries` has two numbers for each message in the current chunk: its time in ns, and its offset.
+    `entries` has two numbers for each message in the chunk: its time in ns, and its offset.
     """
 
     def __init__(self, number: int, chunk: Chunk) -> None:
@@ -103,15 +102,12 @@ class Channel:
             chunk.on_full()
 
     def record(self, message: Template) -> "list[bytes | Slot]":
-        """Return the parts of a message record with a message of fixed size, for `compile_writer`.
-
-        The first field is `time` in ns; the others are those of the message.
-        """
+        """Return the parts of a Message record for `compile_writer`: the field `time` in ns, and `message`."""
         head = struct.pack("<BQHI", _MESSAGE, 22 + len(message.buffer), self.number, 0)
         return [head, Slot("Q", "time"), Slot("Q", "time"), *message.parts]
 
     def index(self) -> bytes:
-        """Return the MessageIndex record with the messages of this channel in the current chunk."""
+        """Return the MessageIndex record with the messages of this channel in the chunk."""
         entries = self.entries
         size = 8 * len(entries)
         return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, self.number, size, *entries)
@@ -119,11 +115,11 @@ class Channel:
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_BYTES = 1 << 18
-"""Size above which a chunk is written in any case."""
+"""Size above which a chunk is always written."""
 CHUNK_FLUSH_BYTES, CHUNK_FLUSH_NS = 1 << 16, 500_000_000
-"""Size or time span from which `flush_if_due` writes a chunk. Chunks in memory are lost if the process is killed."""
+"""Size and time span from which `flush_if_due` writes a chunk."""
 _CHUNK = struct.Struct("<BQ3QII4sQ")
-"""A Chunk record without its data."""
+"""Chunk record without its data."""
 _COMPRESSION_LEVEL = -2  # of zstd: 4 % larger files than level 1, but 25 % faster
 
 
@@ -138,8 +134,7 @@ class Sink(Protocol):
 class McapWriter:
     """Writes an MCAP file to `sink`. Messages must be added in the order of their times.
 
-    `profile` and `library` are the fields of the MCAP header, for example "ros2" and "simscen". A chunk is written when
-    it has more than `chunk_size` bytes, or by `flush_if_due`. `finish` writes the last chunk and the index.
+    `profile` and `library` are fields of the MCAP header. `chunk_size` is the maximum size of a chunk in bytes.
     """
 
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_BYTES) -> None:
@@ -160,7 +155,7 @@ class McapWriter:
         self._put(_encode(records.Header(profile, library)))
 
     def channel(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> Channel:
-        """Add a channel of CDR messages for a topic, and return it. Messages are added by `Channel.write`."""
+        """Add a channel of CDR messages for a topic, and return the channel."""
         schema = self._schemas.get(kind.name)
         if schema is None:
             schema = self._schemas[kind.name] = len(self._schemas) + 1
@@ -188,14 +183,14 @@ class McapWriter:
         self._put(record)
 
     def message_counts(self) -> dict[str, int]:
-        """Return the number of messages that have been added, by topic."""
+        """Return the number of added messages by topic."""
         pending = {channel.number: len(channel.entries) // 2 for channel in self._chunk.channels}
         return {
             topic: self._counts[number] + pending.get(number, 0) for number, topic in enumerate(self._topics, start=1)
         }
 
     def flush_if_due(self) -> None:
-        """Write the current chunk if it has CHUNK_FLUSH_BYTES, or spans CHUNK_FLUSH_NS."""
+        """Write the current chunk if it has CHUNK_FLUSH_BYTES or spans CHUNK_FLUSH_NS."""
         if self._chunk:
             start, end = self._chunk.time_span()
             if self._chunk.size >= CHUNK_FLUSH_BYTES or end - start >= CHUNK_FLUSH_NS:

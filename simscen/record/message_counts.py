@@ -1,4 +1,4 @@
-"""Check that a log still has all recorded messages, by the counts that its end record states."""
+"""Check that a log still has all recorded messages, by the message counts in its end record."""
 
 from collections.abc import Mapping
 
@@ -6,12 +6,12 @@ from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.record import log_header, topics
 
 NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its end was edited"
-"""Reason why no evidence of a log is known to be complete."""
+"""Reason why all evidence of a log may be incomplete."""
 
 _EVENTS = frozenset(
     {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
 ) | {Evidence.DISTURBANCES, Evidence.OBJECTS}
-"""Evidence that is in the events."""
+"""Evidence (kinds of recorded information) in the events."""
 _EVIDENCE: dict[str, frozenset[Evidence]] = {
     topics.TRUTH.name: frozenset({Evidence.TRUTH, Evidence.VELOCITY}),
     topics.CLEARANCE.name: frozenset({Evidence.CLEARANCE}),
@@ -21,11 +21,11 @@ _EVIDENCE: dict[str, frozenset[Evidence]] = {
     topics.EVENTS.name: _EVENTS,
     topics.TF.name: frozenset({Evidence.OBJECTS}),
 }
-"""Evidence by the topic that contains it."""
+"""Evidence that each topic contains."""
 
 
 class MessageCounts:
-    """Counts the messages of each topic, and compares the counts with those in the end record of the log."""
+    """Counts the messages of each topic, and compares the numbers with the end record of the log."""
 
     def __init__(self) -> None:
         self._topics: dict[int, str] = {}
@@ -35,13 +35,13 @@ class MessageCounts:
         self._expected: dict[str, int] | None = None
 
     def add_channel(self, channel: int, topic: str, message_type: str) -> None:
-        """Add a channel of the log, by its number. Several channels may have the same topic."""
+        """Add the channel with the ID `channel`. Several channels may have the same topic."""
         self._topics[channel] = topic
         if message_type == topics.SCAN_TYPE:
             self._scans.add(topic)
 
     def add_message(self, channel: int, time: int) -> None:
-        """Count a message. Raises ValueError if an earlier message of its topic has a later time."""
+        """Count a message. Raises ValueError if the messages of a topic are not in the order of `time`."""
         topic = self._topics.get(channel, "")
         if time < self._newest.get(topic, time):
             raise ValueError(f"the messages of {topic or 'a topic'} are not in the order of time")
@@ -49,7 +49,7 @@ class MessageCounts:
         self._found[topic] = self._found.get(topic, 0) + 1
 
     def set_expected(self, end: Mapping[str, str], robot: str = "") -> None:
-        """Take the counts of recorded messages from the end record; with `robot`, only for topics in its namespace."""
+        """Set the expected counts from the end record, for topics in the namespace of `robot` ("" for none)."""
         prefix = log_header.COUNT_PREFIX + (f"/{robot}" if robot else "")
         counts = {name: int(count) for name, count in end.items() if name.startswith(log_header.COUNT_PREFIX)}
         if counts:
@@ -60,8 +60,8 @@ class MessageCounts:
     def coverage(self) -> LogCoverage:
         """Return the evidence that the log lacks because messages were removed after the recording.
 
-        Evidence is missing if all messages of its topic were removed, and partial if some of them were. If the log has
-        no counts of recorded messages, all evidence is partial.
+        Evidence is missing if all messages of the topic were removed, and partial if some messages were removed. All
+        evidence is partial if the log has no message counts.
         """
         if self._expected is None:
             return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))

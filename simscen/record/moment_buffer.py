@@ -1,4 +1,4 @@
-"""Buffer that passes the moments of a run to the recorder and the trace builder in batches, because that is faster."""
+"""Buffer that passes moments (the records of single ticks) to the recorder and the trace builder in batches."""
 
 from contextlib import suppress
 from types import TracebackType
@@ -8,7 +8,7 @@ from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
 
 MOMENT_DELAY_S = 0.9
-"""Maximum simulated time for which moments are buffered. They are lost if the process is killed."""
+"""Maximum simulated time for which moments are buffered. Buffered moments are lost if the process is killed."""
 
 
 class MomentSink(Protocol):
@@ -20,7 +20,7 @@ class MomentSink(Protocol):
 
 
 class Flushable(Protocol):
-    """Output with a buffer of its own, such as a Recorder."""
+    """Output with its own buffer, such as a Recorder."""
 
     def flush_if_due(self) -> None:
         """Write the buffered output if it is large enough."""
@@ -28,21 +28,19 @@ class Flushable(Protocol):
 
 
 class MomentBuffer:
-    """Buffers the moments of all robots, and passes them on in batches and in their order.
+    """Buffers the moments of all robots, and passes them on in batches, which is faster.
 
-    Processing several moments in a row halves the time for each, because code and data stay in the caches of the
-    processor. Buffered moments are lost if the process is killed. As a context manager, it flushes the buffer when an
-    exception leaves the context.
+    As a context manager, it flushes the buffer if an exception leaves the context.
     """
 
     def __init__(self, ticks: int, file: Flushable | None = None) -> None:
-        """Buffer moments for at most `ticks`; 0 turns buffering off. `file.flush_if_due` is called after each batch."""
+        """Buffer moments for at most `ticks` (0 = no buffering). `file.flush_if_due` is called after each batch."""
         self.pending: list[tuple[tuple[MomentSink, ...], Moment]] = []
         self._file = file
         self.ticks, self.next_flush_tick = ticks, 0
 
     def sink(self, *logs: MomentSink) -> MomentSink:
-        """Return a sink for the moments of one robot, which are passed to each of `logs`."""
+        """Return a sink that passes the moments of one robot to each of `logs`."""
         return _BufferedSink(self, logs)
 
     def flush(self) -> None:

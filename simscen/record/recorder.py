@@ -17,12 +17,11 @@ from simscen.record.publishers.robot import RobotPublisher
 
 
 class Recorder:
-    """Context manager that writes the moments of each robot, in the order of their ticks, to a log.
+    """Context manager that writes the moments (records of single ticks) of all robots to a log.
 
-    `header` describes the run. `target` is the path of the log, or a sink for its bytes. Equal moments give equal
-    bytes. A log file has a partial name until `close`. If the context is left without `close`, because the run was
-    aborted, the file keeps its partial name and gets an index unless the disk is full. All methods raise RunError of
-    kind "output" if the log cannot be written.
+    `header` describes the run. `target` is the path of the log, or a sink for its bytes. A log file has a partial name
+    until `close`, and keeps this name if the run is aborted. Methods raise RunError of kind "output" if the log cannot
+    be written.
     """
 
     def __init__(self, target: "str | Path | Sink", clock: Clock, header: LogHeader) -> None:
@@ -45,19 +44,19 @@ class Recorder:
         """Publishers by robot name ("" for a single robot). The first one also publishes /clock."""
 
     def append(self, moment: Moment) -> None:
-        """Write one moment. Only for runs with a single robot; see `robots` for others."""
+        """Write one moment of a run with a single robot. With several robots, use `robots[name].append`."""
         (robot,) = self.robots.values()
         robot.append(moment)
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
-        """Write the messages in memory to the file if there are enough, so that a killed run loses few of them."""
+        """Write the buffered messages to the file if there are enough."""
         next(iter(self.robots.values())).flush_if_due()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the last records, and give the file its final name.
 
-        `result` is the content of result.json, and `stack` the facts about external stacks; both are optional.
+        `result` is the content of result.json. `stack` are the facts about external stacks. Both are optional.
         """
         if result:
             self._writer.add_attachment(log_header.RESULT, "application/json", result.encode())

@@ -1,7 +1,4 @@
-"""Storage for the messages of a log that replays show but that are not part of a Trace.
-
-These are scans, particles, local plans, costmaps, and log lines.
-"""
+"""Messages of a log that replays show in addition to the trace: scans, particles, local plans, costmaps, log lines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,22 +16,21 @@ from simscen.record.messages.event_text import EVENT_LOGGER
 from simscen.record.trace_builder import to_planar
 
 LoggedMessages = list[tuple[int, bytes]]
-"""Serialized messages, each with the tick at which it was logged."""
+"""Ticks of logging, and serialized messages."""
 
 
 @dataclass(eq=False)
 class SensorMessages:
-    """Serialized messages of one robot. They are decoded only when needed, because most of them never are.
+    """Serialized messages of one robot, which are decoded on request.
 
     Attributes:
         time: Clock of the log.
         scans: Messages by topic.
         costmaps: Messages by topic.
         mounts: Poses of lidars on the base, by frame.
-        lines: Messages of /rosout, including the events of simscen itself.
-        stamped: True if the stamps of messages count from the start of the run. If False, only the tick of logging is
-            meaningful.
-        frames: Names of the robot's frames in the log, which decoded messages replace by those of the stack.
+        lines: Messages of /rosout, including simscen's own lines.
+        stamped: Whether stamps count from the start of the run. If False, only ticks of logging are meaningful.
+        frames: Names of the robot's frames in the log. Decoded messages have the frame names of the stack instead.
     """
 
     time: SimTime = field(default_factory=lambda: SimTime(1))
@@ -48,9 +44,9 @@ class SensorMessages:
     frames: RobotFrames = field(default_factory=RobotFrames)
 
     def handler(self, topic: str, message_type: str) -> Callable[[int, bytes], None] | None:
-        """Return a function that stores a message of a topic, or None if its messages are not stored.
+        """Return a function (tick of logging, serialized message) that stores a message of a topic.
 
-        Its arguments are the tick at which the message was logged, and the serialized message.
+        Returns None if messages of the topic are not stored.
         """
         if message_type == topics.SCAN_TYPE:
             return _append_to(self.scans.setdefault(topic, []))
@@ -63,7 +59,7 @@ class SensorMessages:
         return None
 
     def scan(self, data: bytes) -> Scan:
-        """Decode a scan. Its tick is that of the measurement; the scan of a tilted lidar is projected to the floor."""
+        """Decode a LaserScan. The scan of a tilted lidar is projected to the floor."""
         scan = decode.laser_scan(MessageReader(data))
         frame = self.frames.stack_frame(scan.frame)
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
@@ -85,7 +81,7 @@ class SensorMessages:
         return [(tick, line) for tick, line in decoded if line.name != EVENT_LOGGER]
 
     def costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:
-        """Decode an OccupancyGrid to the name of its frame, and the grid."""
+        """Decode an OccupancyGrid to its frame and the grid."""
         frame, grid = decode.occupancy_grid(MessageReader(data))
         return self.frames.stack_frame(frame), grid
 

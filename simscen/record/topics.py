@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Topic(NamedTuple):
-    """A topic and its message type. `latched` means transient local: late subscribers get the last message."""
+    """A topic and its message type. `latched` means transient local durability."""
 
     name: str
     type: str
@@ -20,12 +20,12 @@ MAP = Topic("/map", "nav_msgs/msg/OccupancyGrid", latched=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", latched=True)
 TRUTH = Topic("/ground_truth/odom", "nav_msgs/msg/Odometry")
 FILTERED_ODOMETRY = Topic("/odometry/filtered", "nav_msgs/msg/Odometry")
-"""Named as the output of ekf_node in robot_localization."""
+"""Same topic as the output of ekf_node in robot_localization."""
 CLEARANCE = Topic("/simscen/clearance", "std_msgs/msg/Float64")
 BELIEF = Topic("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 PARTICLES = Topic("/particle_cloud", "nav2_msgs/msg/ParticleCloud")
 PARTICLE_POSES = Topic("/particlecloud", "geometry_msgs/msg/PoseArray")
-"""Topic of AMCL before Nav2 had its own message type. Viewers show it without a plug-in."""
+"""Topic of the particles for viewers without nav2_msgs."""
 PLAN = Topic("/plan", "nav_msgs/msg/Path")
 LOCAL_PLAN = Topic("/local_plan", "nav_msgs/msg/Path")
 GLOBAL_COSTMAP = Topic("/global_costmap/costmap", "nav_msgs/msg/OccupancyGrid", latched=True)
@@ -78,9 +78,6 @@ class MessageType(NamedTuple):
 
 
 def load_message_types() -> dict[str, MessageType]:
-    """Return all message types of a log by name, from schemas.json.
-
-    The file is generated from the definitions of ROS 2 Humble in rosbags; a test checks it.
-    """
+    """Return all message types of a log by name, from schemas.json (definitions of ROS 2 Humble)."""
     table = json.loads(files(__package__).joinpath("schemas.json").read_text("utf-8"))
     return {name: MessageType(name, entry["definition"], entry["hash"]) for name, entry in table.items()}

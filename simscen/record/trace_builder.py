@@ -1,8 +1,7 @@
-"""Builder of the Trace of a run, and the tables in which the signals of a Trace are collected.
+"""Builder of the Trace (signals and events) of a run, and the tables in which the signals are collected.
 
-A TraceBuilder collects signals from moments, and the log reader from messages. Both collect orientations as the
-quaternions that the log contains, and the same function converts these to yaw. The two traces are therefore equal to
-the last bit.
+A TraceBuilder collects signals from moments (records of single ticks), and the log reader from messages. Both store
+the quaternions of the log and convert them to yaw with the same function, so that both traces are equal to the bit.
 """
 
 import math
@@ -28,8 +27,7 @@ _tick = struct.Struct("d").pack
 class SignalBuffer:
     """Growing table of a signal. Each row has a tick and `width` numbers.
 
-    `rows` are the bytes of all rows, and `pack` converts the numbers of a row to bytes. Where speed matters, callers
-    append to `rows` directly.
+    `rows` are the bytes of all rows. `pack` converts the numbers of a row to bytes.
     """
 
     def __init__(self, width: int) -> None:
@@ -42,12 +40,12 @@ class SignalBuffer:
         self.rows += self.pack(tick, *values)
 
     def append(self, tick: int, values: Array) -> None:
-        """Append a row, whose `width` numbers are in an array of any shape."""
+        """Append a row with the `width` numbers of an array of any shape."""
         self.rows += _tick(tick)
         self.rows += values.tobytes()
 
     def extend(self, ticks: Ticks, values: Array) -> None:
-        """Append n rows, with ticks (n,) and values (n, width)."""
+        """Append n rows with ticks (n,) and values (n, width)."""
         self.rows += np.column_stack((ticks, values)).tobytes()
 
     def sort(self) -> None:
@@ -64,10 +62,8 @@ class SignalBuffer:
 
 
 def exact_planar_poses(points: Array) -> Array:
-    """Return poses (n, 7) for points (n, 3) x, y, yaw, equal to those of Pose3.planar to the last bit.
-
-    The log contains the poses of Pose3.planar. The sine of numpy, which `planar_poses` uses, is slightly different.
-    """
+    """Return poses (n, 7) of points (n, 3) x, y, yaw. The result is equal to Pose3.planar to the last bit."""
+    # The log contains the poses of Pose3.planar. The sine of numpy is slightly different.
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
     halves = np.where(np.isfinite(points[:, 2]), points[:, 2] / 2, np.nan).tolist()
@@ -76,25 +72,25 @@ def exact_planar_poses(points: Array) -> Array:
 
 
 def to_planar(poses: Array) -> Array:
-    """Return x, y, yaw (n, 3), with yaw in [-π, π], for poses (n, 7 or more): x, y, z, and a quaternion x, y, z, w."""
+    """Return x, y, yaw (n, 3) of poses (n, 7 or more): x, y, z, and a quaternion x, y, z, w."""
     x, y, z, w = poses[:, 3:7].T.copy()
     return np.column_stack((poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
 
 
 class TraceRows:
-    """Signals and events of a run that have been collected for its Trace.
+    """Collected signals and events of a run.
 
     A pose has seven columns: x, y, z and a quaternion x, y, z, w.
 
     Attributes:
-        truth: Pose, vx, vy, wz.
+        truth: True pose, vx, vy, wz.
         clearance: Clearance in m.
-        belief: Pose, and its covariance xx, xy, xyaw, yy, yyaw, yawyaw.
+        belief: Estimated pose, and its covariance xx, xy, xyaw, yy, yyaw, yawyaw.
         odometry: Pose.
         command: vx, vy, wz.
         objects: Poses of moving objects, by name.
         scans: Ticks at which the stack received a scan.
-        plans: Tick at which each plan was made, and its poses (n, 7).
+        plans: Tick and poses (n, 7) of each plan.
         events: Events in order.
     """
 
@@ -118,14 +114,14 @@ class TraceRows:
         return buffer
 
     def joint_objects(self, names: tuple[str, ...]) -> SignalBuffer:
-        """Return a buffer for ticks at which all these objects have moved. A row has their poses side by side."""
+        """Return the joint buffer of objects that move together. A row has the poses of all these objects."""
         buffer = self._joint.get(names)
         if buffer is None:
             buffer = self._joint[names] = SignalBuffer(7 * len(names))
         return buffer
 
     def split_joint_objects(self) -> None:
-        """Move the poses in joint buffers to the buffers of the objects, which are then sorted by tick."""
+        """Move the poses from joint buffers to the buffers of single objects, sorted by tick."""
         for names, buffer in self._joint.items():
             ticks, poses = buffer.columns()
             for column, name in enumerate(names):
@@ -160,13 +156,10 @@ def _poses(buffer: SignalBuffer) -> Samples:
 
 
 class TraceBuilder:
-    """Builds the Trace of a robot from its moments, which must be added in the order of their ticks.
-
-    The Trace equals the one that `read_log` returns for a log of the same moments.
-    """
+    """Builds the Trace of a robot from its moments. The Trace is equal to the Trace that `read_log` reads."""
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """`thinning` can be that of a RobotPublisher that gets each moment right afterwards, to select samples once."""
+        """`thinning` selects the samples to keep. It can be shared with the RobotPublisher of the same robot."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()
@@ -177,7 +170,7 @@ class TraceBuilder:
         """
 
     def append(self, moment: Moment) -> None:
-        """Add one moment. This only appends numbers, because it is called at every beat."""
+        """Add one moment. Moments must be added in the order of their ticks."""
         tick, truth, decision = moment.tick, moment.truth, moment.decision
         rows, thinning = self._rows, self._thinning
         if truth is not None:

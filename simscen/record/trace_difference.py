@@ -15,17 +15,17 @@ _COLUMNS = {
     "odometry": _POSE,
     "command": ("vx", "vy", "wz"),
 }
-"""Names of the columns of each signal; other signals are poses."""
+"""Names of the columns of each signal. Signals that are missing here are poses."""
 
 Difference = tuple[int, str]
 """Tick and description of a difference."""
 
 
 def first_difference(first: Trace, second: Trace) -> str | None:
-    """Return a description of the first difference of two traces, with its tick; None if they are equal to the bit.
+    """Return a description of the first difference of two traces; None if the traces are equal to the bit.
 
-    If several fields differ at this tick, the first of truth, velocity, clearance, odometry, objects, scans, belief,
-    command, plans, and events is described, because a difference in one causes differences in those after it.
+    If several fields differ at the first tick, describes the field that comes first in this order: truth, velocity,
+    clearance, odometry, objects, scans, belief, command, plans, events.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
@@ -37,7 +37,7 @@ def first_difference(first: Trace, second: Trace) -> str | None:
 
 
 def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
-    """Yield the first difference of each signal, all differences of plans and events, and that of the end."""
+    """Yield the first difference of each signal, all differences of plans and events, and a difference of the ends."""
     for name in ("truth", "velocity", "clearance", "odometry"):
         yield from _in_samples(name, getattr(first, name), getattr(second, name))
     empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
@@ -62,7 +62,7 @@ def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
 
 
 def _in_samples(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
-    """Yield the first row that differs in at least one bit: nan equals nan, but 0.0 differs from -0.0."""
+    """Yield the first row that differs in at least one bit (nan equals nan, but 0.0 differs from -0.0)."""
     n = min(len(first), len(second))
     a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (first, second))
     differs = a.view(np.int64) != b.view(np.int64)
@@ -82,20 +82,20 @@ def _in_samples(name: str, first: Samples, second: Samples) -> Iterator[Differen
 
 
 def _missing(name: str, first: list[int], second: list[int]) -> Iterator[Difference]:
-    """Yield a difference at the first surplus tick if one list of ticks is longer than the other."""
+    """Yield a difference at the first additional tick if one list of ticks is longer."""
     if len(first) != len(second):
         longer = max(first, second, key=len)
         yield longer[min(len(first), len(second))], f"{name}: {len(first)} against {len(second)}"
 
 
 POSE_TOLERANCE_M_RAD = 1e-5
-"""Tolerance for true poses in m and rad, far above the differences between processors with different arithmetic."""
+"""Tolerance for true poses in m and rad."""
 
 
 def first_pose_difference(first: Trace, second: Trace) -> str | None:
-    """Return a description of the first difference of the true poses above POSE_TOLERANCE_M_RAD; None without one.
+    """Return a description of the first difference of true poses above POSE_TOLERANCE_M_RAD; None without a difference.
 
-    This is for runs on different processors, whose traces need not be equal to the bit.
+    Used for runs on different processors.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"

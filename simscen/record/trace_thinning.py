@@ -1,4 +1,4 @@
-"""Selection of the samples of a run that are recorded, for the log and for the Trace alike."""
+"""Selection of the samples of a run that the log and the Trace contain."""
 
 from collections.abc import Mapping
 
@@ -9,18 +9,16 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.core.records.trace import Truth
 
 COMMAND_RATE_HZ = 20
-"""Rate at which an unchanged command is recorded."""
+"""Rate at which an unchanged command is kept."""
 STANDSTILL_RATE_HZ = 1
-"""Rate at which an unchanged pose of an object is recorded."""
+"""Rate at which an unchanged pose of an object is kept."""
 
 
 class Thinning:
-    """Selects the samples to keep. The clock has `rate` ticks per second.
+    """Selects the samples to keep. `rate` is the number of ticks per second.
 
-    A command is kept if it differs from the previous one, and otherwise 20 times a second. The pose of an object is
-    kept if it has changed, and otherwise once a second. If there are several odometry sensors, the first one
-    with a reading counts as the robot's odometry. Repeated calls for the same tick return the same result, so that the
-    recorder and the TraceBuilder can use the same Thinning.
+    Changed commands and changed poses of objects are always kept. Repeated calls for the same tick return the same
+    result.
     """
 
     def __init__(self, rate: int) -> None:
@@ -40,7 +38,7 @@ class Thinning:
         """The previous sample if all its objects were kept. It is added to `_kept_poses` only when needed."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
-        """Return whether the command of this tick is to be kept."""
+        """Return whether to keep the command of this tick."""
         if tick != self._command_checked_tick:
             self._command_checked_tick = tick
             if command != self._command or tick - self._command_kept_tick >= self._command_period:
@@ -48,13 +46,13 @@ class Thinning:
         return self._command_kept_tick == tick
 
     def keeps_odometry(self, odometry: Odometry) -> bool:
-        """Return whether a reading is from the sensor that counts as the robot's odometry."""
+        """Return whether to keep a reading: only readings of the first odometry sensor."""
         if self._odometry is None:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry
 
     def objects_to_keep(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
-        """Return the poses of objects that are to be kept at this tick, by object name."""
+        """Return the poses of objects to keep at this tick, by object name."""
         if tick != self._selected_tick:
             self._selected_tick, self._selected = tick, self._select_objects(tick, truth.objects)
         return self._selected
@@ -71,7 +69,7 @@ class Thinning:
         return kept
 
     def _have_all_moved(self, objects: PosesAtTick) -> bool:
-        """Return True if all poses of the previous sample were kept, and all objects have moved since then."""
+        """Return whether all poses of the previous sample were kept and all objects have moved since then."""
         if self._all_kept is None:
             return False
         previous, predicted = self._all_kept[1], objects.predicted
@@ -103,7 +101,7 @@ class Throttle:
         self._next: int | None = None
 
     def passes(self, tick: int) -> bool:
-        """Return whether a message may be written at this tick, and count it."""
+        """Return whether a message may be written at this tick. If so, a new period begins."""
         if self._next is not None and tick < self._next:
             return False
         self._next = tick + self._period

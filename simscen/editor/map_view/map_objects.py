@@ -182,8 +182,8 @@ def motion_path(
 def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
     """Return the ID of the object whose YAML contains a problem; "" if no object does.
 
-    Of several objects, returns the one with the shortest YAML. A problem at a key belongs to the value after the key.
-    `source` is the syntax tree of `text`.
+    Of several objects, returns the one with the shortest YAML. A problem at a key belongs to the value in the same
+    line. `source` is the syntax tree of `text`.
     """
     if not problem.line or source is None:
         return ""

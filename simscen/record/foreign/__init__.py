@@ -1,1 +1,1 @@
-"""Reader of logs of real robots: MCAP files and rosbag2 folders with standard topics are converted to a Trace."""
+"""Reader of logs of real robots: MCAP files and rosbag2 folders with standard topics."""

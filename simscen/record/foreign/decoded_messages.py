@@ -1,4 +1,4 @@
-"""Decoder of the messages of a real log: decodes each message as the role of its topic requires."""
+"""Decoder of the messages of a real robot's log by the role (purpose) of their topics."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _DECODERS: Mapping[str, Mapping[str, Callable[[bytes], Any]]] = {
     "tf_static": _TRANSFORM_DECODERS,
     "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
 }
-"""Decoders by role and message type. Only the stamp of a scan is decoded."""
+"""Decoders by role and message type. The decoder of scans returns only the stamp."""
 
 
 @dataclass
 class DecodedMessages:
-    """Decoded messages by role, each with its time of logging in ns.
+    """Times of logging in ns and decoded messages, by role.
 
-    `problems` states, by role, why messages could not be decoded.
+    `problems` are the reasons why messages of a role could not be decoded.
     """
 
     by_role: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
@@ -44,7 +44,7 @@ class DecodedMessages:
 
 
 def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
-    """Return the roles of each topic. The topic of the ground truth has the role `truth`, and can have another one."""
+    """Return the roles of each topic. The topic of the ground truth has the role `truth`, and may have another role."""
     roles: dict[str, list[str]] = defaultdict(list)
     for role in TOPICS:
         roles[options.topic(role)].append(role)
@@ -54,10 +54,10 @@ def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
 
 
 def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]]) -> DecodedMessages:
-    """Decode the messages of all topics that have a role.
+    """Decode the messages of all topics with a role. `roles` are the roles of each topic.
 
-    A topic with another message type or encoding than its role requires is recorded in `problems`. Raises UnusableLog
-    for a message that does not match its type.
+    A topic with an unsuitable message type or encoding is added to `problems`. Raises UnusableLog for an invalid
+    message.
     """
     decoded = DecodedMessages()
     for message in raw:

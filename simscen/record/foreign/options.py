@@ -14,13 +14,13 @@ TOPICS = {
     "tf_static": "/tf_static",
     "status": "/navigate_to_pose/_action/status",
 }
-"""Default topics by role. A role is the NAME in `--topic NAME=TOPIC`: the use that simscen makes of a topic.
+"""Default topics by role. A role is the purpose of a topic, the NAME in the option `--topic NAME=TOPIC`.
 
-The topic with the role `status` contains the results of goals.
+The topic with the role `status` contains the states of goals.
 """
 
 Clock = Literal["header", "log"]
-"""Source of the times of messages: the stamps in their headers, or the times at which they were logged."""
+"""Source of the times of messages: stamps in headers, or times of logging."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class ForeignLogOptions:
     """Options for reading the log of a real robot.
 
     Attributes:
-        truth: Ground truth: a topic, or two frames such as `map:base_link`. None if there is no ground truth.
+        truth: Ground truth: a topic, or two frames of tf such as `map:base_link`; None without ground truth.
         topics: Topics by role, for roles whose topic is not the default.
         tick_rate: Ticks per second of the trace.
         clock: Source of the times of messages.
-        same_frame: Treat the frame of the ground truth as the map frame, even if its name differs.
-        goals: Names of the goals that the robot was sent to, in order.
+        same_frame: Whether the frame of the ground truth is the map frame, even if its name differs.
+        goals: Names of the goals of the robot, in order.
     """
 
     truth: str | None = None
@@ -44,16 +44,16 @@ class ForeignLogOptions:
     goals: tuple[str, ...] = ()
 
     def topic(self, role: str) -> str:
-        """Return the topic with a role in this log."""
+        """Return the topic with a role."""
         return self.topics.get(role, TOPICS[role])
 
     @property
     def frames(self) -> tuple[str, str] | None:
-        """The parent and child frame if the ground truth is a transform of tf, otherwise None."""
+        """Parent and child frame of the ground truth; None if the ground truth is a topic."""
         return None if self.truth is None else parse_frame_pair(self.truth)
 
 
 def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
+    """Return the parent and child frame of a name such as `map:base_link`; None for the name of a topic."""
     outer, colon, inner = name.partition(":")
     return (outer, inner) if colon and not name.startswith("/") else None

@@ -1,4 +1,4 @@
-"""Iteration over the serialized messages of any MCAP file or rosbag2 folder, and recognition of simscen's logs."""
+"""Iteration over the serialized messages of MCAP files and rosbag2 folders, and recognition of simscen's logs."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from simscen.record.mcap_writer import MAGIC
 
 
 class UnusableLog(ValueError):
-    """The log cannot be used. The message states the reason; `hint` states how to fix it, "" if unknown."""
+    """The log cannot be used. The message states the reason, and `hint` the solution ("" if unknown)."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -25,7 +25,7 @@ class UnusableLog(ValueError):
 
 @contextmanager
 def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
-    """Context manager that converts exceptions of a log that cannot be read or used to InvalidInput with its path."""
+    """Context manager that converts exceptions for unreadable and unusable logs to InvalidInput with the path."""
     with unreadable_log_as_invalid_input(path):
         try:
             yield
@@ -34,7 +34,7 @@ def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
 
 
 class RawMessage(NamedTuple):
-    """Serialized message. `encoding` is "cdr" for ROS 2, and `time` the time of logging in nanoseconds."""
+    """Serialized message. `encoding` is "cdr" for ROS 2. `time` is the time of logging in ns."""
 
     topic: str
     type: str
@@ -46,8 +46,8 @@ class RawMessage(NamedTuple):
 class McapMessages:
     """Iterable of the messages of an MCAP file.
 
-    After the iteration, `complete` is False if the file is truncated, and `topics` has the message types by topic. The
-    iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
+    After the iteration, `complete` states whether the file is not truncated, and `topics` has the message types by
+    topic. The iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -87,7 +87,7 @@ class McapMessages:
 
 
 def is_simscen_log(path: Path) -> bool:
-    """Return whether simscen recorded this file; True if it cannot be read, because `read_log` then reports why."""
+    """Return whether simscen recorded this file. Returns True if the file cannot be read."""
     try:
         return _run_metadata(path) is not None
     except Exception:
@@ -95,7 +95,7 @@ def is_simscen_log(path: Path) -> bool:
 
 
 def recorded_robots(path: Path) -> tuple[str, ...]:
-    """Return the names of the robots if this is a log of simscen with several robots, otherwise ()."""
+    """Return the names of several robots in a log of simscen; () for other logs."""
     try:
         return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS, "[]")))
     except Exception:
@@ -103,7 +103,7 @@ def recorded_robots(path: Path) -> tuple[str, ...]:
 
 
 def _run_metadata(path: Path) -> dict[str, str] | None:
-    """Return the metadata record that simscen writes before the first message, or None if there is none."""
+    """Return the metadata record of simscen before the first message; None if it is missing."""
     with open_log(path) as stream:
         for record in RecordReader(stream):
             if isinstance(record, records.Metadata) and record.name == "simscen":
@@ -125,8 +125,8 @@ INSTALL_ROSBAGS = "pip install 'rosbags>=0.10,<1'"
 class BagMessages:
     """Iterable of the messages of a rosbag2 folder.
 
-    After the iteration, `complete` is False if messages are missing, and `topics` has the message types by topic.
-    SQLite and compressed bags need the optional package rosbags; only their messages on `topics` are read.
+    After the iteration, `complete` states whether no messages are missing, and `topics` has the message types by topic.
+    SQLite and compressed bags need the optional package rosbags. Of these bags, only messages on `topics` are read.
     """
 
     def __init__(self, folder: Path, topics: Container[str]) -> None:
@@ -140,7 +140,7 @@ class BagMessages:
         return self._read_mcap(files) if files and not self._is_compressed() else self._read_with_rosbags()
 
     def _is_compressed(self) -> bool:
-        """Return whether rosbag2 compressed the messages or files. The compression of MCAP itself does not count."""
+        """Return whether rosbag2 has compressed the messages or files, in addition to the compression of MCAP."""
         metadata = self._folder / "metadata.yaml"
         text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
         return re.search(r"compression_mode:\s*['\"]?(message|file)", text, re.IGNORECASE) is not None
@@ -178,7 +178,7 @@ class BagMessages:
 def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessages:
     """Return an iterable of the messages of an MCAP file or a rosbag2 folder.
 
-    It contains all messages on `topics`, and may also contain others. Raises UnusableLog for .bag and .db3 files.
+    It contains all messages on `topics`, and possibly on other topics. Raises UnusableLog for .bag and .db3 files.
     """
     if path.is_dir():
         return BagMessages(path, topics)
@@ -190,6 +190,6 @@ def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessa
 
 
 def _file_number(file: Path) -> tuple[int, str]:
-    """Return the sort key of a file of a bag: name_0, name_1, …, name_10."""
+    """Return the sort key of a file of a bag, for the order name_0, name_1, …, name_10."""
     number = re.search(r"_(\d+)$", file.stem)
     return (int(number[1]) if number else -1, file.name)

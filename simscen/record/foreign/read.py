@@ -1,4 +1,4 @@
-"""Reader of logs of real robots: returns a Trace, the evidence that the log lacks, and sensor messages for replays."""
+"""Reader of logs of real robots."""
 
 from __future__ import annotations
 
@@ -25,9 +25,13 @@ from simscen.record.sensor_messages import SensorMessages
 
 @dataclass(frozen=True, eq=False)
 class ForeignLog:
-    """Log of a real robot: its trace, the evidence that it lacks, and remarks for the user.
+    """Log of a real robot.
 
-    `sensors` and `map`, for replays, are empty unless requested. `map` is also None if the log has no map.
+    trace:     recorded signals and events
+    coverage:  evidence (kinds of information) that the log lacks
+    notes:     remarks for the user
+    sensors:   sensor messages for replays; empty unless requested
+    map:       map for replays; None unless requested, or if the log has no map
     """
 
     trace: Trace
@@ -40,9 +44,8 @@ class ForeignLog:
 def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool = False) -> ForeignLog:
     """Read an MCAP file or a rosbag2 folder of a real robot.
 
-    The trace lasts from the first to the last message on a topic with a role. The trace of a truncated log has no event
-    `run.ended`, so that no criterion can pass. With `with_sensors`, also keep scans, particles, local plans, costmaps
-    and the map. Raises InvalidInput if the log cannot be used.
+    The trace of a truncated log has no event `run.ended`. With `with_sensors`, also keep scans, particles, local plans,
+    costmaps, and the map. Raises InvalidInput if the log cannot be used.
     """
     with unusable_log_as_invalid_input(path):
         roles = topic_roles(options)
@@ -68,7 +71,7 @@ SENSOR_TOPICS = (
     *(topic.name for topic in (topics.PARTICLES, topics.LOCAL_PLAN, topics.MAP)),
     *(topic.name for topic in (topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP)),
 )
-"""Topics to read for replays from SQLite bags. In MCAP files, scans on any topic are read."""
+"""Topics for replays. In MCAP files, scans on other topics are read as well."""
 BASE_FRAME = "base_link"
 """Frame in which replays need the poses of lidars."""
 
@@ -76,7 +79,7 @@ BASE_FRAME = "base_link"
 class SensorMessageCollector:
     """Collects sensor messages while another reader iterates over the messages of a log.
 
-    `map` is the last map on /map; None if there is none.
+    `map` is the last map on /map; None without a map.
     """
 
     def __init__(self) -> None:
@@ -92,7 +95,7 @@ class SensorMessageCollector:
             yield message
 
     def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:
-        """Return the collected messages with their ticks, and the mounts of lidars from static transforms."""
+        """Return the collected messages with ticks of the timebase, and the mounts of lidars from static transforms."""
         ticks = time.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
         for tick, message in zip(ticks.tolist(), self._messages, strict=True):
             handler = self._sensors.handler(message.topic, message.type)
@@ -112,7 +115,7 @@ class SensorMessageCollector:
             self._messages.append(message)
 
     def _check(self, message: RawMessage) -> None:
-        """Decode a message once, so that a damaged message is reported now and not when it is drawn."""
+        """Raise ValueError for an invalid message."""
         match message.type:
             case topics.SCAN_TYPE:
                 self._sensors.scan(message.data)

@@ -1,4 +1,4 @@
-"""Conversion of the times in a real log to the ticks of a Trace, and checks for clocks set during recording."""
+"""Conversion of the times in a real robot's log to ticks, and checks for clocks that were set during recording."""
 
 from __future__ import annotations
 
@@ -12,26 +12,25 @@ from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
-"""Largest step back of the stamps of a topic in ns. A larger one means that the clock was reset."""
+"""Maximum backward step between stamps of a topic. A larger step means that the clock was reset."""
 MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
-"""Smallest change of a clock in ns that is reported. Smaller changes are within the delays of logging."""
+"""Minimum change of a clock that is reported."""
 MIN_MESSAGES_AROUND_STEP = 20
-"""Smallest number of messages before and after the change of a clock, to distinguish it from delayed messages."""
+"""Minimum number of messages before and after the change of a clock."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""Largest ratio of the lasting change of the offset to its jump at one message, if a clock was set.
+"""Maximum ratio of the permanent change of the offset (stamp minus time of logging) to its change at one message.
 
-The offset is the stamp minus the time of logging. If a clock is set, both changes are about equal. If a recorder
-catches up after a busy start, or loses messages, the offset changes by far more in total than at any single message.
+A larger ratio means that the recorder caught up or lost messages, and that no clock was set.
 """
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Largest difference in ns between the stamps of two topics at the same time. A larger one means different clocks."""
+"""Maximum difference between stamps of two topics at the same time. A larger difference means different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class StampedMessages:
-    """Times of logging and stamps of the messages of a topic, in ns, in the order of logging.
+    """Times of logging and stamps of the messages of a topic in ns, in the order of logging.
 
-    The constructor raises UnusableLog if the stamps jump back, or if their clock was set during the recording.
+    Raises UnusableLog if the stamps jump back or if their clock was set during the recording.
     """
 
     topic: str
@@ -54,7 +53,7 @@ class StampedMessages:
 
     @property
     def order_problems(self) -> str:
-        """Description of the numbers of late and repeated stamps; "" if there are none."""
+        """Text on the numbers of late and repeated stamps; "" without problems."""
         late = int((np.diff(self.stamps) < 0).sum())
         repeated = len(self.stamps) - len(np.unique(self.stamps))
         texts = [
@@ -65,14 +64,13 @@ class StampedMessages:
 
 
 def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
-    """Return where the clock of the stamps was set: the index of the first message afterwards, and the change in ns.
+    """Return the index of the first message after the clock of the stamps was set, and the change in ns.
 
-    Returns None if the clock was not set. `logged` and `stamps` are the times of the messages of one topic, in ns, in
-    the order of logging. The offset of a message is its stamp minus its time of logging. Delays make it smaller, so the
-    largest offset of many messages shows the difference of the two clocks. Only setting a clock changes this maximum
-    permanently and from one message to the next. A delayed or repeated message, a slow recorder, and a paused
-    simulation change offsets for a short time, or they change the interval of logging rather than that of the stamps.
+    Returns None if the clock was not set. `logged` and `stamps` are the times of the messages of one topic in ns, in
+    the order of logging.
     """
+    # Delays make offsets smaller, so that the maximum offset of many messages is the difference of the two clocks. Only
+    # setting a clock changes this maximum permanently and from one message to the next.
     count = MIN_MESSAGES_AROUND_STEP
     if len(stamps) < 2 * count:
         return None
@@ -92,11 +90,9 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
 def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
     """Raise UnusableLog if the clock of the recorder was set back.
 
-    `logged` and `stamps` are the times of the messages of one topic, in ns, in the order of the file. The clock was set
-    back if the times of logging step back exactly once, to a time that the log has already covered, and the stamps
-    step back there as well or are all zero. Several steps, or parts whose times do not overlap, are not reported: the
-    file is only unsorted.
+    `logged` and `stamps` are the times of the messages of one topic in ns, in the order of the file.
     """
+    # Several steps back, or parts whose times do not overlap, mean that the file is only unsorted.
     times = np.array(logged, dtype=np.int64)
     backward = np.flatnonzero(np.diff(times) < 0)
     if len(backward) != 1:
@@ -113,11 +109,12 @@ def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int
 
 @dataclass(frozen=True, eq=False)
 class Timebase:
-    """Conversion of the times of messages to ticks: tick 0 is at `start`, the last tick at `stop` (both in ns).
+    """Conversion of the times of messages to ticks.
 
-    There are `rate` ticks per second. `anchor` are messages with stamps and times of logging, by which the times of
-    logging of other messages are converted to the clock of the stamps. It is None if the times of logging are used for
-    all messages.
+    start:   time of tick 0 in ns
+    stop:    time of the last tick in ns
+    rate:    ticks per second
+    anchor:  messages that relate times of logging to stamps; None if times of logging are used for all messages
     """
 
     start: int
@@ -129,9 +126,9 @@ class Timebase:
     def from_logged(
         cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None, begin: int | None = None
     ) -> Timebase:
-        """Return the timebase from `begin` until the last of the times of logging, of which there is at least one.
+        """Return the timebase from `begin` (None for the first time) to the last time of logging.
 
-        `logged` has the times of logging of each topic, in ns. `begin` is a time of logging; None for the first.
+        `logged` are the times of logging of each topic in ns, at least one in total.
         """
         times = np.concatenate(list(logged))
         begin = int(times.min()) if begin is None else begin
@@ -148,7 +145,7 @@ class Timebase:
         return self._ticks(_header_times(logged, self.anchor))
 
     def ticks_of_stamped(self, messages: StampedMessages) -> Ticks:
-        """Return the ticks of messages with stamps. Raises UnusableLog if their clock differs from the anchor's."""
+        """Return the ticks of messages with stamps. Raises UnusableLog if the anchor has another clock."""
         if self.anchor is None:
             return self._ticks(messages.logged)
         delays = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
@@ -160,10 +157,7 @@ class Timebase:
         return self._ticks(messages.stamps)
 
     def _ticks(self, times: Ticks) -> Ticks:
-        """Return the ticks nearest to times in ns, limited to the first and the last tick.
-
-        Latched messages can be older than the log, and transforms newer.
-        """
+        """Return the ticks nearest to times in ns, limited to the first and the last tick."""
         since: Ticks = np.clip(times, self.start, self.stop) - self.start
         ticks: Ticks = (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
         return ticks
@@ -172,7 +166,7 @@ class Timebase:
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
     """Convert times of logging to the clock of the anchor's stamps, by interpolation between the anchor's messages.
 
-    Before and after these messages, the difference of the two clocks is assumed to be constant.
+    Before and after these messages, the difference of the two clocks is constant.
     """
     if anchor is None:
         return logged

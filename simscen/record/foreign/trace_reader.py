@@ -1,4 +1,4 @@
-"""Conversion of the decoded messages of a real log to the signals of a Trace, and to the evidence that it lacks."""
+"""Conversion of the decoded messages of a real robot's log to the signals and events of a Trace."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ _FINAL_STATES = {
     CANCELED: (EventKind.GOAL_CANCELED, "CANCELED"),
     ABORTED: (EventKind.GOAL_FAILED, "FAILED"),
 }
-"""Event of a goal, and result of the navigation if it is the last goal, by the final status of the goal."""
+"""Event of a goal, and result of the navigation after the last goal, by the final status of the goal."""
 
 
 def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence[str]) -> list[Event] | str:
-    """Return the events of goals from status messages, or the reason why they are unknown, as text.
+    """Return the events of goals, or the reason why they are unknown.
 
-    Each message is its tick and the states of all goals. `names` are the names of the goals in the order in which they
-    were accepted. Goals that ended before the log started are ignored.
+    `messages` are ticks and states of all goals. `names` are the names of the goals in the order of their acceptance.
+    Goals that ended before the start of the log are ignored.
     """
     accepted: dict[bytes, int] = {}
     ended: dict[bytes, tuple[int, int]] = {}
@@ -73,17 +73,16 @@ def _count(number: int) -> str:
 
 
 MAX_TRUTH_GAP_S = 1.0
-"""Longest time without ground truth for complete evidence. A violation could remain unseen in a longer gap."""
+"""Maximum time without ground truth for complete evidence."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
-"""Delay of the first ground truth or scan with which the log is judged only from then on.
+"""Minimum and maximum delay of the first ground truth or scan that is due to a late subscription of the recorder.
 
-A recorder subscribes to one topic after another when it starts. A shorter delay does not matter, and a longer one has
-another cause.
+With such a delay, the log is judged from the first ground truth or scan on.
 """
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
-"""Distance that a robot may drive before the first pose of AMCL: a little more than Nav2's update_min_d, 0.25 m."""
+"""Maximum distance that the robot drives before the first pose of AMCL, for complete evidence."""
 MAX_LISTED_TOPICS = 12
-"""Maximum number of topics that a message to the user lists."""
+"""Maximum number of topics in a message to the user."""
 _NOT_ON_STANDARD_TOPICS = (
     *(Evidence.CLEARANCE, Evidence.CONTACTS, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES),
     Evidence.OBJECTS,
@@ -93,22 +92,22 @@ _ALWAYS_MISSING: dict[Evidence, str] = {
     Evidence.DISTURBANCES: "only logs of simscen contain faults and events",
     Evidence.FOOTPRINT: "the scenario has no `robot:`",
 }
-"""Evidence that the messages of a real log never contain, with the reason."""
+"""Evidence that logs of real robots never contain, with the reason."""
 
 _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan": Evidence.PLANS}
-"""Evidence by the role of the topic that contains it."""
+"""Evidence that the topic with a role contains."""
 
 
 class ForeignTraceReader:
-    """Converts the messages of one log to signals and events, in its constructor.
+    """Signals and events of one log, converted from the `decoded` messages.
 
-    It takes the `decoded` messages, and the message types of all `topics` of the log.
+    `topics` has the message types of all topics of the log.
 
     Attributes:
         rows: Signals and events.
         time: Conversion of times to ticks.
-        missing: Evidence that the log lacks, with the reason.
-        partial: Evidence that the log has only for a part of the time, with the reason.
+        missing: Evidence (kinds of information) that the log lacks, with the reason.
+        partial: Evidence that the log has for a part of the time, with the reason.
         notes: Remarks for the user.
     """
 
@@ -141,7 +140,7 @@ class ForeignTraceReader:
         return track
 
     def _track(self, role: str, *evidence: Evidence) -> Track | None:
-        """Return the track of a role. If there is none, return None and add its `evidence` to `missing`."""
+        """Return the track (poses over time) of a role. If it has no messages, add `evidence` to `missing`."""
         topic = (self._options.truth or "") if role == "truth" else self._options.topic(role)
         messages = self._decoded.by_role[role]
         if messages:
@@ -150,7 +149,7 @@ class ForeignTraceReader:
         return None
 
     def _reason_missing(self, role: str, topic: str) -> str:
-        """Return why there are no messages with a role, and other topics that might have it."""
+        """Return the reason why the log has no messages with a role, and other topics with poses."""
         if role in self._decoded.problems:
             return self._decoded.problems[role]
         if topic in self._topics:
@@ -164,7 +163,7 @@ class ForeignTraceReader:
     def _timebase(self, *tracks: Track | None) -> Timebase:
         """Return the timebase of all decoded messages.
 
-        Its anchor is the first topic with stamps among the `tracks`, the odometry, and the scans.
+        The anchor is the first of `tracks`, odometry, and scans that has stamps.
         """
         logged = [
             np.array([time for time, _ in messages], dtype=np.int64)
@@ -184,11 +183,7 @@ class ForeignTraceReader:
         return Timebase.from_logged(logged, self._options.tick_rate, anchor, self._recorded_since(logged, tracks[0]))
 
     def _recorded_since(self, logged: Sequence[Ticks], truth: Track | None) -> int:
-        """Return the time of logging in ns from which the log is judged.
-
-        This is the time of the first message, or of the first ground truth or scan if that is slightly later: see
-        MAX_LATE_SUBSCRIPTION_S.
-        """
+        """Return the time of logging in ns from which the log is judged: see MAX_LATE_SUBSCRIPTION_S."""
         start = int(min(times.min() for times in logged))
         firsts = {} if truth is None else {truth.source: int(truth.logged.min())}
         if scans := self._decoded.by_role["scan"]:
@@ -229,7 +224,7 @@ class ForeignTraceReader:
             self.partial |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"{track.source} has no message {gap}")
 
     def _gap(self, ticks: Ticks) -> str:
-        """Return a description of the first gap between samples that is too long; "" if there is none."""
+        """Return text on the first gap between samples above MAX_TRUTH_GAP_S; "" without such a gap."""
         edges = np.concatenate(([0], ticks, [self.time.end]))
         long = np.flatnonzero(np.diff(edges) > MAX_TRUTH_GAP_S * self.time.rate)
         if not len(long):
@@ -250,7 +245,7 @@ class ForeignTraceReader:
             )
 
     def _check_frames(self, truth: Track | None, belief: Track | None) -> None:
-        """Add the alignment to `missing` if the ground truth and the belief have different frames."""
+        """Add the alignment of the frames to `missing` if ground truth and belief have different frames."""
         map_frame = "map" if belief is None else belief.frame
         if truth is None or self._options.same_frame or truth.frame == map_frame:
             return
@@ -258,7 +253,7 @@ class ForeignTraceReader:
         self.missing[Evidence.ALIGNMENT] = f"{text}; if they are the same, use --same-frame"
 
     def _add_other_roles(self) -> None:
-        """Add the odometry, commands, scans and plans to `rows`, or their evidence to `missing`."""
+        """Add the odometry, commands, scans, and plans to `rows`, or their evidence to `missing`."""
         for role in ("odom", "cmd_vel", "scan", "plan"):
             messages = sorted(self._decoded.by_role[role], key=lambda message: message[0])
             if not messages:
@@ -272,7 +267,7 @@ class ForeignTraceReader:
             self._add_role(role, ticks, values)
 
     def _short_reason(self, role: str) -> str:
-        """Return why a role has no messages, without a list of topics."""
+        """Return the reason why the log has no messages with a role, without other topics."""
         return self._reason_missing(role, self._options.topic(role)).split(";")[0]
 
     def _add_role(self, role: str, ticks: Ticks, values: list[Any]) -> None:
@@ -302,12 +297,12 @@ class ForeignTraceReader:
 
 
 def _stamp(message: Any) -> int | None:
-    """Return the stamp of a decoded message, or None if it has no header."""
+    """Return the stamp of a decoded message; None for a message without a header."""
     return message if isinstance(message, int) else message.stamp
 
 
 def _last_per_tick(ticks: Ticks) -> tuple[Ticks, Ticks]:
-    """Return the distinct ticks in ascending order, and for each tick the index of its last message."""
+    """Return the distinct ticks in ascending order, and the index of the last message at each tick."""
     order = np.argsort(ticks, kind="stable")
     ascending = ticks[order]
     last = np.append(ascending[1:] != ascending[:-1], True)

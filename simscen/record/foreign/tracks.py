@@ -1,4 +1,4 @@
-"""Tracks: the poses of a robot over time, from a topic or from tf of a real log."""
+"""Tracks (poses of a robot over time) from a topic or from tf in a real robot's log."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from simscen.record.foreign.transforms import TransformTree
 from simscen.record.messages.decode import NO_COVARIANCE, StampedPose
 
 DIFFERENCE_WINDOW_S = 0.2
-"""Time over which velocities are computed from poses, long enough to average the noise of motion capture."""
+"""Time over which velocities are computed from poses."""
 MIN_MOTION_M_RAD = 0.1
-"""Motion in m or rad above which an odometry whose twists are all zero counts as one without twists."""
+"""Motion in m or rad above which twists of zero count as missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Track:
         stamped: Stamps; None if the times of logging are used instead.
         poses: x, y, z and a quaternion x, y, z, w (n, 7).
         covariances: xx, xy, xyaw, yy, yyaw, yawyaw (n, 6); zeros if unknown.
-        twists: vx, vy, wz (n, 3); None unless all messages have a twist.
+        twists: vx, vy, wz (n, 3); None if a message has no twist.
     """
 
     source: str
@@ -48,7 +48,7 @@ class Track:
 def stamped_messages(
     topic: str, logged: Sequence[int], stamps: Sequence[int], options: ForeignLogOptions
 ) -> StampedMessages | None:
-    """Return the stamps of a topic, sorted by time of logging; None if all are zero, or if `options` ignore stamps."""
+    """Return the stamps of a topic by time of logging; None if all stamps are zero or `options` ignore stamps."""
     if options.clock == "log" or not any(stamps):
         return None
     times = np.array(logged, dtype=np.int64)
@@ -57,9 +57,9 @@ def stamped_messages(
 
 
 def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], options: ForeignLogOptions) -> Track:
-    """Return the track of a topic from its messages and their times of logging.
+    """Return the track of a topic. `messages` are times of logging in ns and poses.
 
-    Raises UnusableLog if the messages have several frames, or if a clock was set during the recording.
+    Raises UnusableLog if the messages have several frames or if a clock was set during the recording.
     """
     frames = sorted({pose.frame for _, pose in messages})
     if len(frames) > 1:
@@ -80,7 +80,7 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
 
 
 def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track | str:
-    """Return the track of the frame `inner` in `outer` from tf, or the reason why there is none, as text."""
+    """Return the track of the frame `inner` in the frame `outer` from tf, or the reason why it is unknown."""
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:
@@ -111,7 +111,7 @@ def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:
 
 
 def is_twist_missing(twists: Array, poses: Array) -> bool:
-    """Return whether the twists of an odometry were never set: always zero although the robot moved."""
+    """Return whether all twists are zero although the robot moved."""
     moved = float(np.ptp(poses[:, 0]) + np.ptp(poses[:, 1])) if len(poses) else 0.0
     turned = float(np.abs(wrap_array(poses[:, 2] - poses[0, 2])).max()) if len(poses) else 0.0
     return not twists.any() and (moved > MIN_MOTION_M_RAD or turned > MIN_MOTION_M_RAD)

@@ -16,7 +16,7 @@ from simscen.record.messages.decode import StampedPose
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with their times of logging and their stamps in ns."""
+    """Poses of a frame in its parent frame, with times of logging and stamps in ns."""
 
     parent: str
     logged: list[int] = field(default_factory=list)
@@ -34,7 +34,7 @@ class TransformTree:
     def add(self, logged: int, links: list[StampedPose], static: bool) -> None:
         """Add the transforms of one message on /tf, or on /tf_static if `static`.
 
-        `logged` is its time of logging in ns. If a frame gets another parent, its previous transforms are dropped.
+        `logged` is the time of logging in ns. If the parent of a frame changes, previous transforms are dropped.
         """
         for transform in links:
             link = self._links.get(transform.child)
@@ -45,10 +45,10 @@ class TransformTree:
             link.poses.append(transform.pose)
 
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
-        """Return the poses (n, 7) of the frame `inner` in `outer` with their times, or why they are unknown, as text.
+        """Return times and poses (n, 7) of the frame `inner` in `outer`, or the reason why they are unknown.
 
-        There is one pose for each message of the non-static transform that is closest to `inner`. At these times, the
-        other transforms have the value of their latest message, without interpolation.
+        Each message of the dynamic transform nearest to `inner` yields one pose. Other transforms are not interpolated:
+        they have the value of their latest message.
         """
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
@@ -68,7 +68,7 @@ class TransformTree:
         return StampedMessages(f"tf {outer}:{inner}", logged, times[is_connected]), poses
 
     def _chain(self, outer: str, inner: str) -> list[_Link] | str:
-        """Return the transforms from `inner` up to `outer`, or the reason why there is no such chain."""
+        """Return the transforms from `inner` up to `outer`, or the reason why the frames are not connected."""
         chain: list[_Link] = []
         frame = inner
         while frame != outer:
@@ -82,7 +82,7 @@ class TransformTree:
 
 
 def _latest_poses(link: _Link, times: Ticks) -> Array:
-    """Return the newest pose of a link at each of `times`."""
+    """Return the latest poses (n, 7) of a link at `times` (n,)."""
     stamps, poses = np.array(link.stamps, dtype=np.int64), np.array(link.poses)
     order = np.argsort(stamps, kind="stable")
     newest = np.searchsorted(stamps[order], times, side="right") - 1
@@ -91,7 +91,7 @@ def _latest_poses(link: _Link, times: Ticks) -> Array:
 
 
 def _compose(outer: Array, inner: Array) -> Array:
-    """Return the composition of poses (n, 7), row by row; `inner` are poses in the frames `outer`."""
+    """Return the composition of poses (n, 7) row by row. `inner` are poses in the frames `outer`."""
     ax, ay, az, aw = outer[:, 3:].T
     bx, by, bz, bw = inner[:, 3:].T
     rotations = np.column_stack(
@@ -112,17 +112,16 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 
 
 class LidarMount(NamedTuple):
-    """Planar pose of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
+    """Planar pose of a lidar on the base, and whether the lidar is mounted upside down."""
 
     pose: Pose2
     is_upside_down: bool
 
 
 def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> LidarMount | None:
-    """Return the mount of the lidar with the frame `frame` on the frame `base`.
+    """Return the mount of a lidar with the frame `frame` on the frame `base`, or else on base_link or base_footprint.
 
-    `links` are the static transforms by child frame. If they do not connect the two frames, return the mount on
-    base_link or base_footprint, or None if the frame of the lidar is not connected with these either.
+    `links` are the static transforms by child frame. Returns None if they do not connect the frames.
     """
     pose, visited, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
     while True:

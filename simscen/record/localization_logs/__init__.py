@@ -1,1 +1,1 @@
-"""Odometry, scans and reference poses from recorded logs, for `simscen localize`."""
+"""Readers of odometry, scans, and reference poses from recorded logs, for `simscen localize`."""

@@ -1,4 +1,4 @@
-"""Reader of logs for `simscen localize`: returns the odometry, scans, and reference poses from a log of any format."""
+"""Reader of odometry, scans, and reference poses from a log of any supported format."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ from simscen.record.log_reader import invalid_log
 
 @dataclass(frozen=True, eq=False)
 class LocalizationLog:
-    """Recorded input of a localizer, and the poses to compare its estimates with.
+    """Recorded input of a localizer, and reference poses.
 
-    Ticks count from the first reading, with TICK_RATE_HZ ticks per second.
+    Ticks start at the first reading. There are TICK_RATE_HZ ticks per second.
 
     Attributes:
-        readings: Readings in the order in which the robot received them.
+        readings: Readings in the order of the log.
         ticks: Ticks (n,) of the reference poses.
         truth: Reference poses x, y, yaw (n, 3) in the map frame.
         notes: Remarks for the user.
-        initial_pose: Pose at the start of the odometry, computed from the first initial pose that was sent to the
-            localizer; None if none was sent.
+        initial_pose: Pose at the start of the odometry, from the first initial pose in the log; None if it has none.
     """
 
     readings: Sequence[Odometry | Scan]
@@ -42,10 +41,9 @@ class LocalizationLog:
 
 
 def read_localization_log(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationLog:
-    """Read odometry, scans and reference poses from a rosbag2 folder, an MCAP file, a CARMEN log or a CSV file.
+    """Read odometry, scans, and reference poses from a rosbag2 folder, an MCAP file, a CARMEN log, or a CSV file.
 
-    The names of topics apply to ROS logs only: see `read_rosbag_rows`. The reference poses are in TRUEPOS lines of a
-    CARMEN log, and in `truth` rows of a CSV file. Raises InvalidInput if the log cannot be used.
+    `odometry`, `scan`, and `reference` are topics of ROS logs. Raises InvalidInput if the log cannot be used.
     """
     with unusable_log_as_invalid_input(path):
         try:
@@ -82,7 +80,7 @@ def _to_log(rows: LocalizationRows) -> LocalizationLog:
 
 
 def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
-    """Return the pose at the start of the odometry, from the first initial pose and the odometry until its time."""
+    """Return the pose at the start of the odometry, from the first initial pose and the odometry before it."""
     if not rows.initial:
         return None
     first = min(rows.initial, key=lambda row: row.order)
@@ -91,7 +89,7 @@ def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
 
 
 def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
-    """Yield remarks on readings that a localizer cannot use. Raises UnusableLog if the scans cannot be used at all."""
+    """Yield remarks on readings that a localizer cannot use. Raises UnusableLog if no scan can be used."""
     all_scans = [reading for reading in readings if isinstance(reading, Scan)]
     if any(scan.angle_increment == 0.0 and len(scan.ranges) > 1 for scan in all_scans):
         raise UnusableLog("all beams of a scan have the same direction: its angle_increment is 0")

@@ -31,16 +31,16 @@ from simscen.record.messages.decode import (
 )
 
 INITIAL_POSE_TOPIC = "/initialpose"
-"""Topic on which RViz and other programs send the initial pose to AMCL."""
+"""Topic of the initial pose for AMCL."""
 
 
 LoggedMessage = tuple[int, int, Any]
-"""Time of logging in ns, index in the log, and the decoded message."""
+"""Time of logging in ns, index in the log, and decoded message."""
 
 
 @dataclass
 class _TransformMessages:
-    """Transforms of a log, and the index in the log of each message by its time of logging."""
+    """Transforms of a log, and the indices of their messages in the log by time of logging."""
 
     transforms: TransformTree = field(default_factory=TransformTree)
     indices: dict[int, int] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class _TransformMessages:
         self.indices[logged] = index
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
-        """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if they are unknown."""
+        """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
         result = self.transforms.between(outer, inner)
         if isinstance(result, str):
             raise UnusableLog(result)
@@ -64,7 +64,7 @@ class _TransformMessages:
 
 @dataclass
 class _Messages:
-    """Decoded messages of a log, the static transforms by child frame, and the types of all topics."""
+    """Decoded messages of a log, static transforms by child frame, and message types of all topics."""
 
     odometry: list[LoggedMessage] = field(default_factory=list)
     scans: list[LoggedMessage] = field(default_factory=list)
@@ -78,10 +78,11 @@ class _Messages:
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
     """Read an MCAP file or a rosbag2 folder. Raises UnusableLog if messages cannot be used.
 
-    `scan` is a topic. `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link`, whose poses
-    are read from /tf. Without `reference`, the reference poses are the ground truth in logs of simscen. The mount of
-    the lidar is read from /tf_static. Times are stamps; if all stamps of a topic are zero, times of logging are used
-    for all topics.
+    Times are stamps, or times of logging if all stamps of a topic are zero. The mount of the lidar is on /tf_static.
+
+    odometry:   topic, or pair of frames on /tf such as `odom:base_link`
+    scan:       topic
+    reference:  topic or pair of frames of the reference poses; None for the ground truth in a log of simscen
     """
     messages = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
     if frames := parse_frame_pair(odometry):
@@ -144,7 +145,7 @@ def _time(logged: int, message: Any, use_log_time: bool) -> float:
 
 
 def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, notes: list[str]) -> Iterator[PoseRow]:
-    """Yield the valid poses, and add a note with the number of invalid ones."""
+    """Yield the valid poses. Adds a note with the number of invalid poses."""
     invalid = 0
     for logged, index, message in messages:
         if all_within(message.pose, MAX_COORDINATE_M):
@@ -156,7 +157,7 @@ def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, no
 
 
 def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]) -> Iterator[ScanRow]:
-    """Yield the scans, converted for a lidar that is mounted upright."""
+    """Yield the scans. Scans of a lidar that is mounted upside down are mirrored."""
     base = next((pose.child for *_, pose in messages.odometry if pose.child), "")
     mounts: dict[str, LidarMount | None] = {}
     for logged, index, scan in messages.scans:

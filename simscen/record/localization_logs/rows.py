@@ -1,4 +1,4 @@
-"""Common form into which the readers of all formats convert a localization log."""
+"""Content of localization logs of all formats."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from simscen.core.geometry import Array, Pose2
 
 TICK_RATE_HZ = 1000
-"""Ticks per second to which the times of a log are rounded."""
+"""Number of ticks per second to which times are rounded."""
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
-"""Largest valid time and coordinate. Broken sensors can report larger ones, whose squares could overflow."""
+"""Maximum valid time and coordinate."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,9 @@ class PoseRow:
 class ScanRow:
     """Scan at a time in s, with ranges (n,) in m.
 
-    `order` is the index of the line or message in the log. `layout` is the first angle, the angle increment (rad), and
-    the minimum and maximum range (m). `mount` is the pose of the lidar on the base.
+    order:   index of the line or message in the log
+    layout:  first angle and angle increment in rad, minimum and maximum range in m
+    mount:   pose of the lidar on the base
     """
 
     time: float
@@ -39,8 +40,10 @@ class ScanRow:
 class LocalizationRows:
     """Content of a localization log.
 
-    `truth` are the reference poses, and `initial` the initial poses that were sent to the localizer. `hint` is shown to
-    the user if odometry or scans are missing. `notes` are remarks for the user.
+    truth:    reference poses
+    initial:  initial poses for the localizer
+    hint:     hint for the user if odometry or scans are missing
+    notes:    remarks for the user
     """
 
     odometry: list[PoseRow] = field(default_factory=list)

@@ -22,7 +22,7 @@ from simscen.record.localization_logs.rows import (
 def read_csv_rows(path: Path) -> LocalizationRows:
     """Read a CSV file. Raises UnusableLog for an invalid row.
 
-    The first cell of a row is its kind: odom, scan, truth, or mount. `simscen localize --help` describes the columns.
+    The first cell of a row is its kind: odom, scan, truth, or mount.
     """
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:
@@ -42,7 +42,7 @@ def read_csv_rows(path: Path) -> LocalizationRows:
 
 
 def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the rows of a CSV file, numbered from 1. Raises UnusableLog with `hint` if it is not CSV."""
+    """Yield number (from 1) and cells of each row of a CSV file. Raises UnusableLog with `hint` if it is not CSV."""
     reader = csv.reader(lines)
     try:
         yield from enumerate(reader, 1)
@@ -51,7 +51,7 @@ def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[
 
 
 def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Pose2) -> None:
-    """Add a row of the CSV file to `rows`. `order` is its number, and `mount` the last pose of the lidar."""
+    """Add a row of the CSV file to `rows`. `order` is the number of the row, `mount` the last pose of the lidar."""
     match kind:
         case "odom" | "truth":
             time, pose = (values or [math.nan])[0], values[1:]
@@ -74,7 +74,7 @@ def _check_time(time: float) -> None:
 
 
 def _checked_pose(values: list[float]) -> Pose2:
-    """Return the pose x, y, yaw. Raises ValueError unless these are three valid numbers."""
+    """Return the pose x, y, yaw. Raises ValueError if `values` are not three valid numbers."""
     if len(values) != 3 or not all(math.isfinite(value) for value in values):
         raise ValueError(f"expected 3 numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
@@ -83,14 +83,14 @@ def _checked_pose(values: list[float]) -> Pose2:
 
 
 DEFAULT_MAX_RANGE_M = 81.9
-"""Range that a SICK LMS reports for a beam without a hit. FLASER lines do not contain the maximum range."""
+"""Range of a SICK LMS for a beam without a hit, because FLASER lines do not contain the maximum range."""
 
 
 def read_carmen_rows(path: Path) -> LocalizationRows:
     """Read a CARMEN log. Raises UnusableLog for an invalid line.
 
-    The odometry is in ODOM, FLASER and ROBOTLASER1 lines, scans are in the latter two, and reference poses in TRUEPOS
-    lines. Other lines are ignored.
+    ODOM, FLASER, and ROBOTLASER1 lines contain odometry. FLASER and ROBOTLASER1 lines also contain scans. TRUEPOS lines
+    contain reference poses. Other lines are ignored.
     """
     rows = LocalizationRows(hint="its lines must start with ODOM, FLASER or ROBOTLASER1")
     with path.open(encoding="utf-8", errors="strict") as lines:
@@ -127,7 +127,7 @@ def _parse_flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
 def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     """Parse `ROBOTLASER1 type start fov step max accuracy mode n r… m remission… laser robot … time host time`.
 
-    `laser` and `robot` are poses of three numbers each.
+    `laser` and `robot` are poses x, y, theta.
     """
     first, _, step, range_max = (_parse_finite(word) for word in words[2:6])
     count = int(words[8])
@@ -152,7 +152,7 @@ def _pose(words: list[str]) -> Pose2:
 
 
 def _relative_pose(base: Pose2, other: Pose2) -> Pose2:
-    """Return the pose `other` in the frame of `base`. Pose2.between rounds differently."""
+    """Return the pose `other` in the frame of `base`. The rounding differs from Pose2.between."""
     dx, dy, c, s = other.x - base.x, other.y - base.y, math.cos(base.yaw), math.sin(base.yaw)
     return Pose2(c * dx + s * dy, c * dy - s * dx, math.remainder(other.yaw - base.yaw, 2 * math.pi))
 
@@ -175,7 +175,4 @@ _LINE_PARSERS: dict[str, Callable[[LocalizationRows, int, list[str]], None]] = {
     "ROBOTLASER1": _parse_robotlaser,
     "TRUEPOS": _parse_truepos,
 }
-"""Functions that add a line of a CARMEN log to the rows, by the first word of the line.
-
-Their arguments are the rows, the number of the line, and its words.
-"""
+"""Functions (rows, line number, words) that add a line of a CARMEN log to the rows, by the first word of the line."""

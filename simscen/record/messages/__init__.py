@@ -1,1 +1,1 @@
-"""ROS 2 messages of a log: encoding and decoding of CDR, text of events."""
+"""Encoding and decoding of the ROS 2 messages of a log."""

@@ -1,8 +1,7 @@
-"""Decoders of the ROS 2 messages that simscen reads from its own logs, logs of real robots, and external stacks.
+"""Decoders of ROS 2 messages (CDR) from logs and external stacks.
 
-A decoder takes a reader of one message. A MessageReader returns the numbers exactly as simscen wrote them. A
-CheckedReader is for messages of other programs: it rejects invalid poses and normalizes quaternions. The messages are
-those of common_interfaces of ROS 2 Humble, which have not changed since Foxy. A stamp is in nanoseconds.
+A decoder takes the reader of one message. MessageReader is for messages from simscen. CheckedReader is for messages of
+other programs. Stamps are in nanoseconds.
 """
 
 import math
@@ -27,14 +26,14 @@ _COVARIANCE_INDICES = (0, 1, 5, 7, 11, 35)
 _PLANAR_TWIST_INDICES = (0, 1, 5)
 """Indices of vx, vy, wz in the six numbers of a twist."""
 _MAX_QUATERNION_NORM_ERROR = 0.1
-"""Largest difference of the length of a quaternion from 1. It is far above rounding errors; zeros are rejected."""
+"""Maximum difference of the length of a quaternion from 1."""
 _NOT_A_ROTATION = "an orientation is not a quaternion of length 1"
 NO_COVARIANCE: Numbers = (0.0,) * 6
 """Covariance of a pose whose message has none: xx, xy, xyaw, yy, yyaw, yawyaw."""
 
 
 class MessageReader(Reader):
-    """Reads the fields of a message, with their exact values."""
+    """Reads the fields of a message without changing their values."""
 
     @property
     def remaining(self) -> int:
@@ -42,9 +41,9 @@ class MessageReader(Reader):
         return len(self._data) - self._offset
 
     def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
-        """Return the next numbers in an array of this shape, without a copy.
+        """Return the next numbers as an array. `kind` is a numpy type without byte order, e.g. "f8".
 
-        `kind` is a numpy type without byte order, e.g. "f8". Raises ValueError if the message has fewer numbers.
+        Raises ValueError if the message is too short.
         """
         dtype, size = np.dtype(self._byte_order + kind), math.prod(shape)
         if size:  # an empty sequence at the end of a message has no padding
@@ -52,7 +51,7 @@ class MessageReader(Reader):
         return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)
 
     def frame(self) -> str:
-        """Return the name of a frame."""
+        """Return the name of the next frame."""
         return self.string()
 
     def header(self) -> tuple[int, str]:
@@ -63,8 +62,7 @@ class MessageReader(Reader):
     def pose(self) -> Numbers:
         """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform.
 
-        Raises ValueError if the length of the quaternion is not 1. A quaternion with nan is returned, because broken
-        odometry can have such a heading.
+        Raises ValueError if the length of the quaternion is not 1. A quaternion with nan is allowed.
         """
         pose = self.take("7d")
         if abs(math.hypot(*pose[3:]) - 1.0) > _MAX_QUATERNION_NORM_ERROR:
@@ -73,17 +71,14 @@ class MessageReader(Reader):
 
 
 class CheckedReader(MessageReader):
-    """Reads a message of another program. Raises ValueError if a quaternion is invalid.
-
-    Quaternions are normalized, and leading slashes of frames, which tf used before tf2, are removed.
-    """
+    """Reads a message of another program: normalizes quaternions, and removes leading slashes of frames."""
 
     def frame(self) -> str:
-        """Return the name of a frame without leading slashes."""
+        """Return the name of the next frame without leading slashes."""
         return self.string().lstrip("/")
 
     def pose(self) -> Numbers:
-        """Return a pose with a normalized quaternion. Raises ValueError if its length is not 1 or not a number."""
+        """Return the next pose with a normalized quaternion. Raises ValueError if its length is not 1 or is nan."""
         pose = self.take("7d")
         norm = math.hypot(*pose[3:])
         if not abs(norm - 1.0) < _MAX_QUATERNION_NORM_ERROR:
@@ -92,7 +87,7 @@ class CheckedReader(MessageReader):
 
 
 def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
-    """Return the message of another program, decoded by `decoder`. Raises ValueError if it does not match its type."""
+    """Decode a message of another program with a CheckedReader. Raises ValueError if the message is invalid."""
     reader = CheckedReader(data)
     message = decoder(reader)
     if reader.remaining > 3:  # up to three bytes of padding
@@ -103,8 +98,9 @@ def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
 class StampedPose(NamedTuple):
     """Pose of the frame `child` in `frame`: x, y, z and a quaternion x, y, z, w.
 
-    `child` is "" if the message does not name it. `covariance` is xx, xy, xyaw, yy, yyaw, yawyaw; zeros if the message
-    has none. `twist` is vx, vy, wz in the frame `child`, or None if the message has none.
+    child:       "" if the message does not contain it
+    covariance:  xx, xy, xyaw, yy, yyaw, yawyaw; zeros if the message has none
+    twist:       vx, vy, wz in the frame `child`; None if the message has none
     """
 
     stamp: int
@@ -138,7 +134,7 @@ class GoalState(NamedTuple):
 
 
 class ScanMessage(NamedTuple):
-    """Planar scan: angles in rad, and ranges (n,) in m, inf for a beam without a hit."""
+    """Planar scan: angles in rad, and ranges (n,) in m (inf for a beam without a hit)."""
 
     stamp: int
     frame: str
@@ -218,7 +214,7 @@ def particle_cloud(reader: MessageReader) -> Array:
 
 
 def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
-    """Decode the frame and the grid of nav_msgs/msg/OccupancyGrid. The resolution has only 32-bit precision."""
+    """Decode nav_msgs/msg/OccupancyGrid: its frame, and the grid (the resolution has 32-bit precision)."""
     _, frame = reader.header()
     reader.take("iI")
     (resolution,) = reader.take("f")
@@ -230,7 +226,7 @@ def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
 
 
 def log_line(reader: MessageReader) -> LogLine:
-    """Decode the level, logger and text of rcl_interfaces/msg/Log."""
+    """Decode rcl_interfaces/msg/Log."""
     reader.take("iI")
     (level,) = reader.take("B")
     return LogLine(int(level), reader.string(), reader.string())

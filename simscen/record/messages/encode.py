@@ -1,12 +1,10 @@
 """Encoders of ROS 2 messages of fixed size, and of images. Encoders of other messages are in encode_arrays.py.
 
-For a message of fixed size, the function returns a Template, and its docstring lists the fields of the slots.
-`Template.packer()` returns a function that takes the values of these fields, in this order, and returns the bytes of
-the message.
+For a message of fixed size, the encoder returns a Template. `Template.packer()` returns a function that takes the
+values of the fields of the template, in the order of the docstring, and returns the bytes of the message.
 
-A `stamp` is the time of the measurement: seconds and nanoseconds. A `pose` is x, y, z and a quaternion x, y, z, w. A
-`twist` is vx, vy, wz. The messages are those of common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
-REP 145 and the message definitions require.
+The field `stamp` is seconds and nanoseconds, `pose` is x, y, z and a quaternion x, y, z, w, and `twist` is vx, vy, wz.
+Unknown covariances are zeros.
 """
 
 from collections.abc import Sequence
@@ -19,11 +17,11 @@ from simscen.record.messages.template import Template
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"
-"""Format of six numbers, as in `struct`: vx, vy and wz, and zeros for the other three."""
+"""Format of six numbers, as in `struct`: vx, vy, wz, and zeros for the other three."""
 _COVARIANCE = "2d24x3d24xd144x2d24xd"
-"""Format of 36 numbers: the nine of x, y and yaw, and zeros for the others."""
+"""Format of a 6 x 6 covariance: the nine numbers for x, y, yaw, and zeros for the others."""
 _TWIST_VARIANCES = "d48xd216xd"
-"""Format of 36 numbers: the variances of vx, vy and wz on the diagonal, and zeros for the others."""
+"""Format of a 6 x 6 covariance: the variances of vx, vy, wz on the diagonal, and zeros for the others."""
 
 
 def clock() -> Template:
@@ -44,7 +42,7 @@ def twist() -> Template:
 def odometry(frame: str, child: str) -> Template:
     """Return the template of nav_msgs/msg/Odometry without covariances, with the fields stamp, pose, twist.
 
-    The pose is that of the frame `child` in `frame`. The twist is in the frame `child`.
+    `pose` is the pose of the frame `child` in `frame`. `twist` is in the frame `child`.
     """
     return (
         _stamped(frame)
@@ -59,7 +57,7 @@ def odometry(frame: str, child: str) -> Template:
 def odometry_with_covariance(frame: str, child: str) -> Template:
     """Return the template of nav_msgs/msg/Odometry, with the fields stamp, pose, covariance, twist, variances.
 
-    `covariance` is 3 x 3 for x, y, yaw, row by row. `variances` are those of vx, vy, wz.
+    `covariance` is 3 x 3 for x, y, yaw, row by row. `variances` are the variances of vx, vy, wz.
     """
     return (
         _stamped(frame)
@@ -75,8 +73,7 @@ def imu(frame: str) -> Template:
     """Return the template of sensor_msgs/msg/Imu.
 
     Its fields are stamp, angular_velocity (x, y, z), angular_velocity_variance, linear_acceleration (x, y, z), and
-    linear_acceleration_variance. The variance is the same for all axes. The first orientation covariance is -1, because
-    there is no orientation.
+    linear_acceleration_variance. The variance is the same for all axes. The message has no orientation.
     """
     message = _stamped(frame).put("4d", *_NO_ROTATION).put("9d", -1.0, *[0.0] * 8)
     for vector in ("angular_velocity", "linear_acceleration"):
@@ -101,11 +98,11 @@ def pose_stamped(frame: str) -> Template:
 
 
 def transforms(links: Sequence[tuple[str, str, str]], serialized_count: int = 0, serialized_bytes: int = 0) -> Template:
-    """Return the template of tf2_msgs/msg/TFMessage, with the fields stamp, one pose for each link, and serialized.
+    """Return the template of tf2_msgs/msg/TFMessage, with the fields stamp, one pose for each link, and `serialized`.
 
-    A link is a frame, its child frame, and the name of the field for the pose of the child. All transforms have the
-    same stamp. `serialized` are the bytes of `serialized_count` further transforms, `serialized_bytes` in total, from a
-    TransformBatchPacker. This field does not exist if `serialized_count` is 0.
+    A link is (frame, child frame, name of the field for the pose). All transforms have the same stamp. `serialized` are
+    the bytes of `serialized_count` further transforms from a TransformBatchPacker, `serialized_bytes` in total. Without
+    further transforms, the field does not exist.
     """
     message = Template().put("I", len(links) + serialized_count)
     for frame, child, pose in links:

@@ -1,6 +1,6 @@
-"""Encoders of ROS 2 messages with arrays of any length: scans, paths, particles, transforms and grids.
+"""Encoders of ROS 2 messages with arrays of any length: scans, paths, particles, transforms, and grids.
 
-The arrays are serialized by numpy, without a Python loop over beams, cells, poses or particles, because that is slow.
+numpy serializes the arrays without slow Python loops.
 """
 
 import struct
@@ -22,7 +22,7 @@ Link = tuple[str, str, Stamp, Pose3]
 
 
 def planar_poses(points: Array) -> Array:
-    """Return poses (n, 7), x, y, z and a quaternion x, y, z, w, for points (n, 3 or more) x, y, yaw."""
+    """Return poses (n, 7) of points (n, 3 or more) x, y, yaw. A pose is x, y, z and a quaternion x, y, z, w."""
     poses, halves = np.zeros((len(points), 7)), points[:, 2] / 2
     poses[:, :2] = points[:, :2]
     poses[:, 5], poses[:, 6] = np.sin(halves), np.cos(halves)
@@ -30,13 +30,13 @@ def planar_poses(points: Array) -> Array:
 
 
 class LaserScanPacker:
-    """Encoder of sensor_msgs/msg/LaserScan. Call it to get the bytes. The messages have no intensities."""
+    """Callable encoder of sensor_msgs/msg/LaserScan without intensities."""
 
     def __init__(self, frame: str) -> None:
         self._pack = Template().slot("iI", "*stamp").string(frame).slot("7fI", "*numbers").packer()
 
     def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
-        """Encode a scan that was measured at `stamp`."""
+        """Return the bytes of a scan that was measured at `stamp`."""
         n = len(scan.ranges)
         last = scan.angle_min + scan.angle_increment * (n - 1)
         angles = scan.angle_min, last, scan.angle_increment
@@ -45,10 +45,7 @@ class LaserScanPacker:
 
 
 class PathPacker:
-    """Encoder of nav_msgs/msg/Path. Call it to get the bytes. Every pose has the header of the path.
-
-    A pose ends at a multiple of eight bytes, so that all poses except the first have the same layout.
-    """
+    """Callable encoder of nav_msgs/msg/Path. Every pose has the header of the path."""
 
     def __init__(self, frame: str) -> None:
         head = Template().slot("iI", "*stamp").string(frame).slot("I", "count")
@@ -58,15 +55,15 @@ class PathPacker:
 
     @staticmethod
     def _frame_bytes(frame: str, start: int) -> bytes:
-        """Return the part of a geometry_msgs/msg/PoseStamped between its stamp and its pose: the name of the frame.
+        """Return the bytes of the frame name in a geometry_msgs/msg/PoseStamped, padded to a multiple of eight bytes.
 
-        It is padded to a multiple of eight bytes. `start` is the number of bytes of the message before the stamp.
+        `start` is the number of bytes of the message before the stamp.
         """
         pose = Template(prefix=b"", start=start).put("iI", 0, 0).string(frame).align(8)
         return bytes(pose.buffer[8:])
 
     def __call__(self, stamp: Stamp, points: Array) -> bytes:
-        """Encode the path of `points` (n, 3) x, y, yaw."""
+        """Return the bytes of the path through `points` (n, 3) x, y, yaw."""
         head = self._pack(stamp, len(points))
         if not len(points):
             return head
@@ -79,13 +76,13 @@ class PathPacker:
 
 
 class ParticleCloudPacker:
-    """Encoder of nav2_msgs/msg/ParticleCloud. Call it to get the bytes."""
+    """Callable encoder of nav2_msgs/msg/ParticleCloud."""
 
     def __init__(self, frame: str) -> None:
         self._pack = Template().slot("iI", "*stamp").string(frame).slot("I", "count").align(8).packer()
 
     def __call__(self, stamp: Stamp, particles: Array) -> bytes:
-        """Encode `particles` (n, 4) x, y, yaw, weight; n > 0."""
+        """Return the bytes of `particles` (n, 4) x, y, yaw, weight; n > 0."""
         cloud = np.empty((len(particles), 8), dtype="<f8")
         cloud[:, :7] = planar_poses(particles)
         cloud[:, 7] = particles[:, 3]
@@ -93,17 +90,14 @@ class ParticleCloudPacker:
 
 
 class TransformsPacker:
-    """Encoder of tf2_msgs/msg/TFMessage. Call it to get the bytes.
-
-    A transform ends at a multiple of eight bytes, so that all transforms except the first have the same layout.
-    """
+    """Callable encoder of tf2_msgs/msg/TFMessage."""
 
     def __init__(self) -> None:
         self._first_packers: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
         self._following_packers: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
 
     def __call__(self, links: list[Link]) -> bytes:
-        """Encode one message with a transform for each link."""
+        """Return the bytes of one message with a transform for each link."""
         if not links:
             return HEADER + bytes(4)
         frame, child, stamp, pose = links[0]
@@ -115,7 +109,7 @@ class TransformsPacker:
         return message if len(links) == 1 else b"".join((message, *map(self._pack_following, links[1:])))
 
     def _pack_following(self, link: Link) -> bytes:
-        """Encode a transform that is not the first one of its message."""
+        """Return the bytes of a transform that is not the first one of its message."""
         frame, child, stamp, pose = link
         pack = self._following_packers.get((frame, child))
         if pack is None:
@@ -124,9 +118,9 @@ class TransformsPacker:
 
 
 def _transform_packer(frame: str, child: str, prefix: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
-    """Return a function that packs a geometry_msgs/msg/TransformStamped, with `prefix` before it.
+    """Return a function (stamp, pose) that packs a geometry_msgs/msg/TransformStamped after the bytes `prefix`.
 
-    Its arguments are the stamp and the pose. The transform starts `start` bytes after a multiple of eight bytes.
+    The transform starts `start` bytes after a multiple of eight bytes.
     """
     return (
         Template(prefix=prefix, start=start)
@@ -157,25 +151,24 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
 def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
     """Return the bytes of a geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw; n > 0.
 
-    The numbers are rounded to 32-bit precision, so that they compress well.
+    The numbers are rounded to 32-bit precision.
     """
     head = Template().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
     return bytes(head.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
 
 
 Bytes = npt.NDArray[np.uint8]
-"""Bytes as an array, of one message or of several messages in rows."""
+"""Bytes of one message (n,) or of several messages in rows (k, n)."""
 
 
 class TransformBatchPacker:
-    """Encoder of the transforms of the same links at many times, for one tf2_msgs/msg/TFMessage per time.
+    """Callable encoder of the transforms of the same links at many times.
 
-    The transforms are only a part of each message: the caller puts another transform before them. Only then have they
-    the same layout in each message, because a transform ends at a multiple of eight bytes.
+    The bytes for each time are the end of a tf2_msgs/msg/TFMessage. The caller must put another transform before them.
     """
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
-        """Prepare the layout of the transforms; each link is (frame, child frame)."""
+        """Prepare the layout of the transforms. Each link is (frame, child frame)."""
         message = Template(prefix=b"")
         self._slices = list[tuple[slice, slice]]()
         for frame, child in links:
@@ -188,10 +181,7 @@ class TransformBatchPacker:
         """Size in bytes of these transforms in one message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
-        """Return the bytes (n, size) of the transforms of n messages.
-
-        `stamps` has one stamp for each message, and `poses` (n, links, 7) the poses of the child frames.
-        """
+        """Return the bytes (n, size) of the transforms at n `stamps`. `poses` (n, links, 7) belong to child frames."""
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
         for column, (stamp, pose) in enumerate(self._slices):
@@ -200,7 +190,7 @@ class TransformBatchPacker:
 
 
 def _reserve(message: Template, codes: str) -> slice:
-    """Append a slot, and return the range of its bytes in the message."""
+    """Append a slot, and return the slice of its bytes in the message."""
     message.slot(codes, "*numbers")
     end = len(message.buffer)
     return slice(end - calcsize(f"<{codes}"), end)

@@ -1,4 +1,4 @@
-"""Encoder of visualization_msgs/msg/MarkerArray, and functions that compute the points of its shapes."""
+"""Encoder of visualization_msgs/msg/MarkerArray, and points of its shapes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.record.messages.template import Template
 
 Color = tuple[float, float, float, float]
-"""Red, green, blue and opacity, 0 to 1."""
+"""Red, green, blue, and opacity, from 0 to 1."""
 ARROW, LINE_LIST, TEXT, TRIANGLE_LIST = 0, 5, 9, 11
 """Values of `type` of visualization_msgs/msg/Marker."""
 _ADD, _DELETE_ALL = 0, 3
@@ -17,10 +17,13 @@ _ADD, _DELETE_ALL = 0, 3
 
 
 class Marker(NamedTuple):
-    """One shape of visualization_msgs/msg/Marker.
+    """Fields of visualization_msgs/msg/Marker.
 
-    `group` is its namespace, which viewers can show and hide. `kind` is its type. `scale` is in meters; its meaning
-    depends on `kind`. `pose` is in `frame`, and `points` (n, 3) are relative to `pose`.
+    group:   `ns` of the message
+    kind:    `type` of the message
+    scale:   in m; the meaning depends on `kind`
+    pose:    pose in `frame`
+    points:  (n, 3) in m, relative to `pose`
     """
 
     frame: str
@@ -34,9 +37,9 @@ class Marker(NamedTuple):
 
 
 def marker_array(markers: Iterable[Marker]) -> bytes:
-    """Return the bytes of a visualization_msgs/msg/MarkerArray that replaces all previous markers of its topic.
+    """Return the bytes of a visualization_msgs/msg/MarkerArray that replaces all previous markers of the topic.
 
-    Stamps are zero and frames are locked, so that each marker moves with its frame.
+    Each marker moves with its frame.
     """
     markers = list(markers)
     message = Template().put("I", len(markers) + 1)

@@ -1,4 +1,4 @@
-"""Conversion of events to text: JSON for /simscen/events, and readable lines for /rosout."""
+"""Conversion of events to text: JSON for /simscen/events, and sentences for /rosout."""
 
 import json
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from simscen.core.records.events import Event, EventKind
 
 EVENT_LOGGER = "simscen"
-"""Name of the logger of events on /rosout."""
+"""Logger name of events on /rosout."""
 INFO, WARN, ERROR = 20, 30, 40
 """Levels of rcl_interfaces/msg/Log."""
 _LEVELS = {
@@ -21,13 +21,13 @@ _LEVELS = {
 
 
 def to_json(event: Event) -> str:
-    """Return an event as one line of JSON with exact numbers. Infinity and nan are written as Python's json does."""
+    """Return an event as one line of JSON. Infinity and nan are written as by Python's json."""
     record = {"tick": event.tick, "kind": event.kind, "name": event.name, "data": dict(event.data)}
     return json.dumps(record, separators=(",", ":"))
 
 
 def from_json(text: str) -> Event:
-    """Parse the event that `to_json` wrote. Raises ValueError or KeyError if it is not an event."""
+    """Parse the text of `to_json`. Raises ValueError or KeyError for other text."""
     record: dict[str, Any] = json.loads(text)
     return Event(int(record["tick"]), EventKind(record["kind"]), str(record["name"]), dict(record["data"]))
 

@@ -1,7 +1,6 @@
-"""Template of a ROS 2 message of fixed size, and generated functions that pack such messages in one call.
+"""Template of a ROS 2 message of fixed size, and generated functions that pack (serialize) such messages in one call.
 
-The Writer of simscen.peer.cdr serializes field by field, which takes ten times as long as writing the message to a log.
-Therefore, the layout of a message is computed once, as a Template, and reused for all messages.
+This is faster than the Writer of simscen.peer.cdr, which serializes field by field.
 """
 
 import struct
@@ -16,7 +15,7 @@ from simscen.peer.cdr import HEADER
 class Slot(NamedTuple):
     """Space in a Template for the value of a field: format codes as in `struct`, and the name of the field.
 
-    The name starts with an asterisk if the value is a sequence of numbers: "*pose".
+    The name starts with an asterisk if the value is a sequence, e.g. "*pose".
     """
 
     codes: str
@@ -24,12 +23,12 @@ class Slot(NamedTuple):
 
 
 class Template:
-    """Layout of a message of fixed size: constants, and slots for the fields whose values vary.
+    """Layout of a message of fixed size: constants, and slots for variable fields. `buffer` has zeros in the slots.
 
-    Methods append fields in the order of the message definition, and return the template so that calls can be chained.
-    Each field is aligned to its own width. For a part of a message, `start` is the number of bytes of the message
-    before this part. `prefix` does not count for the alignment: the CDR header. `buffer` is the message with zeros in
-    its slots.
+    Methods append aligned fields in the order of the message definition, and return the template.
+
+    prefix:  bytes before the message, such as the CDR header, which do not count for the alignment
+    start:   for the template of a part of a message, number of bytes of the message before this part
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
@@ -38,14 +37,14 @@ class Template:
         self._slots: list[tuple[int, Slot]] = []
 
     def slot(self, codes: str, field: str) -> "Template":
-        """Append a slot for numbers of one width, for example "iI" or "7d". "8x" stands for eight bytes of zeros."""
+        """Append a slot for numbers of equal width. `codes` are codes of `struct`, e.g. "iI" or "7d24x"."""
         self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
         self._slots.append((len(self.buffer), Slot(codes, field)))
         self.buffer += bytes(struct.calcsize("<" + codes))
         return self
 
     def put(self, codes: str, *values: float) -> "Template":
-        """Append constant numbers of one width, whose types are codes of `struct`."""
+        """Append constant numbers of equal width. `codes` are their codes of `struct`."""
         self.align(struct.calcsize("<" + codes[-1]))
         self.buffer += struct.pack("<" + codes, *values)
         return self
@@ -73,16 +72,13 @@ class Template:
         return [*parts, bytes(self.buffer[end:])]
 
     def packer(self) -> Callable[..., bytes]:
-        """Return a function that packs a message. Its arguments are the values of the fields, as in `field_names`."""
+        """Return a function that packs a message. Its arguments are the values of the `field_names`."""
         return compile_packer(tuple(self.parts))
 
 
 @lru_cache(maxsize=256)
 def compile_packer(parts: "tuple[bytes | Slot, ...]") -> Callable[..., bytes]:
-    """Return a function that packs the parts into bytes. Its arguments are the values of `field_names(parts)`.
-
-    The function is cached, because its compilation is slow.
-    """
+    """Return a function that packs the parts into bytes. Its arguments are the values of `field_names(parts)`."""
     return _compile(parts, "pack", ())
 
 
@@ -96,9 +92,9 @@ def compile_writer(parts: "tuple[bytes | Slot, ...]") -> Callable[..., None]:
 
 
 def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str, ...]) -> Callable[..., Any]:
-    """Generate a function that packs all parts with a single call of `struct`.
+    """Generate a function that packs all parts with a single call of the struct function `method`.
 
-    The function is evaluated from source text, as in `collections.namedtuple`. Only field names vary in the text.
+    `leading` are the names of its first arguments.
     """
     codes, arguments, constants = "<", [*leading], dict[str, Any]()
     for is_constant, group in groupby(parts, lambda part: isinstance(part, bytes)):
@@ -119,8 +115,5 @@ def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str,
 
 
 def field_names(parts: "Sequence[bytes | Slot]") -> list[str]:
-    """Return the names of the fields in the order of their first slots, without asterisks.
-
-    Slots with the same name are one field: they get the same value.
-    """
+    """Return the distinct names of the slots in order, without asterisks. Slots with equal names have equal values."""
     return list(dict.fromkeys(part.field.removeprefix("*") for part in parts if isinstance(part, Slot)))

@@ -1,1 +1,1 @@
-"""Publishers that turn the state of a run into messages on the topics of its log."""
+"""Publishers of the messages on the topics of a log."""

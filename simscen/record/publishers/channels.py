@@ -1,4 +1,4 @@
-"""Destinations of the messages that publishers create: a log, or the namespace of a robot in a log.
+"""Destinations of published messages: a log, or the namespace of a robot in a log.
 
 TopicWriter and BatchWriter are faster interfaces to a destination, for topics with many messages.
 """
@@ -11,7 +11,7 @@ from simscen.record.messages.template import Slot, Template, compile_writer, fie
 from simscen.record.topics import CLOCK, MessageType, Topic, load_message_types, qos
 
 Write = Callable[[int, bytes], None]
-"""Function that writes a serialized message. Its arguments are a time in nanoseconds, and the bytes."""
+"""Function (time in ns, bytes) that writes a serialized message."""
 
 Layouts = Sequence[tuple[Topic, Template]]
 """Topics with the templates of their messages."""
@@ -34,10 +34,9 @@ class MessageSink(Protocol):
 
 
 class TopicWriter:
-    """Writer of the messages of one topic.
+    """Writer of the messages of one topic. The attribute `write` is the function that writes a message.
 
-    `open_topic` is called before the first message, so that a topic without messages is not opened. It returns the
-    function that writes messages, which is then available as `write`.
+    `open_topic` is called before the first message, and returns the function that writes messages.
     """
 
     def __init__(self, open_topic: Callable[[], Write]) -> None:
@@ -50,10 +49,7 @@ class TopicWriter:
 
 
 class BatchWriter:
-    """Writer of one message on each of several topics, all with the same time.
-
-    Fields of the same name have the same value in all messages.
-    """
+    """Writer of one message on each of several topics. Fields with equal names have the same value in all messages."""
 
     def __init__(self, out: MessageSink, layouts: Layouts) -> None:
         self._out = out
@@ -64,13 +60,13 @@ class BatchWriter:
         ]
 
     def write(self, time: int, *fields: Any) -> None:
-        """Write all messages at `time` nanoseconds. `fields` are the values of `field_names` of all layouts."""
+        """Write all messages at `time` nanoseconds. `fields` are the values of the `field_names` of all layouts."""
         for topic, pack, indices in self._messages:
             self._out.publish(topic, time, pack(*[fields[index] for index in indices]))
 
 
 class LogPublisher:
-    """Destination that writes messages to a log. The channel of a topic is opened by its first message."""
+    """Destination that writes messages to a log. The first message on a topic opens the topic's channel."""
 
     def __init__(self, writer: McapWriter) -> None:
         self._writer = writer
@@ -90,7 +86,7 @@ class LogPublisher:
         return _ChunkBatchWriter(self, layouts)
 
     def flush_if_due(self) -> None:
-        """Write the messages in memory to the file if there are enough."""
+        """Write the buffered messages to the file if there are enough."""
         self._writer.flush_if_due()
 
     def channel(self, topic: Topic) -> Channel:
@@ -104,10 +100,7 @@ class LogPublisher:
 
 
 class _ChunkBatchWriter(BatchWriter):
-    """BatchWriter that packs all messages directly into the current chunk with one call.
-
-    The first messages, which open the channels, and messages that do not fit into the chunk are written one by one.
-    """
+    """BatchWriter that packs all messages directly into the current chunk with one call, if they fit."""
 
     def __init__(self, out: LogPublisher, layouts: Layouts) -> None:
         super().__init__(out, layouts)
@@ -143,10 +136,7 @@ class _ChunkBatchWriter(BatchWriter):
 
 
 class NamespacedPublisher:
-    """Destination that writes the messages of one of several robots to a log, in the namespace of the robot.
-
-    Nav2's bringup of several robots uses the same namespaces. /clock has none.
-    """
+    """Destination that writes the messages of a robot to a log, in the namespace `/ROBOT` (except /clock)."""
 
     def __init__(self, out: LogPublisher, robot: str) -> None:
         self._out, self._robot = out, robot
@@ -164,7 +154,7 @@ class NamespacedPublisher:
         return self._out.batch_writer([(self._with_namespace(topic), message) for topic, message in layouts])
 
     def flush_if_due(self) -> None:
-        """Write the messages in memory to the file if there are enough."""
+        """Write the buffered messages to the file if there are enough."""
         self._out.flush_if_due()
 
     def _with_namespace(self, topic: Topic) -> Topic:

@@ -1,7 +1,4 @@
-"""Publishes one robot's moments (the records of its beats): ground truth, output of the stack, and events.
-
-Sensor readings and markers are published by sensors.py and scene.py.
-"""
+"""Publishers of the moments (records of single ticks) of a robot: ground truth, decisions of the stack, and events."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -41,7 +38,7 @@ class EventPublisher:
         self._goal = encode.pose_stamped(frame_names.MAP).packer()
 
     def write(self, now: int, event: Event) -> None:
-        """Publish an event at `now` nanoseconds."""
+        """Publish an event. `now` is simulated time in ns."""
         stamp = self._time.stamp(event.tick)
         line = event_text.level(event), event_text.EVENT_LOGGER, event_text.sentence(event)
         self._out.publish(topics.EVENTS, now, messages.string(event_text.to_json(event)))
@@ -51,7 +48,7 @@ class EventPublisher:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
 
     def _pose(self, event: Event) -> Pose2 | None:
-        """Return the pose of an accepted goal from the event, or else from the scenario."""
+        """Return the pose of an accepted goal from the event or the scenario; None for other events."""
         x, y, yaw = (event.data.get(key) for key in ("x", "y", "yaw"))
         if isinstance(x, float) and isinstance(y, float):
             return Pose2(x, y, yaw if isinstance(yaw, float) else 0.0)
@@ -59,10 +56,10 @@ class EventPublisher:
 
 
 class RobotPublisher:
-    """Publishes the moments of a robot, in the order of their ticks.
+    """Publishes the moments of a robot.
 
-    `header` and `scenery` describe the run. `robot` is the robot's name; "" for a single robot. With `clock`, it also
-    publishes the simulated time on /clock.
+    `header` and `scenery` describe the run. `robot` is the name of the robot; "" for a single robot. `clock` states
+    whether to publish simulated time on /clock.
     """
 
     def __init__(
@@ -89,7 +86,7 @@ class RobotPublisher:
         self._scene = ScenePublisher(out, header.case, scenery, frames, robot)
 
     def append(self, moment: Moment) -> None:
-        """Publish one moment. All its messages have the simulated time of the moment."""
+        """Publish one moment. Moments must be published in the order of their ticks."""
         tick, decision = moment.tick, moment.decision
         now, truth = self._time.nanoseconds(tick), moment.truth
         if truth is not None:
@@ -108,11 +105,11 @@ class RobotPublisher:
 
 
 PARTICLE_RATE_HZ = 2
-"""Maximum rate of ParticleCloud messages, which are larger than most others."""
+"""Maximum rate of ParticleCloud messages."""
 POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200
-"""Maximum rate, and maximum number of poses, of the PoseArray of particles, which only viewers need."""
+"""Maximum rate of the PoseArray of particles, and maximum number of its poses."""
 LOCAL_PLAN_RATE_HZ = 5
-"""Maximum rate of local plans, which only viewers need."""
+"""Maximum rate of local plans."""
 
 
 class StackPublisher:
@@ -129,7 +126,7 @@ class StackPublisher:
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE_HZ)
 
     def write(self, now: int, tick: int, decision: Decision) -> None:
-        """Publish the decision of `tick`, which is at `now` nanoseconds."""
+        """Publish the decision of `tick`. `now` is simulated time in ns."""
         if decision.belief is not None:
             self._write_belief(now, tick, decision.belief)
         if decision.plan is not None:
@@ -159,13 +156,13 @@ class StackPublisher:
 
 
 MAX_CACHED_WRITERS = 16
-"""Maximum number of cached writers. Each set of moving objects needs its own, and most runs have few such sets."""
+"""Maximum number of cached writers, one for each set of moving objects."""
 
 
 class TruthPublisher:
-    """Publishes the ground truth: pose, velocity and clearance of the robot, and poses of moving objects.
+    """Publishes the ground truth: pose, velocity, and clearance of the robot, and poses of moving objects.
 
-    The poses of the robot and of moving objects are also on /tf. With `clock`, it publishes the time on /clock.
+    Poses are also published on /tf. `clock` states whether to publish simulated time on /clock.
     """
 
     def __init__(
@@ -180,7 +177,7 @@ class TruthPublisher:
         self._precomputed: _PrecomputedBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
-        """Publish the ground truth of `tick`, which is at `now` nanoseconds."""
+        """Publish the ground truth of `tick`. `now` is simulated time in ns."""
         poses = self._thinning.objects_to_keep(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
         if type(poses) is PosesAtTick:
@@ -201,7 +198,7 @@ class TruthPublisher:
         self._tf_writer.write(now, self._pack_transforms([(frame_names.MAP, self._frame, stamp, truth.pose), *links]))
 
     def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
-        """Serialize the transforms of all objects for all ticks for which their poses are predicted."""
+        """Serialize the transforms of all objects for all ticks with predicted poses."""
         previous, names = self._precomputed, predicted.names
         if previous is not None and previous.predicted.names == names:
             packer, writer = previous.packer, previous.writer
@@ -213,16 +210,16 @@ class TruthPublisher:
         return _PrecomputedBatch(predicted, packer, writer, packer(stamps, predicted.table))
 
     def _new_writer(self, names: Iterable[str]) -> BatchWriter:
-        """Return a writer for the messages with the poses of the robot and of these objects on /tf."""
+        """Return a writer for the ground truth and the poses of the robot and the named objects on /tf."""
         links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(names)]
         tf = encode.transforms([(frame_names.MAP, self._frame, "pose"), *links])
         return self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
 
 
 class _PrecomputedBatch(NamedTuple):
-    """Serialized transforms of objects whose poses are known in advance: one row of `serialized` for each tick.
+    """Serialized transforms of objects with predicted poses: one row of `serialized` for each tick.
 
-    `packer` serialized them. `writer` writes the row of a tick, together with the other messages of that tick.
+    `packer` has serialized the transforms. `writer` writes a row together with the other messages of its tick.
     """
 
     predicted: PredictedPoses

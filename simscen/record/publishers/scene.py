@@ -1,4 +1,4 @@
-"""Publisher of markers for 3D viewers: objects, footprints, zones, ramps and places."""
+"""Publisher of markers for 3D viewers: objects, footprints, zones, ramps, and places."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -36,17 +36,17 @@ TRUTH_COLOR: Color = (0.0, 0.44, 0.34, 1.0)
 BELIEF_COLOR: Color = (0.8, 0.2, 0.5, 1.0)
 """Colors of Okabe and Ito, as in reports and pictures."""
 LINE_SCALE, TEXT_SCALE = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
-"""`scale` of markers in m: the width of lines in x, and the height of letters in z."""
+"""`scale` of markers in m: line width in x, and height of letters in z."""
 MAX_MASK_BLOCKS = 2000
-"""Maximum number of rectangles of a filter mask that are drawn, the largest first."""
+"""Maximum number of rectangles of a filter mask. The largest rectangles are drawn."""
 _MARKER_HEIGHT_M = 0.02  # above the floor, so that the map does not hide markers
 _TEXT_POSE = Pose3(0.0, 0.0, 0.5)
 
 
 class ScenePublisher:
-    """Publishes the markers of the world and of `robot` ("" for a single robot) whenever one of them changes.
+    """Publishes the markers of the world and of `robot` ("" for a single robot) when they change.
 
-    Markers move with the frames of the robot and of objects, whose poses are on /tf, and need no message for this.
+    Markers move with their frames on /tf without further messages.
     """
 
     def __init__(self, out: MessageSink, case: Case, scenery: Scenery, frames: RobotFrames, robot: str) -> None:
@@ -59,7 +59,7 @@ class ScenePublisher:
         """True after the first call of `write`. From then on, `write` is needed only at ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
-        """Update the markers after events, and publish them at `now` nanoseconds if they have changed."""
+        """Update the markers after events, and publish them if they have changed. `now` is simulated time in ns."""
         objects_changed = [self._update_objects(event) for event in events]
         zones_changed = [self._update_zones(event) for event in events]
         if any(objects_changed) or not self.has_published:
@@ -87,7 +87,7 @@ class ScenePublisher:
         return True
 
     def _find_zone(self, filter_: Filter, region: str) -> FilterZone | None:
-        """Return the zone that had this region at the start of the run, or a new one; None if it is unknown."""
+        """Return the zone of a region at the start of the run, or else a new zone; None for an unknown region."""
         for zone in self._scenery.zones:
             if (zone.filter, zone.region, zone.robot) == (filter_, region, self._robot):
                 return zone
@@ -124,7 +124,7 @@ class ScenePublisher:
 
 
 def _outlines(event: Event) -> list[list[tuple[float, float]]]:
-    """Return the outlines in an object.spawned event. A plugin may write values that are no polygons; skip these."""
+    """Return the outlines in an object.spawned event. Values that are not polygons are skipped."""
     parts = event.data.get("parts")
     outlines = [_corners(part) for part in parts] if isinstance(parts, list) else []
     return [corners for corners in outlines if len(corners) > 2]

@@ -1,4 +1,4 @@
-"""Publisher of sensor readings: /scan, /odom, /imu, bumpers, images, and the related transforms."""
+"""Publisher of sensor readings and their transforms."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -22,16 +22,22 @@ _DEFAULT_TOPICS = {
     "Imu": ("imu", topics.IMU_TYPE),
     "Bump": ("bumper", topics.BUMPER_TYPE),
 }
-"""Default topic and message type, by the name of a class of simscen.core.messages.sensor_data."""
+"""Default topic and message type, by the class name of a reading."""
 
 
 class SensorPublisher:
-    """Publishes readings at the time at which the stack receives them, with the time of the measurement as the stamp.
+    """Publishes readings when the stack receives them. Stamps are the times of measurement.
 
-    The first sensor of a type gets the default topic, for example /scan. The others get a topic that starts with their
-    name, for example /rear/scan. `sensors` maps the names of sensors to reading types, in the order in which sensors
-    get their topics. A sensor that is missing there gets its topic with its first reading. `mounts` are the poses of
-    sensors on the base. `declared` are the topics of all `sensors`: pairs of the name of a sensor, and a topic.
+    The first sensor of a type has the default topic, e.g. /scan. The topics of other sensors start with the name of the
+    sensor, e.g. /rear/scan.
+
+    Args:
+        mounts: Poses of sensors on the base, by sensor name.
+        sensors: Class names of readings ("Scan", …) by sensor name, in the order of topics. Missing sensors get their
+            topics with their first reading.
+
+    Attributes:
+        declared: Sensor names and topics of all `sensors`.
     """
 
     def __init__(
@@ -68,20 +74,20 @@ class SensorPublisher:
         self._publish_mounts(0)
 
     def set_map_from_odom(self, map_from_odom: Pose3) -> None:
-        """Set the transform of the localizer, which is published on /tf with each odometry from now on."""
+        """Set the transform from map to odom, which is published on /tf with each odometry from now on."""
         self._map_from_odom = map_from_odom
 
     def write_filtered(self, now: int, odometry: Odometry) -> None:
-        """Publish the odometry of the stack's filter at `now` nanoseconds.
+        """Publish the filtered odometry of the stack. `now` is simulated time in ns.
 
-        From now on, the filter defines the transform from odom to base on /tf, and no longer the wheel odometry.
+        From now on, the transform from odom to base on /tf comes from the filter instead of the wheel odometry.
         """
         if self._filtered_odometry is None:
             self._filtered_odometry = self._odometry_writers(topics.FILTERED_ODOMETRY)
         self._write_with_transforms(self._filtered_odometry, now, odometry)
 
     def write(self, now: int, readings: Readings) -> None:
-        """Publish readings at `now` nanoseconds."""
+        """Publish readings. `now` is simulated time in ns."""
         for reading in readings:
             self._methods[type(reading)](now, reading)
 
@@ -156,7 +162,7 @@ class SensorPublisher:
                 self._out.publish(topic, now, encode.image(frame, stamp, pixels))
 
     def _publish_mounts(self, now: int) -> None:
-        """Publish the mounts of all sensors in one message, because late subscribers get only the last message."""
+        """Publish the mounts of all sensors in one message."""
         base = self._frames.base
         links = [(base, self._frames.sensor_frame(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
@@ -179,23 +185,20 @@ class SensorPublisher:
 
 
 class _OdometryWriters(NamedTuple):
-    """Writers of odometry together with odom→base on /tf; `with_map` also writes map→odom."""
+    """Writers of odometry and of odom→base on /tf. `with_map` also writes map→odom."""
 
     without_map: BatchWriter
     with_map: BatchWriter
 
 
 def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:
-    """Return the topics of a camera: one with False for colors, and one with True for depths."""
+    """Return the topics of a camera, each with whether it contains depths instead of colors."""
     root = f"/{_ros_name(sensor)}"
     names = ("image_raw", False), ("depth/image_raw", True)
     return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
 
 
 def _ros_name(text: str) -> str:
-    """Return a valid ROS name for a sensor: letters, digits and underscores, without a digit at the start.
-
-    A sensor with the name ground_truth gets another one, so that its topic is not that of the ground truth.
-    """
+    """Return a valid ROS name for a sensor, which differs from the namespace ground_truth."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
     return f"sensor_{name}" if name[:1].isdigit() or name in ("", "ground_truth") else name
