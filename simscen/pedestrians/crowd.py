@@ -196,7 +196,7 @@ class Crowd:
     def _obstacle_forces(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> Array:
-        """Return the forces (n, 2) in m/s² of walls and objects, which act at their point nearest to the pedestrian.
+        """Return the forces (n, 2) in m/s² of walls and objects on pedestrians.
 
         Robots act as objects on pedestrians with the behavior `impassive`.
         """

@@ -99,7 +99,7 @@ class Pedestrian:
     # Goals
 
     def update_goal(self) -> list[PedestrianAction]:
-        """Advance to the next corner or goal if the current one is reached. Return one action if it is a goal."""
+        """Advance to the next corner or goal if the current one is reached. Return an action for a reached goal."""
         while len(self.path) > 1 and math.dist(self.position, self.path[0]) <= CORNER_RADIUS_M:
             self.path.pop(0)
         if self.has_arrived or math.dist(self.position, self.destination) > GOAL_RADIUS_M:

@@ -1,4 +1,4 @@
-"""Read the parameters of other nodes."""
+"""Reader of the parameters of other nodes."""
 
 from __future__ import annotations
 

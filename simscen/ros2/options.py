@@ -26,14 +26,18 @@ class BringUpAborted(AdapterError):
 class Options(NamedTuple):
     """Options of `simscen ros2`. Times are in s.
 
-    without:  topics that simscen does not publish
-    frame:    renamed frames, `FRAME:=NAME`
-    rounds:   extra rounds of the node barrier if no command has arrived; 0 = one per node
-    wait:     maximum wall time to wait for a command
-    warm_up:  simulated time before goals are sent
-    ready:    maximum wall time until the nodes are ready
-    settle:   wall time for which the graph must be unchanged before the run
-    answer:   maximum wall time to wait for an answer of a node
+    without:     topics that simscen does not publish
+    frame:       renamed frames, `FRAME:=NAME`
+    factor:      speed relative to real time if `sync` is "paced"
+    rounds:      extra rounds of the node barrier if no command has arrived; 0 = one per node
+    wait:        maximum wall time to wait for a command
+    warm_up:     simulated time before goals are sent
+    ready:       maximum wall time until the nodes are ready
+    settle:      wall time for which the graph must be unchanged before the run
+    answer:      maximum wall time to wait for an answer of a node
+    wall_time:   whether to accept nodes without use_sim_time
+    nav2:        whether to require Nav2's nodes and check their parameters
+    parameters:  content of `parameter_file`, by node
     """
 
     launch: Optional[str] = None

@@ -63,12 +63,14 @@ def relevant_parameters(node: str, names: Iterable[str]) -> List[str]:
     """Return the parameters among `names` that the rules use for this node."""
     if node in COSTMAPS:
         ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
-        return [name for name in names if name in _CHECKED or name == "plugins" or name.endswith(ends)]
+        return [name for name in names if name in _CHECKED_PARAMETERS or name == "plugins" or name.endswith(ends)]
     ends = (".topic", ".type", ".enabled")
-    return [name for name in names if name in _CHECKED or (node == "collision_monitor" and name.endswith(ends))]
+    return [
+        name for name in names if name in _CHECKED_PARAMETERS or (node == "collision_monitor" and name.endswith(ends))
+    ]
 
 
-_CHECKED = frozenset(
+_CHECKED_PARAMETERS = frozenset(
     (
         *("use_sim_time", "robot_base_frame", "base_frame_id", "odom_frame_id", "global_frame", "global_frame_id"),
         *("local_frame", "odom_topic", "scan_topic", "observation_sources"),
@@ -112,23 +114,23 @@ class _Node(NamedTuple):
             self.add_problem(key, f"is {value!r}, which no node publishes; simscen's {kind}: {available}")
 
 
-def _amcl(node: _Node) -> None:
+def _check_amcl(node: _Node) -> None:
     node.check_base("base_frame_id")
     node.check_frame("odom_frame_id", ODOM)
     node.check_frame("global_frame_id", MAP)
     node.check_topic("scan_topic", node.published.scans, "scans")
 
 
-def _costmap(node: _Node) -> None:
+def _check_costmap(node: _Node) -> None:
     node.check_base("robot_base_frame")
     node.check_frame("global_frame", MAP, ODOM)
     for layer in node.get("plugins") or ():
         sources = node.get(f"{layer}.observation_sources")
         for source in sources.split() if isinstance(sources, str) else ():
-            _source(node, f"{layer}.{source}")
+            _check_source(node, f"{layer}.{source}")
 
 
-def _source(node: _Node, source: str) -> None:
+def _check_source(node: _Node, source: str) -> None:
     """Check an observation source of a costmap layer or of the collision monitor."""
     kind = node.get(f"{source}.data_type") or node.get(f"{source}.type") or "LaserScan"
     if kind in ("LaserScan", "scan"):
@@ -138,38 +140,38 @@ def _source(node: _Node, source: str) -> None:
         node.add_problem(key, f"is {kind!r}: simscen publishes scans only", is_severe=False)
 
 
-def _navigator(node: _Node) -> None:
+def _check_navigator(node: _Node) -> None:
     node.check_base("robot_base_frame")
     node.check_frame("global_frame", MAP)
     node.check_topic("odom_topic", [node.published.odometry], "odometry")
 
 
-def _with_odometry(node: _Node) -> None:
+def _check_odometry_topic(node: _Node) -> None:
     node.check_topic("odom_topic", [node.published.odometry], "odometry")
 
 
-def _behaviors(node: _Node) -> None:
+def _check_behavior_server(node: _Node) -> None:
     node.check_base("robot_base_frame")
     node.check_frame("local_frame", ODOM)
     node.check_frame("global_frame", MAP, ODOM)
 
 
-def _monitor(node: _Node) -> None:
+def _check_collision_monitor(node: _Node) -> None:
     node.check_base("base_frame_id")
     node.check_frame("odom_frame_id", ODOM)
     for source in node.get("observation_sources") or ():
-        _source(node, str(source))
+        _check_source(node, str(source))
 
 
 RULES: Dict[str, Any] = {
-    "amcl": _amcl,
-    "local_costmap": _costmap,
-    "global_costmap": _costmap,
-    "bt_navigator": _navigator,
-    "controller_server": _with_odometry,
-    "velocity_smoother": _with_odometry,
-    "behavior_server": _behaviors,
-    "collision_monitor": _monitor,
+    "amcl": _check_amcl,
+    "local_costmap": _check_costmap,
+    "global_costmap": _check_costmap,
+    "bt_navigator": _check_navigator,
+    "controller_server": _check_odometry_topic,
+    "velocity_smoother": _check_odometry_topic,
+    "behavior_server": _check_behavior_server,
+    "collision_monitor": _check_collision_monitor,
 }
 """Functions that check the parameters of a node, by name of the node."""
 NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))

@@ -1,4 +1,4 @@
-"""Collect behavior tree transitions, warnings, and parameters of Nav2's nodes for the log of the run."""
+"""Behavior tree transitions, warnings, and parameters of Nav2's nodes for the run's log."""
 
 from __future__ import annotations
 
