@@ -48,10 +48,10 @@ def missing_disturbances(
     return tuple(found)
 
 
-def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
+def _is_reported_earlier(outcome: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
     """Return whether the disturbance is a step of a sequence of which an earlier step did not happen."""
-    after = one.disturbance.after
-    if after is None or one.fired:
+    after = outcome.disturbance.after
+    if after is None or outcome.fired:
         return False
     before = [other for other in outcomes if other.disturbance.kind == "event"][after]
     return not before.fired and (before.missing or _is_reported_earlier(before, outcomes))
@@ -65,13 +65,13 @@ def _enumerate_by_kind(disturbances: Sequence[Disturbance]) -> Iterator[tuple[in
         counts[one.kind] += 1
 
 
-def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
+def _finding(trace: Trace, outcome: DisturbanceOutcome) -> Finding:
     """Return the finding on a missing disturbance: a failure, or inconclusive if the log is truncated."""
-    text = f"{one.disturbance.name} ({one.disturbance.trigger})"
+    text = f"{outcome.disturbance.name} ({outcome.disturbance.trigger})"
     if not has_ended(trace):
         because = f"{text}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
-        return undecided(FINDING_NAME, because, detail=(one.effect,))
-    return missed(FINDING_NAME, text, "", None if one.tick is None else (trace, one.tick), (one.effect,))
+        return undecided(FINDING_NAME, because, detail=(outcome.effect,))
+    return missed(FINDING_NAME, text, "", None if outcome.tick is None else (trace, outcome.tick), (outcome.effect,))
 
 
 def _events_of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:

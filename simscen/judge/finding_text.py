@@ -10,6 +10,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 DISTURBANCE = "disturbance"
 """Criterion name of verdicts on missing events and faults. The ID is the name of the event or fault."""
 ARRIVAL = "goals_reached"
+"""Name of the criterion on the distance from goals."""
 MAX_TIMES_SHOWN = 5
 """Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
@@ -50,21 +51,21 @@ def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
+def disturbance_times(outcome: DisturbanceOutcome, tick_rate: int) -> str:
     """Return the times at which a disturbance began, e.g. "t = 10.00 s, 12.50 s and 3 more", or "never"."""
-    times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:MAX_TIMES_SHOWN]]
-    more = f" and {len(one.fired) - MAX_TIMES_SHOWN} more" if len(one.fired) > MAX_TIMES_SHOWN else ""
+    times = [f"{tick / tick_rate:.2f} s" for tick in outcome.fired[:MAX_TIMES_SHOWN]]
+    more = f" and {len(outcome.fired) - MAX_TIMES_SHOWN} more" if len(outcome.fired) > MAX_TIMES_SHOWN else ""
     return f"t = {', '.join(times)}{more}" if times else "never"
 
 
-def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
+def disturbance_line(outcome: DisturbanceOutcome, tick_rate: int) -> str:
     """Return the text of a disturbance, e.g. "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     parts = (
-        disturbance_times(one, tick_rate) if one.fired else "",
-        one.effect,
-        "" if one.happened else "so it did not happen",
+        disturbance_times(outcome, tick_rate) if outcome.fired else "",
+        outcome.effect,
+        "" if outcome.happened else "so it did not happen",
     )
-    return f"{one.disturbance.name}: {', '.join(part for part in parts if part)}"
+    return f"{outcome.disturbance.name}: {', '.join(part for part in parts if part)}"
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:

@@ -38,7 +38,9 @@ def combine_robots(
         )
         judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
     verdicts = tuple(verdict for verdict, _ in judged)
-    outcome, expectation = apply_expectation(expected, verdicts, _worst(results), all(map(has_ended, traces.values())))
+    outcome, expectation = apply_expectation(
+        expected, verdicts, _worst_outcome(results), all(map(has_ended, traces.values()))
+    )
     if expected is not None and expectation is not None:
         judged.append((expectation, expected.line))
     errors = [(name, result.error) for name, result in results.items() if result.error is not None]
@@ -75,7 +77,7 @@ def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
     return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
-def _worst(results: Mapping[str, RunResult]) -> Outcome:
+def _worst_outcome(results: Mapping[str, RunResult]) -> Outcome:
     outcomes = [result.outcome for result in results.values()]
     return next((worst for worst in (Outcome.ERROR, Outcome.FAILED) if worst in outcomes), Outcome.PASSED)
 
