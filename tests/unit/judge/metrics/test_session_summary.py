@@ -6,8 +6,8 @@ import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.judge.metrics.session_summary import (
-    SessionSummaryBuilder,
     SessionSummary,
+    SessionSummaryBuilder,
     session_summary_data,
     session_summary_line,
 )
