@@ -19,7 +19,7 @@ CHECKED_VARIATIONS = range(1, 4)
 """Numbers of the variations (sets of values of a scenario) that the editor checks."""
 
 MAX_WORLDS = 8
-"""Maximum number of cached worlds. Each change of an inline world makes a new one."""
+"""Maximum number of cached worlds."""
 
 
 @dataclass

@@ -7,7 +7,7 @@ from simscen.loading.yaml.tree import Key, dotted_path
 
 
 class EditRefused(Exception):
-    """The edit is impossible without changes of other parts of the text. The message states the reason."""
+    """The edit is invalid, or changes other parts of the text. The message states the reason."""
 
 
 class Splice(NamedTuple):
