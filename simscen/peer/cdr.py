@@ -52,7 +52,7 @@ class Writer:
         return self
 
     def done(self) -> bytes:
-        """Return the bytes of the message."""
+        """Return the serialized message."""
         return bytes(self._data)
 
     def _align(self, width: int) -> None:

@@ -96,7 +96,7 @@ class Peer:
     """Connection of a stack to simscen. Iteration yields one Step after another until the run ends.
 
     Args:
-        name: Name of the stack for the run's log, as `version` and `about` (any JSON object).
+        name, version, about: Description of the stack for the run's log. `about` is any JSON object.
         topics: Topics to receive; None for all.
         every_beat: True for a step whenever a sensor publishes, False for one step per velocity command.
         modes: Nav2 actions that the stack supports.
