@@ -1,9 +1,4 @@
-"""Decisions of the advanced stack about when to replan, how to plan around moving obstacles, and what to clear.
-
-Plans pass behind moving obstacles. For each cell, the obstacles are predicted for the time at which the robot would
-arrive there in a straight line at full speed. Only the part of a crossing obstacle's path where both would
-meet gets a cost.
-"""
+"""Replanning of the advanced stack: costs of moving obstacles, reasons for a new plan, and clearing of the costmap."""
 
 import contextlib
 import math
@@ -28,16 +23,16 @@ from simscen.stack.plan_manager import PlanManager, PlanResult
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 DECAY_TIME_S = 2.0
-"""Time ahead over which the cost decays by a factor of e, because no obstacle keeps its velocity forever."""
+"""Time constant of the exponential decay of costs with the time of arrival, because obstacles change their velocity."""
 BLOCK_SIZE_M = 0.2
-"""Approximate size of the blocks of cells that get the same cost."""
+"""Approximate side length of the blocks of cells that get the same cost."""
 
 
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
-    """Return the costmap with costs of at most MAX_NON_OBSTACLE where the robot would meet moving obstacles.
+    """Return the costmap with costs of at most MAX_NON_OBSTACLE in cells where the robot would meet moving obstacles.
 
-    The robot starts at `robot`, drives at `speed` m/s, and has a `radius` in m. If it would meet none, `costmap` itself
-    is returned.
+    The robot drives to each cell in a straight line from the pose `robot` at `speed` m/s; its `radius` is in m. The
+    obstacles are predicted for the time of its arrival.
     """
     if not len(costmap.moving):
         return costmap
@@ -62,6 +57,7 @@ def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius
 
 
 def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
+    """Return the costs of the points (x, y), at which the robot arrives after `times` in s."""
     near, _ = moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
     cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
     return np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
@@ -70,9 +66,10 @@ def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, 
 def meets_moving_obstacle(
     moving: MovingObstacles, robot: Pose2, path: Iterable[complex], speed: float, radius: float
 ) -> bool:
-    """Return whether a robot at `robot` that drives along `path` (x + iy) at `speed` comes too close to an obstacle.
+    """Return whether a robot that drives from `robot` along `path` (points x + iy) comes too close to an obstacle.
 
-    It is too close if `MovingObstacles.nearness` is positive; computed with scalars because there are only few points.
+    Obstacles are predicted for HORIZON_S. Too close means that `MovingObstacles.nearness` is positive. The `speed` is
+    in m/s, and the robot's `radius` in m.
     """
     moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON_S)
     if not moving.obstacles:
@@ -93,25 +90,25 @@ def meets_moving_obstacle(
 MIN_PLAN_AGE_S = 0.5
 """Age of a plan from which on it is checked for lost clearance."""
 SHORTCUT_PERIOD_S = 2.0
-"""Time between two checks whether obstacles have disappeared, so that there may be a shorter path."""
+"""Time between two checks for a shorter path after obstacles have disappeared."""
 MOVING_PERIOD_S = 0.5
 """Minimum time between two plans around moving obstacles."""
 CAUTIOUS_CLEARANCES_M = (0.10, 0.05)
-"""Additional clearances that are tried in this order, once the controller could not follow a plan."""
+"""Clearances added to the robot's radius, tried in this order, after the controller could not follow a plan."""
 PREFERRED_CLEARANCE_M, MAX_DETOUR_RATIO = 0.15, 1.15
-"""Larger additional clearance that is used if the path with it is at most this many times as long."""
-DISAPPEARED_CELLS = 8
-"""A shorter path is searched if more obstacle cells than this have disappeared; a few vary with lidar noise."""
+"""Larger added clearance, and maximum length of a path with it, relative to the path with a cautious clearance."""
+MAX_VARYING_CELLS = 8
+"""Number of obstacle cells that vary with lidar noise. If more disappear, a shorter path is searched."""
 MAX_LENGTH_RATIO, MIN_SAVING_M = 0.85, 0.5
-"""Hysteresis: a new path must be shorter than this ratio of the rest of the current plan, and save this length."""
+"""Maximum length of a shorter path relative to the rest of the current plan, and minimum length that it saves."""
 LOST_CLEARANCE_M = 0.1
-"""Clearance that a plan may lose before it is replaced."""
+"""Decrease of a plan's clearance after which the plan is replaced."""
 CLEARANCE_HORIZON_M = 4.0
 """Length of the plan ahead of the robot on which clearance is checked."""
 
 
 class ClearancePlan(FollowedPlan):
-    """Followed plan that also remembers the clearance it had when it was made."""
+    """Followed plan that compares its present clearance with its clearance when it was made."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
         """Take the arguments of FollowedPlan."""
@@ -119,17 +116,14 @@ class ClearancePlan(FollowedPlan):
         super().__init__(path, radius, costmap)
 
     def compare(self, costmap: CostmapView) -> None:
-        """Determine at which points the plan is occupied, and where it has lost clearance."""
+        """Determine which points of the plan are occupied, and which have lost clearance."""
         clearance = distances(costmap, self.path.points[:, :2])
         self._occupied = clearance <= np.float32(self._radius)
         min_clearance = self._initial_clearance - np.float32(LOST_CLEARANCE_M)
         self._has_lost = np.minimum(clearance, np.float32(WATCH_DISTANCE_M)) < min_clearance
 
     def has_lost_clearance(self) -> bool:
-        """Return whether the plan ahead has clearly less clearance than when it was made.
-
-        A plan that was made when an obstacle was only half visible passes it closely, although the robot still fits.
-        """
+        """Return whether the plan has lost LOST_CLEARANCE_M of clearance within the next CLEARANCE_HORIZON_M."""
         track = self._track
         if not self._has_lost.any():
             return False
@@ -138,13 +132,17 @@ class ClearancePlan(FollowedPlan):
         return bool(self._has_lost[index:end].any())
 
     def is_longer_than(self, length: float) -> bool:
-        """Return whether a path of `length` m is clearly shorter than the rest of this plan."""
+        """Return whether a path of `length` m is shorter than the rest of this plan by more than a hysteresis."""
         remaining_length = self.remaining()
         return length < MAX_LENGTH_RATIO * remaining_length and length < remaining_length - MIN_SAVING_M
 
 
 class AdvancedPlanManager(PlanManager):
-    """Plan manager that plans around predicted obstacles. With `replanning: on_invalid`, it replans only on changes."""
+    """Plan manager that plans around moving obstacles.
+
+    With `replanning: on_invalid`, it replans if the plan is blocked, leaves the rolling window, meets a moving
+    obstacle, has lost clearance, or may be much too long.
+    """
 
     plan: ClearancePlan | None
 
@@ -171,7 +169,7 @@ class AdvancedPlanManager(PlanManager):
         self._is_cautious = False
 
     def report_control_failure(self) -> None:
-        """Prefer paths with more clearance until the next goal, because the controller could not follow the plan."""
+        """Add CAUTIOUS_CLEARANCES_M to plans until the next goal, because the controller could not follow the plan."""
         self._is_cautious = self._spec.cautious
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
@@ -197,13 +195,13 @@ class AdvancedPlanManager(PlanManager):
         if now - self._scheduled_at < SHORTCUT_PERIOD_S:
             return ""
         self._scheduled_at, cells = now, self._costmap.obstacle_cells
-        disappeared = cells < self._max_obstacle_cells - DISAPPEARED_CELLS
+        disappeared = cells < self._max_obstacle_cells - MAX_VARYING_CELLS
         self._max_obstacle_cells = cells if disappeared else max(self._max_obstacle_cells, cells)
         can_be_shorter = self._is_partial or plan.is_longer_than(pose.distance(goal.pose) - goal.xy_tolerance)
         return "better" if disappeared and can_be_shorter else ""
 
     def _should_avoid_moving(self, now: float, pose: Pose2, plan: FollowedPlan) -> bool:
-        """Return whether to replan because the plan meets a moving obstacle, or avoids one that may have moved away."""
+        """Return whether to replan: the plan meets a moving obstacle, or avoids one that may have moved away."""
         moving = self._costmap.moving
         if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
             return False
@@ -247,20 +245,18 @@ class AdvancedPlanManager(PlanManager):
 
 
 INITIAL_WAIT_S = 10.0
-"""Time until the entire costmap may be cleared again; doubled after each such clearing."""
+"""Time after clearing the entire costmap until this may happen again; doubled each time."""
 PROGRESS_M = 1.0
-"""Decrease of the distance to the goal after which the last clearing counts as a success, which resets the wait."""
+"""Decrease of the distance to the goal that resets this time to INITIAL_WAIT_S."""
 
 
 class ClearingBackoff:
     """Policy that clears the entire global costmap at increasing intervals, otherwise only the area around the robot.
 
-    Clearing helps if obstacles that were seen earlier have disappeared. But a robot that clears everything whenever it
-    finds no path forgets the far end of a wall, and drives back and forth between both ends.
+    A robot that clears everything whenever it finds no path would forget one end of a wall at the other end.
     """
 
     def __init__(self) -> None:
-        """Start as for a new goal."""
         self.reset()
 
     def reset(self) -> None:
@@ -268,9 +264,9 @@ class ClearingBackoff:
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear the entire global costmap at the time `now` in s, or only the area around the robot.
+        """Return True to clear the entire global costmap, or False to clear only the area around the robot.
 
-        Call it once per clearing. `goal_distance` is the straight distance to the goal in m.
+        Call it once per clearing. `now` is the time in s, `goal_distance` the straight distance to the goal in m.
         """
         if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now

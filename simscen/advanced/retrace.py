@@ -16,40 +16,37 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 
 SPACING_M = 0.01
-"""Distance in m between two poses of a trail, as returned by `Trail.footprint_distance`."""
+"""Distance between two poses of a trail, by `Trail.footprint_distance`."""
 LOOP_CLOSURE_M, MIN_LOOP_M = 0.12, 0.3
-"""A trail has a loop if it returns to within the first distance of an earlier pose, after the footprint has moved by at
-least the second distance. Loops are removed."""
+"""Maximum distance between the ends of a loop, and minimum length of a loop, both by `Trail.footprint_distance`."""
 MIN_LATERAL_SHARE = 0.1
-"""Share of lateral motion above which the base has strafed. A base that only slips has less."""
+"""Share of lateral motion above which the base has strafed. Slipping wheels cause less."""
 
 
 class Trail:
-    """Evenly spaced poses (n, 3) of the robot's path in reverse, without loops, starting at the current pose.
+    """The robot's path in reverse: evenly spaced poses from the current one to the oldest one, without loops.
 
-    `along` (n,) is the distance in m that the footprint moves to each pose (`footprint_distance`). After the oldest
-    known pose, the trail continues straight backward.
+    Beyond the oldest pose, the trail continues straight backward. `poses` (n, 3) are x, y, and yaw. `driven` and
+    `along` (n,) are the distances in m that the base and the footprint (`footprint_distance`) move to each pose.
     """
 
-    def __init__(self, poses: Sequence[Pose2], pose: Pose2, radius: float, length: float) -> None:
-        """Take earlier poses (oldest first), the current one, the circumscribed radius, and the length to add in m."""
+    def __init__(self, earlier: Sequence[Pose2], current: Pose2, radius: float, extension: float) -> None:
+        """Take the poses (oldest first), the circumscribed radius in m, and the length in m of the straight part."""
         self._radius = radius
-        passed = self._thinned(np.array([pose, *reversed(poses)], dtype=np.float64))
+        passed = self._thinned(np.array([current, *reversed(earlier)], dtype=np.float64))
         self.has_strafed = _has_strafed(passed)
-        """Whether the base drove sideways."""
         trail = self._without_loops(passed)
         x, y, yaw = trail[-1].tolist()
-        end = (x - length * math.cos(yaw), y - length * math.sin(yaw), yaw)
+        end = (x - extension * math.cos(yaw), y - extension * math.sin(yaw), yaw)
         self.known_count = len(self._resampled(trail))
-        """Number of poses that the robot has passed, without the continuation."""
+        """Number of poses without the straight part."""
         self.poses = self._resampled(np.concatenate((trail, [end])))
         self.along = np.concatenate(([0.0], np.cumsum(self.footprint_distance(self.poses[1:], self.poses[:-1]))))
         steps = np.hypot(np.diff(self.poses[:, 0]), np.diff(self.poses[:, 1]))
         self.driven = np.concatenate(([0.0], np.cumsum(steps)))
-        """Distance (n,) in m that the base drives to each pose."""
 
     def footprint_distance(self, poses: Array, others: Array) -> Array:
-        """Return the distances (…,) in m from poses (…, 3) to others, plus the turn times the circumscribed radius."""
+        """Return the distances (…,) in m between poses (…, 3), plus the turn in rad times the circumscribed radius."""
         turned = np.abs(wrap_array(poses[..., 2] - others[..., 2]))
         return np.asarray(
             np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._radius * turned
@@ -64,7 +61,7 @@ class Trail:
         return trail[indices]
 
     def _without_loops(self, trail: Array) -> Array:
-        """Return the poses without loops, in which the robot returns to an earlier pose."""
+        """Return the poses without those on loops."""
         moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
         indices, k = [0], 0
         while k < len(trail) - 1:
@@ -82,27 +79,28 @@ class Trail:
 
 
 def _has_strafed(passed: Array) -> bool:
+    """Return whether the base drove sideways between poses (n, 3)."""
     steps, yaw = np.diff(passed[:, :2], axis=0), passed[:-1, 2] + wrap_array(np.diff(passed[:, 2])) / 2
     lateral = np.abs(np.cos(yaw) * steps[:, 1] - np.sin(yaw) * steps[:, 0])
     return bool(lateral.sum() > MIN_LATERAL_SHARE * np.hypot(*steps.T).sum())
 
 
 HORIZON_S = 1.0
-"""Horizon in s of each candidate command: 15 cm at Nav2's backup_speed."""
+"""Duration for which each candidate command is simulated."""
 TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
 """Times in s at which a candidate command is checked for collisions."""
 MIN_FREE_STEPS = 3
-"""Number of steps of TIMES that must be free if no command is free for the whole horizon."""
+"""Number of steps of TIMES that must be free of collisions if no command is free for the whole horizon."""
 SLACK_CELLS = 0.3
-"""Cells by which the robot may come closer to an obstacle than on its trail."""
+"""Distance in cells by which the robot may come closer to an obstacle than on its trail."""
 DEVIATION_WEIGHT = 2.0
-"""Weight of the deviation from the trail relative to the progress along it."""
+"""Weight of the deviation from the trail relative to the progress along the trail."""
 MIN_GAIN_M = 0.01
-"""Minimum difference in m between the score of a command and that of standing still."""
+"""Minimum score of a command, in m above the score of standing still."""
 WINDOW_M = 0.5
-"""Length in m of the part of the trail, from the last position on, in which the robot is located."""
+"""Length of the part of the trail, from the robot's last position on, that is searched for its present position."""
 SPEED_RATIOS = (-1.0, -0.5, 0.0, 0.5)
-"""Candidate speeds relative to the maximum; also forward, because a trail can have cusps."""
+"""Candidate speeds relative to the maximum. The robot also drives forward, because a trail can have cusps."""
 TURN_RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
 """Candidate turn rates in rad/s."""
 LATERAL_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
@@ -112,9 +110,8 @@ LATERAL_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
 class TrailFollower:
     """Follows the trail of the robot backward; straight backward where there is no trail.
 
-    A robot at an angle between two posts can neither turn nor leave in a straight line, but it can leave on the path
-    on which it entered. Each step compares a few velocities on the local costmap, and takes the one with the most
-    progress and the least deviation. Slipping wheels therefore do not lead the robot away from its trail.
+    Each step simulates a few velocities on the local costmap. The best one has much progress along the trail and little
+    deviation from it.
     """
 
     def __init__(self, setting: Setting, speed: float) -> None:
@@ -126,7 +123,7 @@ class TrailFollower:
         self._commands = _candidate_commands(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
-        """Start at this pose in the odom frame, to drive back at most `length` m."""
+        """Start to drive back at most `length` m from a pose in the odom frame."""
         horizon = np.array([HORIZON_S])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, horizon)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
@@ -134,7 +131,7 @@ class TrailFollower:
         self._last = pose
 
     def _remaining_trail(self) -> Sequence[Pose2]:
-        """Return the poses of the trail, without the part that was already driven back."""
+        """Return the recorded poses, without those that an earlier call of the behavior has driven back."""
         poses = self._recorded()
         if self._last is None or self._last not in poses:
             return poses
@@ -143,7 +140,7 @@ class TrailFollower:
         return [*(Pose2(*each) for each in remaining[::-1].tolist()), *poses[first_new:]]
 
     def locate(self, pose: Pose2) -> None:
-        """Locate the robot on the trail, never before the position where it was located last."""
+        """Update the robot's position on the trail, the pose nearest to `pose`. The position only moves onward."""
         window, self._last = self._window(), pose
         self._index += int(self._trail.footprint_distance(self._trail.poses[window], np.array(pose)).argmin())
 
@@ -154,7 +151,7 @@ class TrailFollower:
 
     @property
     def footprint_moved(self) -> float:
-        """Distance in m that the footprint has moved, including rotation."""
+        """Distance in m that the footprint has moved, by `Trail.footprint_distance`."""
         return float(self._trail.along[self._index])
 
     def _window(self) -> slice:
@@ -162,10 +159,10 @@ class TrailFollower:
         return slice(self._index, int(np.searchsorted(along, along[self._index] + WINDOW_M, side="right")))
 
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the best command that is free of collisions, or one that is free at first, or None.
+        """Return the best command without collisions in HORIZON_S, otherwise the best one without early collisions.
 
-        None means that no better command than standing still is free. If the collision monitor rejects the best one,
-        because it sees obstacles more precisely than the costmap, other backward commands are tried.
+        None if no such command is better than standing still. If the collision monitor rejects a command, other
+        backward commands are tried.
         """
         *scores, stop_score = self._scores(pose).tolist()
         has_strafed, is_vetoed = self._trail.has_strafed, False
@@ -190,10 +187,9 @@ class TrailFollower:
         return fallback
 
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
-        """Return which of the poses (n, 3) collide, except with cells that were or are as near to the robot.
+        """Return which of the poses (n, 3) collide with obstacle cells.
 
-        The robot has passed its trail. Collisions there by less than a cell are therefore errors of the costmap, and
-        deeper ones are due to obstacles that appeared later.
+        Cells that are about as near at the current pose, or were on the trail, are ignored: errors of the costmap.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -208,7 +204,7 @@ class TrailFollower:
         return np.asarray(blocked & is_nearer.any(axis=1))
 
     def _scores(self, pose: Pose2) -> Array:
-        """Return the scores (commands + 1,): progress minus weighted deviation; the last one is for a stop."""
+        """Return the scores in m of all commands and, last, of a stop: progress minus weighted deviation."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         ends = np.column_stack((
             pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],
@@ -222,6 +218,7 @@ class TrailFollower:
 
 
 def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
+    """Return the combinations of candidate velocities that the robot can drive."""
     commands = list[Twist]()
     for speed_ratio, lateral_ratio, rate in product(
         SPEED_RATIOS, LATERAL_RATIOS if robot.max_lateral > 0.0 else (0.0,), TURN_RATES
@@ -235,7 +232,7 @@ def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
 
 
 TIME_ALLOWANCE_RATIO = 1.5
-"""Time after which the behavior fails, relative to the time that the distance takes at full speed."""
+"""Minimum time limit of the behavior, relative to the time that the distance takes at full speed."""
 
 
 class Retrace:
@@ -264,7 +261,7 @@ class Retrace:
         follower.locate(pose)
         if follower.driven >= self._spec.retrace_dist:
             return None
-        if follower.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
+        if follower.driven >= self._spec.backup_dist and self._can_turn(pose, costmap):
             return None
         if seconds > max(self._spec.time_allowance, TIME_ALLOWANCE_RATIO * self._spec.retrace_dist / follower.speed):
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back along the trail took too long")
@@ -273,5 +270,5 @@ class Retrace:
             raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "the trail is blocked")
         return command
 
-    def _may_turn(self, pose: Pose2, costmap: CostmapView) -> bool:
+    def _can_turn(self, pose: Pose2, costmap: CostmapView) -> bool:
         return distance_at(costmap, pose.x, pose.y) > self._footprint.circumscribed + costmap.resolution

@@ -13,7 +13,7 @@ PARAMETER_SETS: Mapping[str, Mapping[str, object]] = {
     "default": {},
     "consistent": {"covariance": "scatter", "sure_update_interval": 1},
 }
-"""Values that replace the defaults of ScanMatchingAmcl, by the name of the parameter set."""
+"""Values that replace defaults of ScanMatchingAmcl, by the name of the parameter set."""
 
 
 class ScanMatchingAmcl(AmclParameters):
@@ -51,14 +51,13 @@ class ScanMatchingAmcl(AmclParameters):
     """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
-    """Covariance of the pose. `particles`: that of the particles, as in Nav2. `scatter`: the same, scaled to the errors
-    that are observed in two ways: by the residuals of the beams, and by comparing recent poses, which scan matching
-    propagates to the present. `scatter` needs `match_scans`."""
+    """Covariance of the pose. `particles`: that of the particles, as in Nav2. `scatter`: the covariance of the
+    particles, scaled by the residuals of the beams and the scatter of recent poses. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod
     def _with_parameter_set(cls, values: Any) -> Any:
-        """Fill in the values of the chosen parameter set; values that are given win."""
+        """Fill in values of the chosen parameter set for parameters that are not given."""
         name = values.get("parameters") if isinstance(values, Mapping) else None
         chosen = PARAMETER_SETS.get(name) if isinstance(name, str) else None
         return {**chosen, **values} if chosen else values

@@ -1,4 +1,4 @@
-"""The advanced stack and its builder: the reference stack with motion prediction and slip compensation."""
+"""The advanced stack and its builder: the reference stack with motion prediction and compensation of turn slip."""
 
 import math
 from typing import Any
@@ -17,13 +17,16 @@ from simscen.stack.protocols import Controller, Planner
 from simscen.stack.reference import ReferenceStack
 
 DECAY_DISTANCE_M = 0.5
-"""Distance driven in which the weight of an earlier measurement decays by a factor of e, because the ground changes."""
+"""Distance driven in which the weight of a measurement decays by a factor of e, because the ground changes."""
 MAX_CURVATURE_PER_M = 1.0
-"""Limit of the estimate to both sides. Only a broken sensor would measure more."""
+"""Maximum absolute value of the estimated curvature in rad/m. Only a broken sensor would measure more."""
 
 
 class TurnSlipObserver:
-    """Estimates the turn in rad per meter driven that the wheels do not measure, and compensates commands for it."""
+    """Estimates the curvature that the wheels do not measure, and corrects commands for it.
+
+    This curvature is the turn in rad per meter driven by which fused odometry and wheel odometry differ.
+    """
 
     def __init__(self) -> None:
         self._curvature = 0.0
@@ -45,7 +48,7 @@ class TurnSlipObserver:
             self._curvature = min(max(curvature, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 
     def compensate(self, command: Twist) -> Twist:
-        """Return the command to send so that the robot turns as `command` intends."""
+        """Return `command` with the estimated turn slip subtracted, so that the robot turns as intended."""
         if command.vx == 0.0 or self._curvature == 0.0:
             return command
         return Twist(command.vx, command.vy, command.wz - self._curvature * command.vx)
@@ -56,12 +59,15 @@ ROBOT_FRAME = Pose2(0.0, 0.0)
 
 
 class AdvancedStack(ReferenceStack):
-    """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal."""
+    """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal.
+
+    The private methods are hooks of ReferenceStack.
+    """
 
     def __init__(
         self, *parts: Any, prediction: MotionPrediction, turn_slip: TurnSlipObserver | None, **options: Any
     ) -> None:
-        """Take the arguments of ReferenceStack, and two more components. If `turn_slip` is None, slip is ignored."""
+        """Take the arguments of ReferenceStack and two components. If `turn_slip` is None, turn slip is ignored."""
         super().__init__(*parts, **options)
         self._prediction, self._turn_slip = prediction, turn_slip
         self._has_moving_obstacles = False
@@ -88,7 +94,7 @@ class AdvancedStack(ReferenceStack):
         return self._prediction.with_moving_hits(scan)
 
     def _on_costmaps_updated(self, tick: int, frames: Frames) -> None:
-        """Pass the moving obstacles to collision monitor, controller, and planner, each in its frame."""
+        """Pass the moving obstacles to the collision monitor (base frame) and to both costmaps (odom and map frame)."""
         if self._prediction.is_idle and not self._has_moving_obstacles:
             return
         moving = self._prediction.moving_obstacles_in_frame(tick, ROBOT_FRAME)
@@ -112,7 +118,7 @@ class AdvancedStack(ReferenceStack):
         return command if self._turn_slip is None else self._turn_slip.compensate(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
-        """Make the robot step aside for moving obstacles, and drive back to its position afterward."""
+        """Make the standing robot step aside for moving obstacles, and drive back to its position afterward."""
         command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
         if command == STOP or self._monitor.is_silent(tick):
             self._commands.stop(tick)
@@ -121,10 +127,10 @@ class AdvancedStack(ReferenceStack):
 
 
 class AdvancedStackBuilder(StackBuilder):
-    """Builder of the advanced stack: replaces the plan manager, the clearing policy, and the stack itself."""
+    """Builder of the advanced stack, with its own plan manager and clearing policy."""
 
     def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
-        """Make the plan manager, which predicts obstacles for a robot that drives at the controller's full speed."""
+        """Make the plan manager, for a robot that drives at the controller's full speed."""
         self._full_speed = controller.full_speed  # `make_stack`, which is called later, needs it
         return AdvancedPlanManager(
             self.spec.planner,
@@ -138,11 +144,11 @@ class AdvancedStackBuilder(StackBuilder):
         )
 
     def make_clearing_policy(self) -> ClearingPolicy:
-        """Make the policy for clearing the global costmap."""
+        """Make the policy for clearing the global costmap: ClearEntirely if `recovery.clear_entirely`."""
         return ClearEntirely() if self.spec.recovery.clear_entirely else ClearingBackoff()
 
     def make_stack(self, *parts: Any) -> AdvancedStack:
-        """Make the stack of its components, with motion prediction and compensation of turn slip."""
+        """Make the stack from the components of the reference stack, which are `parts`."""
         surroundings, spec = self.surroundings, self.spec
         prediction = MotionPrediction(
             spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self._full_speed

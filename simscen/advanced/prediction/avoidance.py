@@ -1,10 +1,10 @@
-"""Avoidance of moving obstacles: compares trajectories of the robot with the predicted positions of the obstacles.
+"""Avoidance of moving obstacles by trajectory rollouts, and return of a standing robot to its position.
 
 As long as the controller's trajectory is safe, its command stays. Otherwise, a few hundred trajectories are compared:
-the controller's own at lower speeds, and sequences of two velocities. The main cost is the risk of coming too close.
-Among safe trajectories, progress decides. The robot therefore slows down early, passes behind obstacles, and steps
-aside when it stands. (Trajectory rollouts as in Fox, Burgard, Thrun 1997 and, with moving obstacles, Seder and Petrović
-2007.)
+the controller's trajectory at lower speeds, and sequences of two velocities. Their main cost is the risk of coming too
+close to predicted obstacles. Among safe trajectories, progress decides.
+
+Sources: Fox, Burgard, Thrun 1997; with moving obstacles, Seder and Petrović 2007.
 """
 
 import math
@@ -24,32 +24,32 @@ from simscen.stack.protocols import CostmapView, RobotModel
 MIN_DISTANCE_M = 0.25
 """Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
 DECAY_TIME_S = 1.2
-"""Time ahead in s over which the weight of a predicted event decays by a factor of e."""
+"""Time constant in s of the exponential decay of risk with the time ahead."""
 DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
-"""Weight of a predicted event at each of TIMES."""
+"""Weight of the risk at each of TIMES."""
 APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
-"""Weights of the closest approach to moving obstacles, of a collision with them, and of the mean nearness."""
+"""Weights of the maximum nearness to moving obstacles (1 at contact), of a collision, and of the mean nearness."""
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
 """Weight of a collision with a static obstacle, and the distance in m to keep from it."""
-PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, OTHER_COST = 1.0, 0.15, 0.08, 0.1
+PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, DEVIATION_COST = 1.0, 0.15, 0.08, 0.1
 """Weights of progress, of driving backward, and of a changed command; cost of leaving the controller's trajectory."""
 SAFE_RISK = 0.02
-"""Risk (`Avoidance._risk`) up to which the controller's command stays."""
+"""Maximum risk (`Avoidance._risk`) at which the controller's command stays."""
 RESUME_RISK = 0.01
-"""Risk up to which the controller gets back control after avoidance; less than SAFE_RISK, as a hysteresis."""
+"""Maximum risk at which the controller gets back control after avoidance; less than SAFE_RISK, as a hysteresis."""
 SPEED_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Factors on the controller's speed that are tried on its own trajectory."""
-BATCH_SIZE, ROUNDING = 64, 1e-9
+"""Fractions of the controller's speed that are tried on the controller's trajectory."""
+BATCH_SIZE, ROUNDING_TOLERANCE = 64, 1e-9
 """Number of trajectories that are evaluated together, and the tolerance for rounding errors of costs."""
 MAX_ROUND_DIFFERENCE_M = 0.15
-"""Maximum difference in m of circumscribed and inscribed radius of a robot that is treated as a disc."""
+"""A robot is treated as a disc if its circumscribed and inscribed radius differ by less than this."""
 
 
 class Avoidance:
     """Replaces commands that lead too close to moving obstacles."""
 
     def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
-        """Take the parameters, the robot, and the full speed of its controller in m/s."""
+        """Take the parameters, the robot, and the full speed of the controller in m/s."""
         self._spec, self._robot = spec, robot
         self._speed = max(full_speed, 0.3)
         is_round = robot.circumscribed_radius - robot.inscribed_radius < MAX_ROUND_DIFFERENCE_M
@@ -58,11 +58,11 @@ class Avoidance:
 
     @cached_property
     def _sampler(self) -> TrajectorySampler:
-        """Candidate trajectories; built on first use because most runs do not need them."""
+        """Sampler of candidate trajectories; built on first use because most runs do not need it."""
         return TrajectorySampler(self._robot, self._speed)
 
     def reset(self) -> None:
-        """Forget the last avoidance command, because nothing moves."""
+        """Forget the last avoidance command."""
         self._last = None
 
     def steer(
@@ -75,9 +75,9 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None = None,
     ) -> Twist:
-        """Return a safe command instead of `command`; the same object if it is safe.
+        """Return `command` itself if it is safe, otherwise the first command of the best trajectory.
 
-        All arguments are in one frame. The robot follows `path`; without one, it stays near `home`, or where it is.
+        All arguments are in one frame. A robot without a path stays near `home`, or near `pose` if `home` is None.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON_S)
         if not near.obstacles:
@@ -98,7 +98,7 @@ class Avoidance:
     def _is_surely_safe(
         self, command: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
     ) -> bool:
-        """Return True if a quick check shows that the controller's trajectory stays away from all obstacles."""
+        """Return whether a quick check shows that the controller's trajectory stays away from all moving obstacles."""
         if path is None or len(path) < 2 or command.vx == 0.0:
             return False
         position, speed, deviation = path.position_over_time(pose, twist, command, self._robot)
@@ -114,11 +114,10 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None,
     ) -> Twist:
-        """Return the first command of the trajectory with the lowest cost.
+        """Return the first command of the trajectory with the lowest cost, among `own` and those of the sampler.
 
-        If several have the same cost, the controller's own trajectory is preferred, then the first one of the sampler.
-        Because risk and static costs take long to compute, trajectories are evaluated in the order of their other
-        costs, and only until these alone exceed the lowest total cost.
+        Risk and static costs take long to compute. Sampled trajectories are therefore evaluated in the order of their
+        other costs, until these alone exceed the lowest total cost. At equal costs, `own` comes first.
         """
         fan, goal = self._sampler.sample(pose, twist), self._goal(pose, path, home)
         all_indices = np.arange(len(fan.commands))
@@ -130,14 +129,16 @@ class Avoidance:
         cost = self._cost(own, pose, goal, moving, costmap, min_clearance, 0.0)
         number = int(cost.argmin())
         best, first_command = (float(cost[number]), -1), own.commands[number]
-        base = OTHER_COST + self._change_costs(fan.commands) - PROGRESS_WEIGHT * self._progress(*fan.ends, pose, goal)
-        base += BACKWARD_WEIGHT * self._backward(fan.vx)[fan.speed]
+        base = (
+            DEVIATION_COST + self._change_costs(fan.commands) - PROGRESS_WEIGHT * self._progress(*fan.ends, pose, goal)
+        )
+        base += BACKWARD_WEIGHT * self._backward(fan.vx)[fan.speed_profile]
         order = base.argsort(kind="stable")
         for begin in range(0, len(order), BATCH_SIZE):
             batch = order[begin : begin + BATCH_SIZE]
-            if base[batch[0]] > best[0] + ROUNDING:
+            if base[batch[0]] > best[0] + ROUNDING_TOLERANCE:
                 break
-            cost = self._cost(fan.rollouts(batch), pose, goal, moving, costmap, min_clearance, OTHER_COST)
+            cost = self._cost(fan.rollouts(batch), pose, goal, moving, costmap, min_clearance, DEVIATION_COST)
             lowest = float(cost.min())
             number = int(batch[cost == lowest].min())
             if (lowest, number) < best:
@@ -154,7 +155,7 @@ class Avoidance:
         min_clearance: float,
         extra: float,
     ) -> Array:
-        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles count within `min_clearance` m."""
+        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles closer than `min_clearance` m count."""
         cost = self._risk(rollouts, moving)
         progress = self._progress(rollouts.x[:, -1], rollouts.y[:, -1], pose, goal)
         cost += self._static_costs(rollouts, costmap, min_clearance) - PROGRESS_WEIGHT * progress
@@ -166,13 +167,13 @@ class Avoidance:
     def _own_rollouts(
         self, command: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, fractions: tuple[float, ...]
     ) -> Rollouts:
-        """Return the controller's own trajectory at fractions of its speed."""
+        """Return the controller's trajectory at fractions of its speed."""
         if path is None or len(path) < 2 or command.vx == 0.0:
             return arc(pose, command, fractions if command != STOP else (1.0,))
         return path.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
 
     def _risk(self, rollouts: Rollouts, moving: MovingObstacles) -> Array:
-        """Return the costs (n,) of trajectories for their nearness to moving obstacles."""
+        """Return the risk (n,) of trajectories: weighted nearness to moving obstacles and collisions with them."""
         nearness, touches = self._discs.nearness(moving, rollouts.x, rollouts.y, rollouts.yaw, TIMES, MIN_DISTANCE_M)
         near = np.minimum(np.maximum(nearness, 0.0), 2.0) ** 2 * DECAY
         risk: Array = (
@@ -191,27 +192,27 @@ class Avoidance:
         return cost
 
     def _clearance(self, rollouts: Rollouts, costmap: CostmapView, index: tuple[slice, int | slice]) -> Reals:
-        """Return the distances in m of poses from static obstacles; `index` selects them from arrays (n, times)."""
+        """Return the distances in m from static obstacles of the poses that `index` selects from arrays (n, times)."""
         return np.asarray(self._discs.clearance(costmap, rollouts.x[index], rollouts.y[index], rollouts.yaw[index]))
 
     def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
-        """Return the position that the robot should approach."""
+        """Return the position (x, y) that the robot should approach."""
         if path is not None:
             return path.ahead(pose, self._speed * HORIZON_S)
         return (pose.x, pose.y) if home is None else (home.x, home.y)
 
     def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
-        """Return the progress (n,) of trajectories that end at x and y (n,), relative to full speed."""
+        """Return the progress (n,) toward the goal of trajectories that end at x and y (n,), relative to full speed."""
         before = math.hypot(goal[0] - pose.x, goal[1] - pose.y)
         gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON_S)
         return gain
 
     def _backward(self, vx: Array) -> Array:
-        """Return the mean backward speed (n,) of trajectories with speeds (n, times), relative to full speed."""
+        """Return the mean backward speed (n,) for speeds `vx` (n, times), relative to full speed."""
         return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
 
     def _change_costs(self, commands: Array) -> Array:
-        """Return the costs (n,) of commands (n, 2) for differing from the previous command."""
+        """Return the costs (n,) of the difference between commands (n, 2: vx, wz) and the previous command."""
         if self._last is None:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
@@ -219,19 +220,22 @@ class Avoidance:
 
 
 ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
-"""Distance in m and angle in rad within which the robot has returned to its stand position."""
+"""Distance and angle within which the robot has returned to its stand position."""
 RETURN_DISTANCE_M = 0.15
-"""Distance in m from its stand position at which the robot starts to return."""
-RETURN_SPEED_RATIO, RETURN_GAIN = 0.3, 1.0
-"""Maximum speed of returning relative to full speed, and gain in 1/s of the speed on the distance."""
+"""Distance from its stand position at which the robot starts to return."""
+RETURN_SPEED_RATIO, RETURN_GAIN_PER_S = 0.3, 1.0
+"""Maximum speed of returning relative to full speed, and ratio of the speed in m/s to the distance in m."""
 RETURN_TURN_RATE_RAD_S = 1.0
 """Maximum turn rate of returning."""
 MAX_BEARING_RAD = 0.4
-"""Angle in rad between the heading and the way back above which the robot turns in place first."""
+"""Angle between the heading and the direction of return above which the robot turns in place first."""
 
 
 class StandPosition:
-    """Pose to which a standing robot returns after it has stepped aside: in a straight line, then by turning."""
+    """Pose to which a standing robot returns after it has stepped aside.
+
+    The robot drives there in a straight line and then turns to the heading of the pose.
+    """
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
@@ -244,17 +248,17 @@ class StandPosition:
         self._is_away = False
 
     def clear(self) -> None:
-        """Forget the pose, because the robot drives."""
+        """Forget the pose."""
         self._home, self._is_away = None, False
 
     def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
-        """Return the stand position: the robot's pose when an obstacle first moved. None if none has moved yet."""
+        """Return the stand position, which is set to `pose` when an obstacle first moves. None before that."""
         if self._home is None and has_moving_obstacles:
             self._home = pose
         return self._home
 
     def return_command(self, pose: Pose2) -> Twist:
-        """Return the command to drive back; STOP at the stand position, and for a robot that cannot turn in place."""
+        """Return the command that drives back. STOP at the stand position, or if the robot cannot turn in place."""
         home = self._home
         if home is None or not self._can_turn_in_place:
             return STOP
@@ -266,7 +270,7 @@ class StandPosition:
         bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
         sign = -1.0 if abs(bearing) > math.pi / 2 and self._can_reverse else 1.0
         deviation = wrap(bearing + math.pi) if sign < 0 else bearing
-        speed = min(self._speed, RETURN_GAIN * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
+        speed = min(self._speed, RETURN_GAIN_PER_S * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
         return Twist(sign * speed, 0.0, self._turn_rate(deviation))
 
     def _turn_rate(self, angle: float) -> float:

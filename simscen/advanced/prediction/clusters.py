@@ -1,6 +1,7 @@
-"""Clusters of a scan: neighboring beams that hit the same obstacle, and the cylinder that fits them.
+"""Clusters of a scan: successive hits on the same obstacle, and the cylinder that fits them.
 
-Hits that are close together form a segment. A segment is divided into clusters where two adjacent obstacles meet.
+A segment consists of successive hits that are close together. A segment of two adjacent obstacles is divided into two
+clusters.
 """
 
 import cmath
@@ -15,36 +16,36 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array
 
 MAX_GAP_M, MAX_GAP_BEAMS = 0.15, 2.5
-"""Maximum distance between hits of one cluster: in m, or as a multiple of the beam spacing."""
+"""Maximum distance between successive hits of a segment: in m, or as a multiple of the beam spacing."""
 MAX_MISSED_BEAMS = 2
-"""Maximum number of consecutive beams without a hit within a cluster."""
+"""Maximum number of consecutive beams without a hit within a segment."""
 MIN_RISE_M = 0.1
-"""Two adjacent obstacles are separated if the range rises by more than this in m between them."""
+"""A segment is divided at a local maximum of the range that exceeds the minima on both sides by more than this."""
 BOTH_EDGES = 2
 """Number of visible edges of a completely visible obstacle."""
 SEGMENT_OFFSET_M = 1e3
-"""Offset in m between segments, to process all of them in one array without mixing them. Larger than any range."""
+"""Offset added from segment to segment, to process all segments in one array. Larger than any range."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Largest half of the angle that a cluster covers, in rad, for computing its radius, which is infinite at 90°."""
+"""Maximum half of the angle that a cluster covers, for computing its radius, which is infinite at 90°."""
 MIN_HITS = 3
 """Minimum number of hits of a cluster."""
 ROUNDING_M = 1e-6
-"""Tolerance in m for rounding."""
+"""Tolerance in m for rounding errors."""
 MAX_ITERATIONS, CONVERGED_STEP_M = 4, 3e-3
 """Maximum number of Gauss-Newton iterations of `fit_circle`, and the step in m below which they end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 Points = npt.NDArray[np.complex128]
-"""Points (n,) as complex numbers x + iy, so that a rotation is one multiplication."""
+"""Points (n,) as complex numbers x + iy in m."""
 
 
 @fast_dataclass(eq=False)
 class Hits:
-    """The m hits of a scan in order: indices of their `beams`, their `ranges`, and `points`, each (m,).
+    """The m hits of a scan in order: indices of their `beams`, their `ranges`, and their `points`, each (m,).
 
-    Two successive hits belong together if their distance is at most MAX_GAP_M or `gap_ratio` times the range,
-    whichever is larger.
+    The maximum distance between successive hits of a segment is MAX_GAP_M or `gap_ratio` times the range, whichever is
+    larger.
     """
 
     beams: Indices
@@ -53,9 +54,9 @@ class Hits:
     gap_ratio: float
 
     def may_share_segment(self, indices: list[int], count: int) -> bool:
-        """Return False if no segment can contain `count` of the hits with these indices, which must ascend.
+        """Return whether one segment may contain `count` of the hits with these ascending indices.
 
-        This is a fast check before the segments are computed.
+        This is a fast check before the segments are computed. Only the result False is certain.
         """
         linked = 1
         for one, other in pairwise(indices):
@@ -65,7 +66,7 @@ class Hits:
         return False
 
     def _may_link_next(self, hit: int) -> bool:
-        """Return whether this hit is close enough to the next one to be in the same segment. Uses scalars for speed."""
+        """Return whether the hit with this index is close enough to the next one to be in the same segment."""
         point, next_point = self.points.item(hit), self.points.item(hit + 1)
         near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
         return abs(next_point - point) <= max(self.gap_ratio * near, MAX_GAP_M) + ROUNDING_M
@@ -73,23 +74,23 @@ class Hits:
 
 @fast_dataclass(eq=False)
 class Segments:
-    """Hits divided into segments of neighbors close together. Segment k contains the hits `first[k]` … `last[k]`."""
+    """Hits divided into segments. Segment k contains the hits `first[k]` … `last[k]`."""
 
     hits: Hits
     first: Indices
     last: Indices
 
     def share_segment(self, mask: Mask, count: int) -> bool:
-        """Return whether at least `count` (more than one) of the hits in the mask (m,) are in one segment."""
+        """Return whether one segment contains at least `count` of the hits in the mask (m,); `count` is at least 2."""
         numbers = self.first.searchsorted(mask.nonzero()[0], side="right")
         return bool((numbers[count - 1 :] == numbers[: 1 - count]).any())
 
 
 class Cluster(NamedTuple):
-    """Cluster of the hits `first` … `last` of a scan, in the lidar frame.
+    """The hits `first` … `last` of a scan, and the cylinder with the same angular width and the same nearest range.
 
-    `center` (x + iy) and `radius` in m are those of the cylinder that covers the same angle at the same distance.
-    `edges` is the number of its ends that are visible, i.e. not hidden by a closer obstacle or the end of the scan.
+    `center` (x + iy) and `radius` of the cylinder are in m, in the lidar frame. `edges` is the number of visible ends
+    (0, 1, or 2). An end is not visible if a closer obstacle or the end of the scan may hide it.
     """
 
     first: int
@@ -105,16 +106,16 @@ class Cluster(NamedTuple):
 
 
 def find_valid_hits(ranges: Array, points: Points, step: float, min_range: float, max_range: float) -> Hits:
-    """Return the hits of a scan with ranges between `min_range` and `max_range` in m.
+    """Return the hits of a scan with ranges (n,) between `min_range` and `max_range` in m.
 
-    `points` (n,) are the ends of all n beams, which are `step` rad apart.
+    `points` (n,) are the endpoints of the beams; `step` is the angle between two beams in rad.
     """
     beams = ((ranges >= min_range) & (ranges <= max_range)).nonzero()[0]
     return Hits(beams, ranges[beams], points[beams], MAX_GAP_BEAMS * abs(step))
 
 
 def divide_into_segments(hits: Hits) -> Segments:
-    """Divide hits into segments. The first and the last segment of a full circle are not joined."""
+    """Return the segments of the hits. The first and the last segment of a full circle are not joined."""
     beams, ranges, points = hits.beams, hits.ranges, hits.points
     gap = np.minimum(ranges[1:], ranges[:-1])
     gap *= hits.gap_ratio
@@ -125,9 +126,9 @@ def divide_into_segments(hits: Hits) -> Segments:
 
 
 def find_clusters(segments: Segments, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
-    """Return the clusters with a radius up to `max_radius` in m, of a scan with these segments and ranges (n,).
+    """Return the clusters of a scan whose radius is at most `max_radius` in m.
 
-    The first beam points along `start`; beams are `step` rad apart.
+    `ranges` (n,) are those of all beams. The first beam points along `start`; beams are `step` rad apart.
     """
     spacing = abs(step)
     hits = segments.hits
@@ -153,7 +154,7 @@ def find_clusters(segments: Segments, ranges: Array, start: float, step: float, 
 
 
 def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> bool:
-    """Return whether a cluster has a visible edge at `beam`: the beam `neighbor` next to it has a longer range."""
+    """Return whether a cluster has a visible edge at `beam`, because the beam `neighbor` beyond it is longer."""
     if not 0 <= neighbor < len(ranges):
         if not is_full_circle:
             return False
@@ -162,13 +163,13 @@ def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> 
 
 
 def count_marked_hits(found: list[Cluster], mask: Mask) -> list[tuple[int, int]]:
-    """Return for each cluster how many of its hits are True in `mask` (m,), and how many hits it has."""
+    """Return the number of hits that are True in `mask` (m,), and the number of all hits, for each cluster."""
     marks = mask.tobytes()
     return [(marks.count(1, first, last + 1), last + 1 - first) for first, last, *_ in found]
 
 
 def _segments_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
-    """Return the first and last hits of the segments of `count` hits, which end at `breaks` (k,) and at the end."""
+    """Return the first and the last hit of each segment of `count` hits; segments end at the hits `breaks` (k,)."""
     if not count:
         return breaks, breaks
     first, last = np.zeros(len(breaks) + 1, np.int64), np.empty(len(breaks) + 1, np.int64)
@@ -178,10 +179,9 @@ def _segments_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
 
 
 def _split_segments(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
-    """Return the first and last hits of clusters: segments, divided where two adjacent obstacles meet.
+    """Return the first and the last hit of each cluster, by dividing segments at local maxima of the range.
 
-    Along one convex obstacle, the range falls to its closest point and then rises. A local maximum of the range
-    therefore separates two obstacles.
+    Along one convex obstacle, the range falls to the closest point and then rises. A maximum separates two obstacles.
     """
     # All segments are processed at once. An offset that increases from segment to segment keeps them independent.
     count = last - first + 1
@@ -199,7 +199,7 @@ def _split_segments(ranges: Array, first: Indices, last: Indices) -> tuple[list[
 
 
 def _split_segment(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the parts of one segment, in order."""
+    """Return the first and the last hit of each cluster of one segment."""
     pending = [(begin, end)]
     parts: list[tuple[int, int]] = []
     while pending:
@@ -217,9 +217,9 @@ def _split_segment(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]
 
 
 def fit_circle(arc: list[complex], radius: float, center: complex) -> complex:
-    """Return the center of the circle with this radius that fits the points `arc` (x + iy) best.
+    """Return the center (x + iy) of the circle with this radius that fits the points `arc` (x + iy) best.
 
-    `center` is the initial guess. Computed with scalars, because a dozen points are too few for arrays.
+    `center` is the initial guess.
     """
     half = 0.52 * len(arc)  # slightly damped, because a short arc does not determine the lateral position
     for _ in range(MAX_ITERATIONS):

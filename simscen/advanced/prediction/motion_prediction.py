@@ -1,7 +1,7 @@
 """Motion prediction: tracks moving obstacles in the scans of each lidar, and avoids them.
 
-Scans are compared in a frame of wheel odometry with the gyroscope's heading. With the heading of skidding wheels,
-everything would seem to rotate around the robot and to move.
+Scans are compared in an odom frame that combines the distance of the wheels with the heading of the gyroscope. With the
+heading of skidding wheels, everything would seem to rotate around the robot.
 """
 
 import math
@@ -29,7 +29,10 @@ MAX_PENDING = 10_000
 
 
 class GyroOdometry:
-    """Integrates wheel odometry along the gyroscope's heading. To save time, only when a pose is requested."""
+    """Odometry with the distance of the wheels and the heading of the gyroscope.
+
+    Readings are integrated when a pose is requested, to save time.
+    """
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -40,7 +43,7 @@ class GyroOdometry:
         self._poses = deque([(-1, 0.0, 0.0, 0.0)])
         self._now = _pose(self._poses[-1])
         self.add: Callable[[Odometry | Imu], None] = self._pending.append
-        """Add a reading. It is called so often that it does nothing else."""
+        """Add a reading."""
 
     @property
     def now(self) -> Pose2:
@@ -49,7 +52,7 @@ class GyroOdometry:
         return self._now
 
     def at(self, tick: int) -> Pose2:
-        """Return the latest pose up to a tick; if all are later, the oldest pose."""
+        """Return the latest pose up to a tick; the oldest stored pose if all are later."""
         self._integrate()
         poses = self._poses
         if poses[-1][0] <= tick:
@@ -93,15 +96,14 @@ def _pose(entry: tuple[int, float, float, float]) -> Pose2:
 
 
 WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
-"""Time after the first scan in which obstacles cannot be tracked yet, and the speed limit during that time: Nav2's
-usual speed, at which the robot can still stop for obstacles."""
+"""Time after the first scan in which obstacles cannot be tracked yet, and the speed limit during this time."""
 
 
 class MotionPrediction:
-    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of GyroOdometry.
+    """Moving obstacles around the robot, and commands that avoid them.
 
-    While the robot drives, `steer` changes its commands. While it stands, `stand` lets it step aside and drive back to
-    its position, unless `hold` was called. `on_drive` ends standing.
+    While the robot drives, `steer` changes its commands. While the robot stands, `stand` lets it step aside and drive
+    back to its position, unless `hold` was called. `on_drive` ends standing.
     """
 
     def __init__(
@@ -125,7 +127,7 @@ class MotionPrediction:
         self.add_reading = self._odometry.add
         """Process an odometry or IMU reading."""
         self.is_idle = not self._trackers
-        """Whether no obstacle moves and the warm-up is over, so that no command is changed."""
+        """Whether no obstacle moves and the warm-up is over, so that `steer` changes no command."""
 
     def on_scan(self, scan: Scan) -> None:
         """Update the tracks of the lidar that took a scan."""
@@ -145,7 +147,7 @@ class MotionPrediction:
             self._avoidance.reset()
 
     def with_moving_hits(self, scan: Scan) -> Scan:
-        """Return the scan with flags at hits on moving obstacles, so that costmaps do not mark these obstacles."""
+        """Return the scan with flags at hits on moving obstacles, which costmaps do not mark."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.moving_hits is None or tracker.tick != scan.tick:
             return scan
@@ -178,7 +180,7 @@ class MotionPrediction:
     def steer(
         self, tick: int, command: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
     ) -> Twist:
-        """Return a safe command instead of `command`. `pose`, `costmap`, and `plan` are in the same frame."""
+        """Return `command`, or a command that avoids moving obstacles. `pose`, `costmap`, and `plan` share a frame."""
         if not self._active:
             return command if self.is_idle else _limit_speed(command)
         if plan is not self._plan:
@@ -197,7 +199,7 @@ class MotionPrediction:
         self._must_stay = self.is_standing = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command for a standing robot, which steps aside for obstacles and then drives back."""
+        """Return the command for a standing robot: step aside for moving obstacles, or drive back, or stop."""
         self.is_standing = True
         if self._must_stay:
             return STOP

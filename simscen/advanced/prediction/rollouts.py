@@ -1,4 +1,4 @@
-"""Candidate trajectories of the robot for the next seconds: along its path, or by sequences of two velocities."""
+"""Candidate trajectories of the robot for the next HORIZON_S: along its path, or with sequences of two velocities."""
 
 import math
 from bisect import bisect_right
@@ -21,11 +21,11 @@ SPEED_RATIOS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
 """First turn rates relative to the maximum, in both directions."""
 SECOND_SPEED_RATIOS = (0.0, 0.5, 1.0)
-"""Second speeds relative to full speed, each without a turn and with the opposite of the first turn rate."""
+"""Second speeds relative to full speed. The second turn rate is 0 or the opposite of the first one."""
 MAX_TURN_RATE_RAD_S = 3.0
 """Maximum turn rate of candidates."""
 RETURN_TIME_S = 0.7
-"""Approximate time constant in s with which a controller returns to its path."""
+"""Approximate time constant with which a controller returns to its path."""
 
 TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * STEP_S
 """Times in s of the points of a trajectory."""
@@ -33,7 +33,7 @@ TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * S
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories (n, times): positions, headings, and speeds at TIMES; and their first commands (n, 2) vx, wz."""
+    """Trajectories: positions, headings, and speeds at TIMES, each (n, times), and first commands (n, 2: vx, wz)."""
 
     x: Array
     y: Array
@@ -43,7 +43,7 @@ class Rollouts:
 
 
 class TrajectorySampler:
-    """Computes trajectories for all sequences of two velocities, reached with the accelerations of the robot."""
+    """Sampler of trajectories with all sequences of two velocities, within the acceleration limits of the robot."""
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
@@ -65,9 +65,9 @@ class TrajectorySampler:
             )
             sequences = sequences[is_possible]
         self.commands: Array = sequences[:, :2]
-        """First command (n, 2) vx, wz of each trajectory."""
-        self._speeds, self._speed = np.unique(sequences[:, (0, 2, 3)], axis=0, return_inverse=True)
-        self._turns, self._turn = np.unique(sequences[:, (1, 2, 4)], axis=0, return_inverse=True)
+        """First command (n, 2: vx, wz) of each trajectory."""
+        self._speeds, self._speed_profile = np.unique(sequences[:, (0, 2, 3)], axis=0, return_inverse=True)
+        self._turns, self._turn_profile = np.unique(sequences[:, (1, 2, 4)], axis=0, return_inverse=True)
 
     def sample(self, pose: Pose2, twist: Twist) -> "TrajectoryFan":
         """Return all trajectories that start at this pose and velocity."""
@@ -78,15 +78,19 @@ class TrajectorySampler:
         wz = _ramp(twist.wz, first, duration, then, robot.angular_acceleration, robot.angular_acceleration)
         yaw = pose.yaw + np.cumsum(wz, axis=1) * STEP_S
         middle = yaw - 0.5 * STEP_S * wz
-        return TrajectoryFan(pose, vx, yaw, np.cos(middle), np.sin(middle), self._speed, self._turn, self.commands)
+        profiles = self._speed_profile, self._turn_profile
+        return TrajectoryFan(pose, vx, yaw, np.cos(middle), np.sin(middle), *profiles, self.commands)
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryFan:
-    """Trajectories (n,), each with the index of its speed profile (`speed`) and of its turn profile (`turn`).
+    """Trajectories from one pose, as combinations of k speed profiles and m turn profiles.
 
-    A speed profile has speeds `vx` (k, times). A turn profile has headings `yaw`, and the cosines and sines of the
-    headings in the middle of each time step (m, times).
+    vx (k, times):                speeds of the speed profiles
+    yaw (m, times):               headings of the turn profiles
+    cosine, sine (m, times):      of the headings in the middle of each time step
+    speed_profile, turn_profile:  indices (n,) of the profiles of each trajectory
+    commands (n, 2):              first command (vx, wz) of each trajectory
     """
 
     pose: Pose2
@@ -94,28 +98,31 @@ class TrajectoryFan:
     yaw: Array
     cosine: Array
     sine: Array
-    speed: npt.NDArray[np.intp]
-    turn: npt.NDArray[np.intp]
+    speed_profile: npt.NDArray[np.intp]
+    turn_profile: npt.NDArray[np.intp]
     commands: Array
 
     @property
     def ends(self) -> tuple[Array, Array]:
-        """Final x and y (n,); they differ from those of `rollouts` by rounding errors at most."""
-        speed, turn, (x, y, _) = self.speed, self.turn, self.pose
+        """Final x and y (n,) of the trajectories."""
+        speed, turn, (x, y, _) = self.speed_profile, self.turn_profile, self.pose
         along, aside = self.vx @ self.cosine.T, self.vx @ self.sine.T
         return x + along[speed, turn] * STEP_S, y + aside[speed, turn] * STEP_S
 
     def rollouts(self, indices: npt.NDArray[np.intp], steps: int = len(TIMES)) -> Rollouts:
         """Return the trajectories with these indices (k,), for the first `steps` time steps."""
-        window, turn = np.s_[:, :steps], self.turn[indices]
-        vx = self.vx[window][self.speed[indices]]
+        window, turn = np.s_[:, :steps], self.turn_profile[indices]
+        vx = self.vx[window][self.speed_profile[indices]]
         x = self.pose.x + np.cumsum(vx * self.cosine[window][turn], axis=1) * STEP_S
         y = self.pose.y + np.cumsum(vx * self.sine[window][turn], axis=1) * STEP_S
         return Rollouts(x, y, self.yaw[window][turn], vx, self.commands[indices])
 
 
 def _ramp(now: float, first: Array, duration: Array, then: Array, acceleration: float, deceleration: float) -> Array:
-    """Return velocities (n, times) that change from `now` to `first` (n, 1), and after `duration` seconds to `then`."""
+    """Return velocities (n, times) that change from `now` to `first` (n, 1), and after `duration` in s to `then`.
+
+    The rates of change are limited by `acceleration` and `deceleration`.
+    """
     up = np.where(np.abs(first) >= abs(now), acceleration, deceleration)
     before = now + np.clip(first - now, -up * np.minimum(TIMES, duration), up * np.minimum(TIMES, duration))
     change = np.where(np.abs(then) >= np.abs(before), acceleration, deceleration) * np.maximum(TIMES - duration, 0.0)
@@ -138,7 +145,7 @@ class FollowedPath:
         return len(self._x)
 
     def nearest(self, pose: Pose2) -> int:
-        """Return the index of the point nearest to a pose."""
+        """Return the index of the path's point nearest to a pose."""
         dx, dy = self._x - pose.x, self._y - pose.y
         dx *= dx
         dy *= dy
@@ -146,7 +153,7 @@ class FollowedPath:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Return the first point, from the nearest one on, that is `reach` m away from a pose, or the last point."""
+        """Return the first point (x, y) after the nearest one that is `reach` m away from a pose, or the last point."""
         nearest = self.nearest(pose)
         beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= reach
         number = nearest + int(beyond.argmax()) if beyond.any() else -1
@@ -161,9 +168,9 @@ class FollowedPath:
         robot: RobotModel,
         with_headings: bool,
     ) -> Rollouts:
-        """Return the trajectories of a controller that follows the path, at fractions of the commanded speed.
+        """Return the trajectories of a controller that follows the path, at `fractions` of the commanded speed.
 
-        A robot that first turns in place counts as standing. Headings are 0 unless `with_headings`, to save time.
+        Headings are computed only `with_headings`; otherwise, they are 0.
         """
         nearest, along = self.nearest(pose), self._along
         scale = np.array(fractions)[:, None]
@@ -181,9 +188,10 @@ class FollowedPath:
     def position_over_time(
         self, pose: Pose2, twist: Twist, command: Twist, robot: RobotModel
     ) -> tuple[Callable[[float], complex], float, float]:
-        """Return the position (x + iy) at the commanded speed as a continuous function of the time in s.
+        """Return a function from the time in s to the position (x + iy) at the commanded speed.
 
-        Also return its maximum speed in m/s, and its maximum distance in m from `rollouts`, which integrates in steps.
+        Also return the maximum speed in m/s, and the maximum distance in m from the positions in `rollouts`, which are
+        integrated in time steps.
         """
         nearest, now, then = self.nearest(pose), twist.vx, command.vx
         rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration
@@ -208,7 +216,7 @@ class FollowedPath:
         return points[after - 1] + part * (points[after] - points[after - 1])
 
     def _headings(self, arc_lengths: Array, nearest: int, backward: bool) -> Array:
-        """Return the headings (…,) at lengths along the path, from the point `nearest` on."""
+        """Return the headings (…,) of the path at arc lengths in m, without the part before the point `nearest`."""
         along, x, y = self._along, self._x, self._y
         later = np.minimum(arc_lengths + 0.1, along[-1])
         before = np.maximum(later - 0.2, along[nearest])
@@ -220,7 +228,7 @@ class FollowedPath:
 
 
 def arc(pose: Pose2, command: Twist, fractions: tuple[float, ...]) -> Rollouts:
-    """Return the trajectories of a constant command at fractions of its velocity, for a robot without a path."""
+    """Return the trajectories of a constant command at `fractions` of its velocity, for a robot without a path."""
     scale = np.array(fractions)[:, None]
     vx, wz = scale * command.vx + 0.0 * TIMES, scale * command.wz + 0.0 * TIMES
     yaw = pose.yaw + wz * TIMES

@@ -1,8 +1,7 @@
 """Tracking of moving obstacles in the scans of one lidar.
 
-A cluster that appears in formerly free space starts a track. Later clusters near the predicted position update the
-track. A track with a significant speed over some updates counts as moving. A track without updates ends: soon if its
-position is visible, later if it is hidden.
+A cluster of hits that appears in formerly free space starts a track. Later clusters near the predicted position update
+the track. A track with a significant speed over some updates counts as moving.
 """
 
 import math
@@ -31,25 +30,25 @@ from simscen.model.guards import Prediction
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
 
 CENTER_STD_M, CENTER_STD_PER_M, HIDDEN_STD_M = 0.02, 0.004, 0.10
-"""Standard deviation in m of a measured center: constant part, part per meter of range, and part if partly hidden."""
+"""Standard deviation of a measured center: a constant, a part per meter of range, and a part if it is partly hidden."""
 INITIAL_STD_M = 0.1
-"""Additional standard deviation in m of the first measurement of a track."""
+"""Additional standard deviation of the first measurement of a track."""
 GATE_M, GATE_SIGMAS = 0.25, 3.0
-"""Maximum distance from a track to a cluster that updates it: a part in m plus a number of standard deviations."""
+"""Maximum distance between a track and a cluster that updates it: a constant plus a number of standard deviations."""
 MIN_START_RADIUS_M = 0.15
-"""Minimum radius in m of a cluster that starts a track without having appeared in free space."""
+"""Minimum radius of a cluster that starts a track outside formerly free space."""
 MIN_HIDDEN_RADIUS_M = 0.3
-"""Minimum radius in m of a partly hidden cluster that starts a track: that of a person."""
+"""Minimum radius of a new track whose cluster is partly hidden: that of a person."""
 RADIUS_GAIN = 0.3
-"""Gain of the radius update with a completely visible cluster."""
+"""Gain of the update of a track's radius by a completely visible cluster."""
 
 
 @fast_dataclass(eq=False)
 class ScanClusters:
-    """The clusters of a scan with their hits `points` (m,), measured by a lidar at `lidar` in the odom frame.
+    """The clusters of a scan, all its hits `points` (m,) in the lidar frame, and the lidar's pose in the odom frame.
 
-    For each cluster, `appeared` states whether an earlier scan saw free space there, and `was_occupied` whether it hit
-    something there.
+    For each cluster, `appeared` states whether it is in formerly free space, and `was_occupied` whether an earlier scan
+    hit something there.
     """
 
     tick: int
@@ -65,7 +64,7 @@ class ScanClusters:
 
 
 def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
-    """Update each track with a cluster nearby, nearest pairs first. Return the indices of the clusters used."""
+    """Update each track with a nearby cluster, nearest pairs first. Return the indices of the used clusters."""
     clusters, lidar = current.clusters, current.lidar
     if not tracks or not clusters:
         return set()
@@ -92,12 +91,12 @@ def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
 
 
 def _is_last_cluster(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
-    """Return whether a static cluster is where the track was updated last, so that it is the tracked obstacle."""
+    """Return whether a static cluster is where the track was updated last. `hidden` is added to GATE_M."""
     return abs(lidar.to_lidar(track.updates[-1].position) - center) <= GATE_M + hidden
 
 
 def _update(assigned: list[tuple[Track, int]], current: ScanClusters) -> None:
-    """Update tracks with their clusters."""
+    """Update each track with the cluster of the given index."""
     lidar = current.lidar
     for track, number in assigned:
         first, last, guess, radius, edges = current.clusters[number]
@@ -114,7 +113,10 @@ def _update(assigned: list[tuple[Track, int]], current: ScanClusters) -> None:
 
 
 def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> None:
-    """Start tracks for clusters not in `used` that are in formerly free space, or large while something moves."""
+    """Start tracks for clusters that are not in `used`, if they are in formerly free space.
+
+    While something moves, clusters with MIN_START_RADIUS_M start tracks elsewhere, too.
+    """
     # While something moves, it may have hidden the free space in which another obstacle appears.
     min_radius = MIN_START_RADIUS_M if any(track.is_moving for track in tracks) else math.inf
     for number, (_, _, center, radius, edges) in enumerate(current.clusters):
@@ -132,13 +134,13 @@ def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> 
 
 
 CHECKED_BEAMS = 120
-"""Number of beams that are checked while nothing moves; if one of them hits something new, all beams are."""
+"""Approximate number of beams that are checked while there are no tracks. If one has a new hit, all beams are used."""
 MIN_NEW_SHARE, MIN_NEW_HITS = 0.3, 3
-"""Minimum share and number of new hits of a cluster that starts a track."""
+"""Minimum share and number of a cluster's hits in formerly free space for `appeared`."""
 STATIC_SHARE = 0.5
-"""A cluster is static if an earlier scan also has more than this share of its hits."""
+"""Minimum share of a cluster's hits where an earlier scan hit something, for `was_occupied`."""
 MIN_RADIUS_M = 0.25
-"""Minimum radius in m of a moving obstacle. The lidar may see only the mast of a robot or the leg of a person."""
+"""Minimum radius of a moving obstacle. The lidar may see only the mast of a robot or the leg of a person."""
 
 
 class Tracker:
@@ -163,11 +165,11 @@ class Tracker:
 
     @property
     def has_moving_obstacles(self) -> bool:
-        """Whether there are moving obstacles."""
+        """Whether `moving` is not empty."""
         return self.moving is not self._no_obstacles
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
-        """Process a scan that was taken with the base at `odometry`."""
+        """Process a scan that was taken with the base at `odometry` in the odom frame."""
         lidar = odometry.compose(scan.mount)
         if len(self._directions) != len(scan.ranges):
             self._set_directions(scan)
@@ -184,13 +186,13 @@ class Tracker:
         self._memory.add(scan, lidar)
 
     def _set_directions(self, scan: Scan) -> None:
-        """Compute the directions of the beams, and of those that are checked while nothing moves."""
+        """Compute the directions of all beams, and of the CHECKED_BEAMS."""
         self._stride = max(1, len(scan.ranges) // CHECKED_BEAMS)
         self._directions = np.exp(1j * scan.angles())
         self._checked_directions = self._directions[:: self._stride].copy()
 
     def _has_new_hit(self, scan: Scan, lidar: Pose2, earlier: EarlierScan) -> bool:
-        """Return whether one of the checked beams hits something new."""
+        """Return whether one of the CHECKED_BEAMS hits something in formerly free space."""
         ranges = scan.ranges[:: self._stride]
         comparison = earlier.compare(_ends(ranges, self._checked_directions), lidar)
         is_new = comparison.was_free()
@@ -218,7 +220,7 @@ class Tracker:
             self._update_moving(moving, current)
 
     def _compare_clusters(self, current: CurrentScan) -> ScanClusters | None:
-        """Compare the clusters of a scan with an earlier scan; None if there is no track and none can start."""
+        """Return the clusters, compared with an earlier scan. None if there is no track and none can start."""
         scan, earlier, tracks = current.scan, current.earlier, self._tracks
         hits = find_valid_hits(scan.ranges, current.ends, scan.angle_increment, scan.range_min, self._max_range(scan))
         comparison = (
@@ -248,12 +250,12 @@ class Tracker:
         return hits.may_share_segment(indices, MIN_NEW_HITS)
 
     def _starts_track(self, segments: Segments, new_hits: Mask) -> bool:
-        """Return whether enough hits of a segment are new, including one of the checked beams."""
+        """Return whether enough hits of a segment are new, including one of the CHECKED_BEAMS."""
         checked = segments.hits.beams[new_hits] % self._stride == 0
         return segments.share_segment(new_hits, MIN_NEW_HITS) and bool(checked.any())
 
     def _update_moving(self, moving: list[Track], current: CurrentScan) -> None:
-        """Update `moving` and `moving_hits`."""
+        """Update the attributes `moving` and `moving_hits` with the moving tracks."""
         scan, ends, lidar = current.scan, current.ends, current.lidar
         obstacles = [
             MovingObstacle(
@@ -274,6 +276,6 @@ class Tracker:
 
 
 def _ends(ranges: Array, directions: Points) -> Points:
-    """Return the ends of beams (n,); beams without a valid range end farther away than any range of a lidar."""
+    """Return the endpoints of beams (n,). Beams without a valid range end farther away than any range of a lidar."""
     ends: Points = np.fmin(np.abs(ranges), 2 * NO_HIT_RANGE_M) * directions  # the range of too close beams is -inf
     return ends

@@ -1,8 +1,8 @@
-"""Tracks of obstacles, each a Kalman filter with a constant-velocity model, and the decision which tracks move or end.
+"""Tracks of obstacles as Kalman filters with a constant-velocity model, and rules for moving and ended tracks.
 
-The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). The results are
-those of filterpy's KalmanFilter with Q_discrete_white_noise. Because noise and measurements are isotropic, position and
-velocity are complex numbers, and three values replace the covariance (4, 4).
+The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). Because noise
+and measurements are isotropic, position and velocity are complex numbers, and three values replace the covariance
+(4, 4).
 """
 
 import math
@@ -17,7 +17,7 @@ from simscen.model.guards import Prediction
 
 @dataclass(slots=True)
 class ConstantVelocityFilter:
-    """Position (m) and velocity (m/s) of a point as x + iy, with variances and covariance along any axis."""
+    """Position (m) and velocity (m/s) of a point as x + iy, with their variances and covariance along any axis."""
 
     position: complex
     velocity: complex
@@ -26,7 +26,7 @@ class ConstantVelocityFilter:
     velocity_variance: float
 
     def predict(self, seconds: float, acceleration: float) -> None:
-        """Predict the state after `seconds`; `acceleration` is the standard deviation in m/s² along each axis."""
+        """Predict the state after `seconds`; `acceleration` is its standard deviation in m/s² along each axis."""
         noise, drift = (acceleration * seconds) ** 2, self.velocity_variance * seconds
         self.position += self.velocity * seconds
         self.variance += seconds * (2.0 * self.covariance + drift) + 0.25 * seconds * seconds * noise
@@ -34,7 +34,7 @@ class ConstantVelocityFilter:
         self.velocity_variance += noise
 
     def correct(self, measured: complex, std: float) -> None:
-        """Correct the state with a measured position, with its standard deviation in m along each axis."""
+        """Correct the state with a measured position (x + iy) and its standard deviation in m along each axis."""
         innovation, noise = measured - self.position, std * std
         remaining, gain = noise / (self.variance + noise), self.covariance / (self.variance + noise)
         self.position, self.velocity = measured - remaining * innovation, self.velocity + gain * innovation
@@ -52,9 +52,10 @@ INITIAL_SPEED_STD_M_S = 1.5
 class Update(NamedTuple):
     """Update of a track with a cluster of hits.
 
-    `appeared` is True if enough of the hits are in formerly free space, through which beams of earlier scans passed.
-    `was_occupied` is True if most of them are where an earlier scan also hit something. Both can be True.
-    `std` is the standard deviation in m of the position along any axis; `edges` is the number of visible edges.
+    std:           standard deviation in m of the position (x + iy) along any axis
+    appeared:      whether enough hits are in formerly free space, through which beams of an earlier scan passed
+    was_occupied:  whether most hits are where the earlier scan also hit something; possible together with `appeared`
+    edges:         number of visible edges of the cluster
     """
 
     tick: int
@@ -67,9 +68,9 @@ class Update(NamedTuple):
 
 @dataclass(slots=True)
 class Track(ConstantVelocityFilter):
-    """Tracked obstacle with its `radius` in m, its first position, and its last updates.
+    """Tracked obstacle with its radius in m, its first position (x + iy), and its last updates.
 
-    `last_fast_tick` is the last tick at which it was faster than the minimum speed of moving obstacles.
+    `last_fast_tick` is the last tick at which the track was faster than the minimum speed of moving obstacles.
     """
 
     radius: float
@@ -79,15 +80,15 @@ class Track(ConstantVelocityFilter):
     is_moving: bool = False
     """Whether the obstacle is moving now."""
     has_moved: bool = False
-    """Whether the obstacle has been moving at any time."""
+    """Whether the obstacle has ever been moving."""
     updates_outside_free_space: int = 0
-    """Number of consecutive updates, up to the newest, that were not in formerly free space."""
+    """Number of consecutive updates, up to the newest, without `appeared`."""
     static_updates: int = 0
-    """Number of consecutive updates, up to the newest, at positions where an earlier scan hit something as well."""
+    """Number of consecutive updates, up to the newest, with `was_occupied` and without `appeared`."""
 
     @classmethod
     def start(cls, tick: int, position: complex, std: float, radius: float) -> "Track":
-        """Start a track at a position with a standard deviation in m, and with unknown velocity."""
+        """Start a track at a position (x + iy) with a standard deviation in m, and with unknown velocity."""
         return cls(position, 0j, std * std, 0.0, INITIAL_SPEED_STD_M_S**2, radius, position, tick)
 
     @property
@@ -113,43 +114,42 @@ class Track(ConstantVelocityFilter):
 
 
 MIN_SIGNIFICANCE = 3.0
-"""Minimum speed or displacement of a moving track in standard deviations."""
+"""Minimum speed or displacement, in standard deviations, before a track counts as moving."""
 MIN_TRAVEL_M = 0.15
-"""Minimum distance in m that a moving track has traveled."""
-MIN_UPDATES = 3
-"""Minimum number of the last updates of a moving track in formerly free space."""
+"""Minimum distance from its oldest stored position before a track counts as moving."""
+MIN_UPDATES, MIN_FREE_SHARE = 3, 0.6
+"""Minimum number and share of the stored updates in formerly free space before a track counts as moving. False tracks
+along a row of posts have less."""
 VISIBLE_TIMEOUT_S = 0.35
-"""Time in s without a hit after which a moving track ends if its position is visible."""
+"""Time without an update after which a moving track ends if its position is visible."""
 HIDDEN_TIMEOUT_S = 2.5
-"""Time in s without a hit after which a moving track ends even if its position is hidden."""
+"""Time without an update after which a moving track ends even if its position is hidden."""
 UNSEEN_STANDING_TIMEOUT_S = 0.8
-"""Time in s without a hit after which a track ends that is not moving."""
+"""Time without an update after which a track ends that is not moving."""
 MAX_POSITION_STD_M = 1.2
-"""Standard deviation in m of the position above which a track ends."""
+"""Standard deviation of the position above which a track ends."""
 MAX_SPEED_M_S = 4.0
-"""Speed in m/s above which a track is wrong, because it has changed from one obstacle to another."""
-NEARBY_MIN_VISIBLE_UPDATES = 5
-"""While another obstacle moves: minimum number of updates with a completely visible cluster before a track moves."""
-NEARBY_MIN_TRAVEL_M = 0.4
-"""While another obstacle moves: minimum distance in m that a moving track has traveled."""
-NEARBY_SPEED_RATIO = 1.6
-"""While another obstacle moves: minimum speed of a moving track relative to the minimum speed of moving obstacles."""
-NEARBY_MAX_OCCUPIED_SHARE = 0.2
-"""While another obstacle moves: maximum share of the last updates of a moving track where something was hit before."""
-MIN_FREE_SHARE = 0.6
-"""Minimum share of the last updates of a moving track in formerly free space. False tracks along a row of posts have
-less."""
+"""Speed above which a track ends, because it has changed from one obstacle to another."""
+OCCLUDED_MIN_VISIBLE_UPDATES = 5
+"""Minimum number of updates with a completely visible cluster before a track counts as moving. The OCCLUDED constants
+apply if another moving obstacle may have hidden the formerly free space."""
+OCCLUDED_MIN_TRAVEL_M = 0.4
+"""Minimum distance from its oldest stored position before a track counts as moving."""
+OCCLUDED_SPEED_RATIO = 1.6
+"""Minimum speed of a track that counts as moving, relative to the minimum speed of moving obstacles."""
+OCCLUDED_MAX_OCCUPIED_SHARE = 0.2
+"""Maximum share of the stored updates with `was_occupied` of a track that counts as moving."""
 FAR_TRAVEL_M = 0.5
-"""A track that has traveled twice the largest radius plus this distance in m counts as moving, even if its first
-position was never visible. The visible part of a wall at the edge of the field of view grows by less."""
+"""A partly hidden track counts as moving after twice the largest radius plus this distance. The visible part of a wall
+at the edge of the field of view grows by less."""
 MAX_UPDATES_OUTSIDE_FREE_SPACE = 5
-"""Number of updates outside formerly free space after which a track that has not moved ends."""
+"""Number of consecutive updates without `appeared` after which a track ends that has not moved."""
 STANDING_AFTER_S = 1.5
-"""Time in s below the minimum speed after which a moving track counts as standing."""
+"""Time below the minimum speed after which a moving track counts as standing."""
 NEVER_MOVED_TIMEOUT_S = 0.5
-"""Time in s below the minimum speed after which a track ends that has never moved."""
+"""Time below the minimum speed after which a track ends that has never moved."""
 MOVED_TIMEOUT_S = 10.0
-"""Time in s below the minimum speed after which a standing track ends that has moved before."""
+"""Time below the minimum speed after which a standing track ends that has moved before."""
 
 
 class TrackLifecycle:
@@ -160,7 +160,7 @@ class TrackLifecycle:
         self._spec, self._rate = spec, tick_rate
 
     def update_motion(self, track: Track, tick: int, tracks: list[Track], has_left: Callable[[Track], bool]) -> None:
-        """Update whether a track moves, after the scan of a tick.
+        """Update `is_moving` and `has_moved` of a track, after the scan of a tick.
 
         `has_left(track)` returns whether the obstacle has left its earlier positions.
         """
@@ -177,7 +177,7 @@ class TrackLifecycle:
             track.is_moving = track.has_moved = self._is_moving(track, tick, speed, tracks) and has_left(track)
 
     def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
-        """Return whether a track has ended; `sees_past(track)` returns whether the lidar sees past its position."""
+        """Return whether a track has ended. `sees_past(track)` returns whether the track's position is visible."""
         unseen_s = (tick - track.last_update_tick) / self._rate
         if abs(track.velocity) >= MAX_SPEED_M_S or track.position_std > MAX_POSITION_STD_M:
             return True
@@ -208,9 +208,9 @@ class TrackLifecycle:
         if (significant or 2 * fully_visible > len(updates)) and sum(each.appeared for each in updates) >= min_appeared:
             return distance > MIN_TRAVEL_M and updates[-1].appeared
         # Otherwise only near another moving obstacle, which may have hidden the free space.
-        if not significant or speed < NEARBY_SPEED_RATIO * min_speed or not any(each.is_moving for each in tracks):
+        if not significant or speed < OCCLUDED_SPEED_RATIO * min_speed or not any(each.is_moving for each in tracks):
             return False
-        if sum(each.was_occupied for each in updates) > NEARBY_MAX_OCCUPIED_SHARE * len(updates):
+        if sum(each.was_occupied for each in updates) > OCCLUDED_MAX_OCCUPIED_SHARE * len(updates):
             return False
         is_far = abs(track.position - track.start_position) > 2 * self._spec.max_radius + FAR_TRAVEL_M
         if (
@@ -219,14 +219,11 @@ class TrackLifecycle:
             and sum(each.edges > 0 for each in updates) >= MIN_FREE_SHARE * MAX_UPDATES
         ):
             return True
-        return fully_visible >= NEARBY_MIN_VISIBLE_UPDATES and distance > NEARBY_MIN_TRAVEL_M
+        return fully_visible >= OCCLUDED_MIN_VISIBLE_UPDATES and distance > OCCLUDED_MIN_TRAVEL_M
 
 
 def _is_sliding(track: Track, tracks: list[Track]) -> bool:
-    """Return whether a track only seems to move: its last updates were not in formerly free space while nothing moved.
-
-    Such a track is a wall of which different parts become visible. If a real obstacle is there, it gets a new track.
-    """
+    """Return whether a track is a wall of which different parts become visible, so that it only seems to move."""
     return track.updates_outside_free_space >= MAX_UPDATES_OUTSIDE_FREE_SPACE and not any(
         each.is_moving for each in tracks
     )

@@ -1,8 +1,7 @@
-"""Visibility: which points a scan can see, and which points were free in earlier scans.
+"""Comparison of a scan with an earlier scan: which points were free, and which were occupied.
 
 If an earlier beam passed through a point where an obstacle is now, the obstacle has moved there since. No beam passed
-through parts of a wall that come into view, or through the edges of hidden obstacles. Therefore static obstacles do not
-seem to move when the robot moves. The drift of odometry between both scans is less than MARGIN_M.
+through walls that come into view. Therefore, static obstacles do not seem to move when the robot moves.
 """
 
 import cmath
@@ -21,31 +20,31 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 
 MARGIN_M, MARGIN_RATIO = 0.25, 0.02
-"""Margin, in m and as a share of the range, by which an earlier beam must have passed a point."""
+"""Distance, a constant and a share of the range, by which an earlier beam must have passed beyond a free point."""
 SLIP_RATIOS = (0.05, 0.1, 0.15)
-"""Assumed wheel slip between two scans, as shares of the distance. A new obstacle must be new for each of them;
-otherwise, posts next to a fast robot seem to jump to the next post."""
+"""Assumed ratios of wheel slip between two scans. New points must have been free for each ratio. Otherwise, posts next
+to a fast robot would seem to jump to the next post."""
 REMAINING_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
-"""Shares of the measured distance that the robot has really driven, for each of SLIP_RATIOS."""
+"""Ratios of the really driven to the measured distance, for each of SLIP_RATIOS."""
 PREFERRED_AGE_S, MIN_AGE_S = 0.9, 0.2
-"""Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by about the margin in 0.9 s."""
+"""Preferred and minimum age of the earlier scan. At 0.25 m/s, an obstacle moves by about MARGIN_M in 0.9 s."""
 MIN_INTERVAL_S = 0.19
-"""Minimum time in s between two scans that are stored."""
+"""Minimum time between two stored scans."""
 MIN_BEAMS = 3
-"""Minimum number of beams of a scan that is stored."""
+"""Minimum number of beams of a stored scan."""
 HEADING_ERROR_RAD = 0.02
-"""Angle in rad to both sides of a point within which earlier beams must have passed too, for errors of the heading."""
+"""Angle to both sides of a free point within which earlier beams must have passed, too."""
 SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
-"""Tolerance, in m and as a share of the range, for an earlier beam to have hit the same obstacle."""
+"""Tolerance, a constant and a share of the range, for an earlier beam to have hit the same obstacle."""
 MAX_SCANS = 64
-"""Maximum number of scans that are stored."""
+"""Maximum number of stored scans."""
 NO_HIT_RANGE_M = 1e5
-"""Range in m of a beam that hit nothing."""
+"""Range of a beam that hit nothing."""
 
 
 @dataclass(frozen=True)
 class ScanGeometry:
-    """Directions of the beams of a lidar: `count` beams, `increment` rad apart, the first along `start`."""
+    """Directions of the `count` beams of a lidar, `increment` rad apart. The first beam points along `start` (rad)."""
 
     count: int
     start: float
@@ -58,17 +57,17 @@ class ScanGeometry:
 
     @cached_property
     def neighbors(self) -> int:
-        """Number of beams to each side of a point that must have passed it as well."""
+        """Number of beams within HEADING_ERROR_RAD to each side."""
         return max(1, math.ceil(HEADING_ERROR_RAD / self.increment))
 
     @cached_property
     def neighbor_offsets(self) -> Indices:
-        """Offsets from a beam's index in `free_distances` to the previous, the same, and the next beam in `lengths`."""
+        """Offsets (3, 1) from an index in `free_distances` to the previous, same, and next beam in `padded_ranges`."""
         return self.neighbors + np.array(((-1,), (0,), (1,)))
 
     @cached_property
     def padding(self) -> int:
-        """Number of beams added at each end, so that there is a beam in each direction."""
+        """Number of beams added at each end of a scan, so that there is a beam in each direction."""
         missing = 0 if self.is_full_circle else max(0, math.ceil(math.pi / self.increment - self.count / 2))
         return self.neighbors + 2 + missing
 
@@ -82,22 +81,25 @@ class ScanGeometry:
         """Index of the center of the field of view in `free_distances`."""
         return self.padding - self.neighbors + (self.count - 1) / 2
 
-    def lengths(self, scan: Scan) -> Array:
-        """Return the ranges (n,) of a scan, with the beams added at each end."""
-        lengths = np.zeros(self.count + 2 * self.padding)
-        measured = lengths[self.padding : -self.padding]
+    def padded_ranges(self, scan: Scan) -> Array:
+        """Return the ranges of a scan with `padding` beams added at each end.
+
+        Their ranges are those of the other end if the field of view is a full circle, otherwise 0.
+        """
+        padded = np.zeros(self.count + 2 * self.padding)
+        measured = padded[self.padding : -self.padding]
         np.fmin(np.fmax(scan.ranges, 0.0), NO_HIT_RANGE_M, out=measured)
         measured[measured < scan.range_min] = 0.0
         if self.is_full_circle:
-            lengths[: self.padding], lengths[-self.padding :] = measured[-self.padding :], measured[: self.padding]
-        return lengths
+            padded[: self.padding], padded[-self.padding :] = measured[-self.padding :], measured[: self.padding]
+        return padded
 
-    def free_distances(self, lengths: Array) -> Array:
-        """Return the distance in each direction up to which space was surely free, from `lengths` of a scan.
+    def free_distances(self, padded_ranges: Array) -> Array:
+        """Return the distance in m along each beam up to which space was surely free.
 
-        The array is shorter than `lengths` by `neighbors` at each end.
+        The array is shorter than `padded_ranges` by `neighbors` at each end.
         """
-        free = _sliding_minimum(lengths, 2 * self.neighbors + 1)
+        free = _sliding_minimum(padded_ranges, 2 * self.neighbors + 1)
         free -= MARGIN_M
         free *= 1.0 / (1.0 + MARGIN_RATIO)
         return free
@@ -120,20 +122,20 @@ class EarlierScan:
     tick: int
     lidar: Pose2
     geometry: ScanGeometry
-    lengths: Array
+    padded_ranges: Array
     free_distances: Array
 
     def compare(self, points: Points, lidar: Pose2) -> "BeamComparison":
-        """Compare points (n,), given in the frame of a lidar at `lidar`, with this scan."""
+        """Compare points (n,) in the frame of the current lidar, whose pose in the odom frame is `lidar`."""
         motion, center_direction = self.lidar.between(lidar), self.geometry.center_direction
         rotated = points * cmath.rect(1.0, motion.yaw - center_direction)
         displacement = complex(motion.x, motion.y) * cmath.rect(1.0, -center_direction)
         return BeamComparison(self, rotated, displacement, *self.beams_toward(rotated + displacement))
 
     def beams_toward(self, points: Points) -> tuple[Indices, Array]:
-        """Return the indices in `free_distances` of the beams (…,) toward points, and the distances of the points.
+        """Return the indices in `free_distances` of the beams toward points (…,), and the distances of the points in m.
 
-        Points are in this lidar's frame, rotated to its center direction.
+        Points are relative to this lidar, with the x-axis along the center of its field of view.
         """
         beam = np.arctan2(points.imag, points.real)
         beam *= 1.0 / self.geometry.increment
@@ -141,16 +143,18 @@ class EarlierScan:
         return beam.astype(np.int64), np.abs(points)
 
     def passed_beyond(self, beam: Indices, distance: Array) -> Mask:
-        """Return which beams (…,) passed beyond the distances (…,)."""
+        """Return which beams (indices in `free_distances`) surely passed beyond the distances in m, both (…,)."""
         return np.asarray(self.free_distances.take(beam) > distance)
 
 
 @fast_dataclass(eq=False)
 class BeamComparison:
-    """Beams (n,) of an earlier scan toward points, with the distances of the points in m.
+    """Beams of an earlier scan toward n points.
 
-    `rotated` are the points relative to the current lidar, along the axes of the earlier scan. `displacement` leads
-    from the earlier lidar to the current one, so that the sum of both is relative to the earlier lidar.
+    rotated:       points (n,) relative to the current lidar, along the axes of the earlier scan
+    displacement:  vector from the earlier lidar to the current one, along the same axes
+    beam:          indices (n,) in `free_distances` of the beams toward the points
+    distance:      distances (n,) in m of the points from the earlier lidar
     """
 
     earlier: EarlierScan
@@ -160,11 +164,11 @@ class BeamComparison:
     distance: Array
 
     def was_free(self) -> Mask:
-        """Return which points were free in the earlier scan. Points beyond NO_HIT_RANGE_M were not."""
+        """Return which points were free in the earlier scan; not those beyond NO_HIT_RANGE_M."""
         return self.earlier.passed_beyond(self.beam, self.distance)
 
     def has_appeared(self, free: Mask) -> Mask:
-        """Return which of the points, of those in the mask `free` (n,), were free for each of the assumed slips."""
+        """Return which of the points in the mask `free` (n,) were free for each of SLIP_RATIOS."""
         earlier, indices = self.earlier, free.nonzero()[0]
         has_appeared: Mask = free.copy()
         if len(indices):
@@ -175,14 +179,14 @@ class BeamComparison:
 
     def was_occupied(self) -> Mask:
         """Return at which points the earlier scan hit something."""
-        difference = self.earlier.lengths.take(self.beam + self.earlier.geometry.neighbor_offsets)
+        difference = self.earlier.padded_ranges.take(self.beam + self.earlier.geometry.neighbor_offsets)
         difference -= self.distance
         closest = np.abs(difference, out=difference).min(axis=0)
         return np.asarray(closest < SAME_DISTANCE_M + SAME_DISTANCE_RATIO * self.distance)
 
 
 class FreeSpaceMemory:
-    """Recent scans of one lidar, to compare later scans with."""
+    """Stores recent scans of one lidar, to compare later scans with."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -192,7 +196,7 @@ class FreeSpaceMemory:
         self._geometry = ScanGeometry(0, 0.0, 0.0)
 
     def add(self, scan: Scan, lidar: Pose2) -> None:
-        """Store a scan, taken with the lidar at a pose."""
+        """Store a scan that was taken with the lidar at a pose in the odom frame."""
         if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._min_interval:
             return
         geometry, count = self._geometry, len(scan.ranges)
@@ -200,11 +204,11 @@ class FreeSpaceMemory:
             return
         if (geometry.count, geometry.start, geometry.increment) != (count, scan.angle_min, scan.angle_increment):
             self._geometry = geometry = ScanGeometry(count, scan.angle_min, scan.angle_increment)
-        lengths = geometry.lengths(scan)
-        self._scans.append(EarlierScan(scan.tick, lidar, geometry, lengths, geometry.free_distances(lengths)))
+        padded = geometry.padded_ranges(scan)
+        self._scans.append(EarlierScan(scan.tick, lidar, geometry, padded, geometry.free_distances(padded)))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
-        """Return the scan that is about PREFERRED_AGE_S old at a tick; None if none is at least MIN_AGE_S old."""
+        """Return the scan that is about PREFERRED_AGE_S older than a tick; None if none is MIN_AGE_S older."""
         scans, latest = self._scans, tick - self._preferred_age
         while len(scans) > 1 and scans[1].tick <= latest:
             scans.popleft()
@@ -236,7 +240,7 @@ class LidarPose(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CurrentScan:
-    """A scan with its beam ends (n,) in the lidar frame, the pose of the lidar, and an earlier scan."""
+    """A scan with the endpoints of its beams (n,) in the lidar frame, the pose of the lidar, and an earlier scan."""
 
     scan: Scan
     ends: Points
@@ -245,7 +249,7 @@ class CurrentScan:
 
     @cached_property
     def lidar(self) -> LidarPose:
-        """Pose of the lidar."""
+        """The `lidar_pose` as complex numbers."""
         return LidarPose.of(self.lidar_pose)
 
     def sees_past(self, track: Track) -> bool:
@@ -255,11 +259,10 @@ class CurrentScan:
         return beam is not None and bool(self.scan.ranges[beam] > abs(off))
 
     def has_left(self, track: Track) -> bool:
-        """Return whether the obstacle of a track has left its earlier positions, which are now free or newly occupied.
+        """Return whether at least half of the earlier positions of a track are no longer occupied.
 
-        A position is still occupied if both this scan and the earlier scan hit something there, for example a post if
-        a false track jumps between posts. Up to half of the positions may be occupied, because another obstacle can
-        follow the same path.
+        A position is still occupied if both this scan and the earlier scan hit something there. This is so for a false
+        track that jumps from post to post.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius
         positions = [update.position for update in track.updates if abs(update.position - track.position) > radius]
@@ -274,7 +277,7 @@ class CurrentScan:
         return 2 * int(np.count_nonzero(was_occupied)) <= len(positions)
 
     def _hit_near(self, point: complex, current: complex, reach: float) -> complex | None:
-        """Return the hit of the beam toward a point if it is within `reach` of it and not on the track at `current`."""
+        """Return the endpoint of the beam toward `point` if it is within `reach` of `point`, but not of `current`."""
         beam = self._beam_toward(point)
         end = None if beam is None else complex(self.ends[beam])
         return end if end is not None and abs(end - point) <= reach < abs(end - current) else None
