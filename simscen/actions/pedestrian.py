@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from simscen.actions.base import WorldAction
-from simscen.core.environment.world_model import Behavior, Polygon, Unseen, WalkingPedestrian
+from simscen.core.environment.world_model import Behavior, Ignorable, Polygon, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.stage import Effect, Stage
@@ -63,7 +63,7 @@ class _WalkSettings(Spec):
     """Radius of the upright cylinder that models a body."""
     height: Annotated[PositiveLength, Field(ge=0.5, le=2.5)] = 1.7
     """Height of the cylinder."""
-    blind_to: list[Unseen] = []
+    blind_to: list[Ignorable] = []
     """What the person does not notice, e.g. while looking at a phone; everybody notices walls."""
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Simulated time as a whole number of physics ticks, and its conversion to nanoseconds and ROS time."""
+"""Conversion of simulated time, counted in physics ticks, to seconds, nanoseconds, and ROS time."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ DEFAULT_TICK_RATE_HZ = 240
 
 @dataclass(frozen=True)
 class Clock:
-    """Converts between ticks and seconds, and rates to periods in ticks. `rate` is in physics ticks per second."""
+    """Converts between ticks and seconds. `rate` is the number of physics ticks per second."""
 
     rate: int = DEFAULT_TICK_RATE_HZ
 
@@ -21,10 +21,7 @@ class Clock:
         return round(seconds * self.rate)
 
     def period(self, hertz: float) -> int:
-        """Return the number of ticks between two samples at a rate of `hertz`.
-
-        Raises ValueError, with the result of `nearest_rate`, if the period is not a whole number of ticks.
-        """
+        """Return the period of the rate `hertz` in ticks. Raises ValueError if it is not a whole number of ticks."""
         period = self.rate / hertz if hertz > 0 else 0.0
         if period < 1 or abs(period - round(period)) > 1e-9:
             fitting = self.nearest_rate(hertz)
@@ -32,9 +29,9 @@ class Clock:
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:
-        """Return the rate in Hz nearest to `hertz` that suits the clock.
+        """Return the rate in Hz nearest to `hertz` whose period is a whole number of ticks.
 
-        Suitable rates are the whole divisors of the clock rate, and rates with a period of 1 to 10 whole seconds.
+        The result is a divisor of the clock rate, or it has a period of 1 to 10 whole seconds.
         """
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))
@@ -47,11 +44,9 @@ Stamp = tuple[int, int]
 
 
 class SimTime:
-    """Converts ticks to nanoseconds and ROS time, and back.
+    """Converts ticks to nanoseconds and ROS time, rounded down to whole nanoseconds.
 
-    `rate` is the number of ticks per second, from 1 to 999,999,999; other values raise ValueError. A tick is rarely a
-    whole number of nanoseconds (1/240 s is not), so times are rounded down. The method `tick` finds the exact tick
-    again.
+    `rate` is the number of ticks per second. Raises ValueError unless it is in 1 … 999,999,999.
     """
 
     def __init__(self, rate: int) -> None:
@@ -71,5 +66,5 @@ class SimTime:
         return self._last[1]
 
     def tick(self, nanoseconds: int) -> int:
-        """Return the tick of a time since the start of the run that was computed by `nanoseconds` or `stamp`."""
+        """Return the tick at a time since the start of the run: the inverse of the method `nanoseconds`."""
         return -(-nanoseconds * self.rate // NS_PER_SECOND)

@@ -1,8 +1,7 @@
 """Environment variables that make NumPy and OpenBLAS compute identical results on all processors with AVX2.
 
-Both libraries choose their CPU kernels (AVX2, AVX-512, …) by the processor when they are loaded. Different kernels give
-results that differ in the last bits. Such differences grow until, after some seconds, the runs are no longer the same.
-simscen therefore uses the AVX2 kernels on all processors with AVX2 and FMA, even if the processor has AVX-512.
+When they are loaded, both libraries choose kernels (AVX2, AVX-512, …) for the processor. The results of different
+kernels differ in the last bits, which makes runs diverge. The variables select the AVX2 kernels on all processors.
 """
 
 import os
@@ -14,7 +13,7 @@ CPUINFO = Path("/proc/cpuinfo")
 _FIRST_PROCESSOR_BYTES = 8192
 """Number of bytes of CPUINFO that contain the entry of the first processor."""
 _AVX512_BEFORE_2_4 = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"
-"""Names of the AVX-512 kernels before NumPy 2.4. NumPy warns about names that it does not know."""
+"""Names of the AVX-512 kernels before NumPy 2.4."""
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 """Names of the AVX-512 kernels since NumPy 2.4."""
 
@@ -23,7 +22,7 @@ _pinned: set[str] = set()
 
 
 def kernel_variables() -> dict[str, str]:
-    """Return the environment variables that select the kernels; empty on processors without AVX2 or FMA."""
+    """Return the environment variables that select AVX2 kernels; empty on processors without AVX2 or FMA."""
     if not {"avx2", "fma"} <= _processor_flags():
         return {}
     avx512 = _AVX512_BEFORE_2_4 if _numpy_version() < (2, 4) else _AVX512
@@ -31,9 +30,9 @@ def kernel_variables() -> dict[str, str]:
 
 
 def pin_kernels() -> None:
-    """Set the `kernel_variables` of this process, except those that the user has set.
+    """Set the variables that `kernel_variables` returns, except those that the environment already contains.
 
-    The variables have no effect on libraries that are already loaded.
+    Call this before NumPy is imported.
     """
     for name, value in kernel_variables().items():
         if name not in os.environ:

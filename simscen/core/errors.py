@@ -1,4 +1,4 @@
-"""Exceptions of simscen with their exit codes, and problems in input files. A failed criterion is not an error."""
+"""Exceptions of simscen with their exit codes, and problems in input files."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -7,8 +7,9 @@ from enum import IntEnum
 class Exit(IntEnum):
     """Exit codes of the command line.
 
-    INCOMPLETE: a run could not be completed. UNDECIDED: the claim of a study is undecided. The last three are 128 plus
-    the number of the signal that ended the command.
+    FAILED: a run failed. USAGE: the command line or an input file is invalid. INCOMPLETE: a run could not be completed.
+    INTERNAL: a defect of simscen. UNDECIDED: the runs of a study do not decide whether its required pass rate is met.
+    The last three are 128 plus the number of the signal that ended the command.
     """
 
     PASSED = 0
@@ -24,14 +25,14 @@ class Exit(IntEnum):
 
 
 class SimscenError(Exception):
-    """Base class of the errors that simscen raises on purpose to end a command or a run."""
+    """Base class of the exceptions of simscen. It ends a command or a run."""
 
     exit = Exit.INTERNAL
     """Exit code of a command that this error ends."""
 
 
 class InvalidInput(SimscenError):
-    """An input file is invalid, and its author can fix it. Nothing was run."""
+    """An input file is invalid. No run was started."""
 
     exit = Exit.USAGE
 
@@ -40,12 +41,12 @@ class InvalidInput(SimscenError):
         super().__init__("\n".join(f"{p.place}: {p.message}" for p in self.problems))
 
     def __reduce__(self) -> "tuple[type[InvalidInput], tuple[list[Problem]]]":
-        """Pickle the problems, so that a worker process can pass the error on; by default only the message is."""
+        """Pickle the problems, which the default would lose."""
         return type(self), (self.problems,)
 
 
 class UsageError(SimscenError):
-    """The command line is invalid or the output folder is unusable; the caller can fix it."""
+    """The command line is invalid, or the output folder is unusable."""
 
     exit = Exit.USAGE
 
@@ -63,7 +64,7 @@ BROKEN_COMPONENT = "broken-component"
 class RunError(SimscenError):
     """A run could not be completed.
 
-    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, … `tail` is the end of the output of an
+    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, … `tail` is the last output of an
     external stack. `by_stack` is True if the stack under test is the cause.
     """
 
@@ -74,7 +75,7 @@ class RunError(SimscenError):
         super().__init__(message)
 
     def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str, bool]]":
-        """Pickle all arguments, as in InvalidInput."""
+        """Pickle all arguments, which the default would lose."""
         return type(self), (self.kind, str(self), self.tail, self.by_stack)
 
 
@@ -83,8 +84,8 @@ class Problem:
     """A problem in an input file.
 
     `line` and `col` count from 1; both are 0 if the problem concerns the whole file. `code` identifies the kind of
-    problem, such as SC012, and never changes its meaning. `hint` says how to fix the problem. `severity` is "error" or
-    "warning". `source` is the text of the line.
+    problem, such as SC012. `hint` says how to fix the problem. `severity` is "error" or "warning". `source` is the text
+    of the line.
     """
 
     path: str

@@ -12,16 +12,16 @@ ANSWER_TIMEOUT_S = 10.0
 
 @dataclass(frozen=True)
 class ExternalCommand:
-    """Program that implements the stack protocol, and how to start it.
+    """Command that starts an external stack.
 
     Attributes:
-        argv: The program, which is looked up in the PATH of `env`, and its arguments.
+        argv: The program and its arguments. The program is looked up in the PATH of `env`.
         env: Complete environment of the program.
         cwd: Working folder.
         start_limit: Maximum wall time in s from the start of the program to its subscription to topics.
         answer_limit: Maximum wall time in s of each later answer.
-        digest: Hash of the arguments, the files that they name, and the variables that the user configured. Other
-            variables of `env` are not included, because they may be secret.
+        digest: Hash of the arguments, of the files that they name, and of the environment variables that the user
+            configuration sets.
     """
 
     argv: tuple[str, ...]

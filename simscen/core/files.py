@@ -1,4 +1,4 @@
-"""Checks that protect existing files from being overwritten, and a record of the input files that were read."""
+"""Checks of output paths that protect existing files, and a record of the input files that were read."""
 
 import errno
 import os
@@ -10,10 +10,7 @@ from pathlib import Path
 
 
 def require_regular_file(path: Path) -> None:
-    """Raise OSError unless `path` is a regular file or does not exist.
-
-    Replacing a device or a link would break other programs, and writing to a pipe without a reader blocks.
-    """
+    """Raise OSError if `path` exists and is not a regular file: a folder, symbolic link, device, or pipe."""
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:
@@ -27,19 +24,19 @@ def require_regular_file(path: Path) -> None:
 
 
 def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
-    """Raise OSError if `path` is one of the `inputs`, which it would overwrite."""
+    """Raise OSError if the output file `path` is one of the `inputs`."""
     real = os.path.realpath(path)
     if any(os.path.realpath(each) == real for each in inputs):
         raise OSError(errno.EINVAL, "it is one of the input files")
 
 
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
-"""Set of `collect_read_files`; None outside of its block."""
+"""Set that `collect_read_files` yielded; None outside of its `with` block."""
 
 
 @contextmanager
 def collect_read_files() -> Iterator[set[Path]]:
-    """Yield a set to which `record_read_file` adds the files that are read in the block."""
+    """Yield a set to which `record_read_file` adds files during the `with` block."""
     read: set[Path] = set()
     token = _READ.set(read)
     try:
@@ -49,10 +46,9 @@ def collect_read_files() -> Iterator[set[Path]]:
 
 
 def record_read_file(file: Path) -> None:
-    """Add `file` to the set of `collect_read_files`; without effect outside of its block.
+    """Add `file` to the set of `collect_read_files`. Has no effect outside of its `with` block.
 
-    Every function that reads a file named in another input file must call this, so that a change of the file is
-    noticed.
+    Call this for every file that another input file refers to.
     """
     read = _READ.get()
     if read is not None:

@@ -1,6 +1,6 @@
-"""Interfaces to a running simulation: Situation for triggers, which observe it, and Stage for actions, which change it.
+"""Interfaces to a running simulation. Triggers observe the simulation by Situation. Actions change it by Stage.
 
-All poses are in the world frame, except those of the belief and the plan, which are in the map frame.
+Poses are in the world frame. Only the estimated pose (belief) and the plan are in the map frame.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action: `happened` if the action changed anything, and `what` it changed, or why it did not."""
+    """Result of an action: whether anything changed, and a description of the change or of the reason for none."""
 
     happened: bool
     what: str
 
 
 class Situation(Protocol):
-    """State of the run at one beat, as triggers see it, from the point of view of one robot."""
+    """Current state of the run for triggers, with the pose, sensors, and navigation of one of the robots."""
 
     @property
     def tick(self) -> int:
@@ -54,14 +54,14 @@ class Situation(Protocol):
 
     @property
     def clearance(self) -> float | None:
-        """Distance in m from the hull to the nearest obstacle in the newest truth sample; None before the first.
+        """True distance in m from the robot to the nearest obstacle; None before the first measurement.
 
-        Distances above `Case.clearance_range` are cut off.
+        Larger distances than the measuring range (`Case.clearance_range`) are replaced by this range.
         """
         ...
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick at which the stack last received a scan of the lidar `sensor`; None if it never did.
+        """Return the tick of the newest scan of the lidar `sensor` that the stack received; None if there is none.
 
         If `sensor` is None, scans of all lidars count.
         """
@@ -74,7 +74,7 @@ class Situation(Protocol):
 
     @property
     def belief(self) -> Belief | None:
-        """Latest belief that the stack published; None before the first."""
+        """Newest pose estimate that the stack published; None before the first one."""
         ...
 
     @property
@@ -98,11 +98,11 @@ class Situation(Protocol):
         ...
 
     def of(self, robot: str) -> Situation:
-        """Return the state from the point of view of the robot with this name."""
+        """Return the situation of the robot with this name."""
         ...
 
     def region(self, name: str) -> Polygon:
-        """Return a named region of the world."""
+        """Return the polygon of a named region of the world."""
         ...
 
     def object(self, name: str) -> Pose2 | None:
@@ -111,7 +111,7 @@ class Situation(Protocol):
 
 
 class Stage(Situation, Protocol):
-    """Changes that actions can make to the run, from the point of view of one robot."""
+    """Changes that actions can make to the run, to its world, and to one of the robots."""
 
     def of(self, robot: str) -> Stage:
         """Return the stage of the robot with this name."""
@@ -126,14 +126,14 @@ class Stage(Situation, Protocol):
         ...
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian of `radius` m at `place` (x, y in m) would touch nothing.
+        """Return whether a pedestrian of `radius` m fits at `place` (x, y in m) without touching an obstacle.
 
-        With `walls_only`, it may touch anything but walls.
+        If `walls_only`, only walls count as obstacles.
         """
         ...
 
     def rng(self, name: str) -> np.random.Generator:
-        """Return a new generator of the random stream with this name, see `Streams.generator`."""
+        """Return a new generator of the random stream with this name."""
         ...
 
     def remove(self, name: str) -> None:
@@ -145,7 +145,7 @@ class Stage(Situation, Protocol):
         ...
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that moves an object now, and the time in s since its start; None if no path moves it."""
+        """Return the path that an object follows, and the time in s since its start; None if it follows no path."""
         ...
 
     def mass(self, name: str) -> float:
@@ -176,7 +176,7 @@ class Stage(Situation, Protocol):
         ...
 
     def send_goal(self, name: str) -> None:
-        """Send the goal with this name, one of `Case.sent`, to the stack. It preempts the current task."""
+        """Send the goal with this name to the stack. It preempts the current task."""
         ...
 
     def cancel_goal(self) -> None:
@@ -184,13 +184,13 @@ class Stage(Situation, Protocol):
         ...
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Send a command to the costmap filters of the stack. Return why it had no effect, or "" if it had one."""
+        """Send a command to the costmap filters of the stack. Return the reason if it had no effect, otherwise ""."""
         ...
 
     def record_world_event(self, event: Event) -> None:
-        """Add an event of the world to the events of all robots. A tick of 0 is replaced by the current tick."""
+        """Add an event to the recorded events of all robots. A tick of 0 is replaced by the current tick."""
         ...
 
     def record_event(self, event: Event) -> None:
-        """Add an event to those of this robot. A tick of 0 is replaced by the current tick."""
+        """Add an event to the recorded events of this robot. A tick of 0 is replaced by the current tick."""
         ...

@@ -1,7 +1,4 @@
-"""Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square distribution.
-
-They do not use scipy, whose import takes half a second.
-"""
+"""Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square distribution, without SciPy."""
 
 from __future__ import annotations
 
@@ -11,24 +8,25 @@ from collections.abc import Sequence
 import numpy as np
 
 MIN_PAIRS = 5
-"""Minimum number of pairs for an interval: a bootstrap of four values is not meaningful."""
+"""Minimum number of pairs for a bootstrap interval."""
 RESAMPLES = 10_000
-"""Number of bootstrap resamples, unless MAX_DRAWS requires fewer."""
+"""Number of bootstrap resamples. MAX_DRAWS can reduce it to a tenth."""
 MAX_DRAWS = 20_000_000
-"""Maximum number of values drawn by a bootstrap, which limits its time. There are at least RESAMPLES / 10 resamples."""
+"""Limit for the number of values that a bootstrap draws."""
 CONFIDENCE = 0.95
 """Probability with which the bootstrap interval contains the true mean."""
 _LN_2 = math.log(2.0)
 _DRAWS_PER_BATCH = 1 << 20
+"""Number of values that a bootstrap draws at once."""
 
 
 def bootstrap_mean_interval(
     differences: Sequence[float], rng: np.random.Generator, weights: Sequence[float] | None = None
 ) -> tuple[float, float] | None:
-    """Return lower and upper limit of the mean of paired differences; None for fewer than MIN_PAIRS pairs.
+    """Return lower and upper confidence limit of the mean of paired differences; None for fewer than MIN_PAIRS pairs.
 
-    `weights` are those of the pairs in the mean, by default equal. Percentile bootstrap with RESAMPLES resamples (Efron
-    and Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13).
+    `weights` contains the weight of each difference; None for equal weights. The method is the percentile bootstrap
+    (Efron and Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13).
     """
     if len(differences) < MIN_PAIRS:
         return None
@@ -46,10 +44,9 @@ def bootstrap_mean_interval(
 
 
 def sign_test(more: int, less: int) -> float:
-    """Return the p-value of the exact two-sided sign test for `more` pairs with an increase and `less` with a decrease.
+    """Return the p-value of the exact two-sided sign test (Conover: Practical Nonparametric Statistics, 1999, 3.4).
 
-    Pairs without a difference do not count. If the pairs are outcomes that changed from pass to fail or from fail to
-    pass, this is McNemar's exact test (Conover: Practical Nonparametric Statistics, 1999, section 3.4).
+    `more` is the number of pairs with an increase, and `less` the number of pairs with a decrease.
     """
     pairs, fewer = more + less, min(more, less)
     term = math.exp(math.lgamma(pairs + 1) - math.lgamma(fewer + 1) - math.lgamma(pairs - fewer + 1) - pairs * _LN_2)
@@ -61,10 +58,9 @@ def sign_test(more: int, less: int) -> float:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Return the p-values of several tests, adjusted for their number, in the same order.
+    """Return the p-values of several tests with Holm's adjustment for multiple tests, in the same order.
 
-    If the adjusted values are compared with a significance level, the probability that any test is significant by
-    chance is at most this level (Holm: A Simple Sequentially Rejective Multiple Test Procedure, 1979).
+    Source: Holm, A Simple Sequentially Rejective Multiple Test Procedure, 1979.
     """
     adjusted, largest = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=p_values.__getitem__)):
@@ -78,11 +74,10 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
-    """Return lower and upper limit of the success rate after `successes` of `runs`: the Wilson score interval.
+    """Return lower and upper limit of the Wilson score interval of a success rate (Wilson 1927, JASA 22(158)).
 
-    Unlike the normal interval, it has a width at rates of 0 and 1 (Wilson 1927, JASA 22(158)). `successes` can be
-    fractional, for example half a success for two runs that count as one. Raises ValueError if `runs` is 0 or if there
-    are more successes than runs.
+    `successes` may be fractional. `z` is the normal quantile of the confidence. Raises ValueError if `runs` is 0, or if
+    there are more successes than runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")
@@ -110,8 +105,7 @@ def chi2_quantile(probability: float, freedom: int) -> float:
 def chi2_cdf(value: float, freedom: int) -> float:
     """Return the cumulative distribution function of chi-square at `value` > 0, for `freedom` degrees of freedom.
 
-    It is the regularized gamma function P(freedom/2, value/2), computed by its power series, whose terms are all
-    positive (Abramowitz and Stegun 1964, 6.5.29).
+    Computed by the power series of the incomplete gamma function (Abramowitz and Stegun 1964, 6.5.29).
     """
     a, x = freedom / 2.0, value / 2.0
     term = total = 1.0 / a
@@ -124,10 +118,10 @@ def chi2_cdf(value: float, freedom: int) -> float:
 
 
 def nees_mean_bounds(samples: int, dimensions: int, probability: float) -> tuple[float, float]:
-    """Return the bounds between which the mean NEES of a consistent estimator lies with this probability.
+    """Return the bounds of the mean NEES (normalized estimation error squared) of a consistent estimator.
 
-    The mean is over `samples` independent samples of an error with this number of `dimensions`. The bounds are the
-    two-sided quantiles of chi2(dimensions x samples) / samples (Bar-Shalom et al. 2001).
+    The mean over `samples` independent errors with `dimensions` components lies between the bounds with this
+    `probability`. The bounds are two-sided quantiles of chi2(dimensions x samples) / samples (Bar-Shalom et al. 2001).
     """
     tail, freedom = (1.0 - probability) / 2.0, dimensions * samples
     return chi2_quantile(tail, freedom) / samples, chi2_quantile(1.0 - tail, freedom) / samples

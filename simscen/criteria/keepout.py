@@ -104,7 +104,7 @@ class Keepout(Spec, Criterion):
             mask = case.masks.get(self.mask or "")
             if mask is None:
                 return f"the log has no mask `{self.mask}`"
-            boxes = mask.forbidden
+            boxes = mask.occupied_boxes
             if not len(boxes):
                 return f"no cell of `{self.mask}` is occupied"
             return lambda poses: separation_from_boxes(mask.to_mask_frame(poses), hull, boxes)

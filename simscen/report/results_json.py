@@ -105,7 +105,7 @@ def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]
     """
     figures_by_stack: dict[str, SessionSummaryBuilder] = {}
     for run in runs:
-        if not run.key.repeats:
+        if not run.key.is_repetition:
             figures_by_stack.setdefault(run.key.stack_name, SessionSummaryBuilder()).add(run.result)
     return {stack: figures.summary() for stack, figures in figures_by_stack.items()}
 

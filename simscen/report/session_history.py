@@ -114,7 +114,7 @@ def last_failed(folder: Path) -> LastFailed | None:
     for session in islice(sessions, MAX_SEARCHED_SESSIONS):
         outcomes: dict[RunKey, bool] = {}
         for key, good in _outcomes(session):
-            outcomes[key.first] = outcomes.get(key.first, True) and good
+            outcomes[key.original] = outcomes.get(key.original, True) and good
         known = {**outcomes, **known}
     return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
 

@@ -237,8 +237,10 @@ def failure_lines(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLin
     --check-determinism are listed once.
     """
     failed = {run.key for run in runs if not run.outcome.good}
-    failures = [run for run in runs if run.key in failed and (run.key == run.key.first or run.key.first not in failed)]
-    if not failures or all(run.key.first == failures[0].key.first for run in runs):
+    failures = [
+        run for run in runs if run.key in failed and (run.key == run.key.original or run.key.original not in failed)
+    ]
+    if not failures or all(run.key.original == failures[0].key.original for run in runs):
         return
     yield (StyledText("did not pass:", "quiet"),)
     for number, run in enumerate(failures):
@@ -265,10 +267,12 @@ def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
 
     Yields nothing if no run was repeated.
     """
-    if not any(run.key.repeats for run in runs):
+    if not any(run.key.is_repetition for run in runs):
         return
-    first_runs = {run.key: run for run in runs if not run.key.repeats}
-    pairs = [(first_runs[run.key.first], run) for run in runs if run.key.repeats and run.key.first in first_runs]
+    first_runs = {run.key: run for run in runs if not run.key.is_repetition}
+    pairs = [
+        (first_runs[run.key.original], run) for run in runs if run.key.is_repetition and run.key.original in first_runs
+    ]
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
     if not compared:
         return

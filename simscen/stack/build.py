@@ -158,7 +158,7 @@ class StackBuilder:
 
     def plan_seed(self, number: int) -> int:
         """Return the random seed of the n-th plan of the run."""
-        return self.streams.integer(f"planner#{number}")
+        return self.streams.library_seed(f"planner#{number}")
 
     def make_odometry_filter(self) -> "OdometryFilter | None":
         """Make the filter that fuses wheel odometry and IMU; None if the wheel odometry is used unfiltered."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from simscen.actions.base import AnyAction
-from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
+from simscen.core.records.events import KIND_BY_TARGET_NAME, MAP, EventKind
 from simscen.core.records.trace import Moment
 from simscen.faults.base import AnyFault
 from simscen.loading.checks.faults import fault_targets, unknown_sensors, unsuitable_faults
@@ -100,7 +100,7 @@ def kinds_of(word: str) -> list[str]:
     return sorted(affects - {MAP})  # what befalls the map befalls the whole run
 
 
-NAMES = {kind: name for name, kind in KIND_BY_INSTANCE.items()}
+NAMES = {kind: name for name, kind in KIND_BY_TARGET_NAME.items()}
 NAMES |= {"Scan": "lidar", "Odometry": "odom", "Imu": "imu", "Bump": "bumper", "Image": "camera"}
 FAULTS = [
     (f"{word} on {NAMES[kind]}", f"{{sensor: {NAMES[kind]}, {word}: {fault_example(word, kind)}, WHEN}}")

@@ -131,14 +131,14 @@ def _has_matching_log(finished: RunFinished) -> bool:
 
     recorded = attached_result(Path(finished.artifacts.mcap))
     expected = json.loads(json.dumps(result_data(finished.result)))
-    expected["stack_name"] = finished.key.first.stack_name
+    expected["stack_name"] = finished.key.original.stack_name
     return recorded is not None and all(recorded.get(key) == expected[key] for key in SHARED_RESULT_KEYS)
 
 
 def _compared_index(jobs: Sequence[Job], number: int) -> int:
     """Return the index of the run with which --check-determinism compares run `number`; without one, `number`."""
     twin = number ^ 1
-    if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
+    if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.original == jobs[number].key.original:
         return twin
     return number
 

@@ -139,7 +139,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     if not _NAME.fullmatch(name):
         hint = "a name consists of letters, digits, `_`, `.`, and `-`"
         raise UsageError(f"cannot read --stack {escaped(text)}: expected NAME=VALUE; {hint}")
-    if RunKey("", 1, stack_name=name.casefold()).repeats:
+    if RunKey("", 1, stack_name=name.casefold()).is_repetition:
         raise UsageError(f"--stack {escaped(text)}: the name {quoted(name)} is reserved for second runs")
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):

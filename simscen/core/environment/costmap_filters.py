@@ -1,4 +1,4 @@
-"""Keepout areas and speed limits of the costmap filters, as masks and as zones, with the meaning of nav2_costmap_2d."""
+"""Masks (grids) and zones (polygons) of Nav2's costmap filters: keepout areas and speed limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FilterMasks:
-    """Filter masks that a stack receives; None if it receives no mask of this kind."""
+    """Filter masks that a stack receives. A mask that the stack does not receive is None."""
 
     keepout: OccupancyGrid | None = None
     speed: SpeedLimits | None = None
@@ -29,7 +29,8 @@ class FilterMasks:
 class SpeedLimits:
     """Mask of speed limits.
 
-    A cell of value v allows a speed of `base + multiplier * v`, in percent of full speed if `percent`, else in m/s.
+    A cell of value v limits the speed to `base + multiplier * v`. The limit is in percent of full speed if `percent` is
+    True, and in m/s otherwise.
     """
 
     grid: OccupancyGrid
@@ -43,15 +44,15 @@ class SpeedLimits:
         return any(self.limit_of_cell(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
 
     def at(self, pose: Pose2, full_speed: float) -> float | None:
-        """Return the limit in m/s at the pose of the robot in the map frame; None if there is no limit.
+        """Return the limit in m/s at a pose in the map frame; None if there is no limit.
 
-        `full_speed` is the top speed of the controller in m/s.
+        `full_speed` is the maximum speed of the controller in m/s.
         """
         value = int(self.grid.values_at(np.array([[pose.x, pose.y]]))[0])
         return self.limit_of_cell(value, full_speed)
 
     def at_points(self, points: Array, full_speed: float) -> Array:
-        """Return the limits (n,) in m/s at points (n, 2) of the map frame; inf for no limit."""
+        """Return the limits (n,) in m/s at points (n, 2) in the map frame; inf where there is no limit."""
         values = self.grid.values_at(points)
         limits = np.full(len(points), np.inf)
         for value in np.unique(values).tolist():
@@ -62,8 +63,7 @@ class SpeedLimits:
     def limit_of_cell(self, value: int, full_speed: float) -> float | None:
         """Return the limit in m/s for the value of a cell; None if there is no limit.
 
-        As in Nav2's SpeedFilter, there is no limit if the value or the limit is 0 or negative, or if the limit is above
-        100 percent.
+        As in Nav2's SpeedFilter, there is no limit if the value or the limit is at most 0, or the limit is above 100 %.
         """
         limit = self.base + self.multiplier * value
         if value <= 0 or limit <= 0 or (self.percent and limit > 100):
@@ -72,22 +72,19 @@ class SpeedLimits:
 
 
 def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, 2) of the map frame lie in occupied cells of a keepout mask.
-
-    Cells with lower values do not forbid anything.
-    """
+    """Return a mask (n,) of the points (n, 2) in the map frame that lie in cells of the value OCCUPIED."""
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 
 Block = tuple[int, int, int, int, int]
-"""Column, row, width and height in cells, and the value of all its cells."""
+"""Rectangle of equal cells: first column, first row, width, height, and the value of the cells."""
 
 
 @dataclass(frozen=True)
 class MaskBlocks:
-    """Compact form of a filter mask for logs: the cells with values from 1 to 100, as `blocks` that do not overlap.
+    """Compact form of a filter mask for logs: `blocks` of cells with values from 1 to 100, which do not overlap.
 
-    `resolution` is in m per cell, and `origin` is the pose of the corner of cell (0, 0), as in OccupancyGrid.
+    `resolution` is in m per cell. `origin` is the pose of the corner of cell (0, 0) in the map frame.
     """
 
     resolution: float
@@ -105,8 +102,8 @@ class MaskBlocks:
         return OccupancyGrid(cells, self.resolution, self.origin)
 
     @property
-    def forbidden(self) -> Array:
-        """The occupied blocks (n, 4) as min x, min y, max x, max y in m in the frame of the mask."""
+    def occupied_boxes(self) -> Array:
+        """Blocks of value OCCUPIED (n, 4) as min x, min y, max x, max y in m in the frame of the mask."""
         cells_xywh = np.array([block[:4] for block in self.blocks if block[4] == OCCUPIED], dtype=np.float64).reshape(
             -1, 4
         )
@@ -115,19 +112,19 @@ class MaskBlocks:
         return boxes
 
     def to_mask_frame(self, poses: Array) -> Array:
-        """Transform poses (n, 3) as x, y, yaw from the map frame to the frame of the mask."""
+        """Transform poses (n, 3), given as x, y, yaw, from the map frame to the frame of the mask."""
         local = self.origin.inverse().apply(poses[:, :2])
         return np.column_stack((local, poses[:, 2] - self.origin.yaw))
 
 
 def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
-    """Return the blocks of a mask: runs of equal cells in a row, joined with equal runs in the following rows."""
+    """Divide a mask into blocks: runs of equal cells in a row, joined with the same runs in the following rows."""
     blocks: list[Block] = []
     first_row: dict[tuple[int, int, int], int] = {}
     for row in range(len(grid.cells) + 1):
         if 0 < row < len(grid.cells) and np.array_equal(grid.cells[row], grid.cells[row - 1]):
             continue
-        runs = _runs(grid.cells[row]) if row < len(grid.cells) else []
+        runs = _row_runs(grid.cells[row]) if row < len(grid.cells) else []
         current_runs = set(runs)
         for run in [run for run in first_row if run not in current_runs]:
             column, width, value = run
@@ -137,8 +134,8 @@ def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
     return MaskBlocks(float(grid.resolution), grid.origin, tuple(blocks))
 
 
-def _runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Return column, width and value of each run of equal cells with a value above 0."""
+def _row_runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
+    """Return first column, width, and value of each run of equal cells in a row; without runs of value 0 or less."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(cells)) + 1, [len(cells)])).tolist()
     return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
 
@@ -149,7 +146,7 @@ Filter = Literal["keepout", "speed"]
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """Enabled zones and masks: `keepout` polygons, and `speed` polygons with limits in m/s, all in the map frame."""
+    """Enabled zones and masks, in the map frame. `speed` contains pairs of a polygon and its speed limit in m/s."""
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()
@@ -158,10 +155,10 @@ class Zones:
 
 @dataclass(frozen=True)
 class ZoneSwitch:
-    """Command that enables or disables the zone in a region.
+    """Command that enables or disables a zone of a costmap filter.
 
-    If `region` is None, the command applies to the filter with all its zones and its mask. `speed_limit` in m/s is the
-    new limit of a zone of the speed filter; None keeps the limit.
+    `region` is the region of the zone; None for all zones and the mask of the filter. `speed_limit` is the new limit of
+    a zone of the speed filter in m/s; None keeps the limit.
     """
 
     filter: Filter

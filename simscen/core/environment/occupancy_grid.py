@@ -18,7 +18,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """Values of cells."""
 
 MAX_CELLS = 2**24
-"""Maximum number of cells of a map that `refined` returns. Its costs and distances take about 200 MB."""
+"""Maximum number of cells of a map that `refined` returns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ class OccupancyGrid:
         return self.cells.shape[0], self.cells.shape[1]
 
     def refined(self, max_cell_size: float) -> OccupancyGrid:
-        """Return the map with each cell split into smaller ones, at most `max_cell_size` m wide if MAX_CELLS allows it.
+        """Return the map with cells that are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
 
-        Cells as large as a robot are too coarse for goals and for the position of walls.
+        Each cell is split into equal cells of the same value.
         """
         rows, columns = self.shape
         max_parts = math.isqrt(MAX_CELLS // max(1, rows * columns))
@@ -49,16 +49,16 @@ class OccupancyGrid:
         return self if parts <= 1 else _split(self, parts)
 
     def cell_of(self, points: Array) -> npt.NDArray[np.int64]:
-        """Return the cells (n, 2) as (row, column) of map points (n, 2); they may lie outside the grid."""
+        """Return the cells (n, 2), as (row, column), at map points (n, 2). Cells can lie outside the grid."""
         local = self.origin.inverse().apply(points) / self.resolution
         return np.floor(local[:, ::-1]).astype(np.int64)
 
     def center_of(self, cells: npt.NDArray[np.int64]) -> Array:
-        """Return the map points (n, 2) of the centers of cells (n, 2) given as (row, column)."""
+        """Return the centers (n, 2) of cells (n, 2), given as (row, column), in the map frame."""
         return self.origin.apply((cells[:, ::-1].astype(np.float64) + 0.5) * self.resolution)
 
     def inside(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Return which of the cells (n, 2) lie on the grid."""
+        """Return a mask (n,) of the cells (n, 2) that lie on the grid."""
         result: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < self.shape), axis=1)
         return result
 
@@ -73,6 +73,6 @@ class OccupancyGrid:
 
 @cached_on_instance
 def _split(grid: OccupancyGrid, parts: int) -> OccupancyGrid:
-    """Return the grid with each cell split into `parts` x `parts` cells. Cached, because all runs use the same grid."""
+    """Return the grid with each cell split into `parts` x `parts` cells."""
     cells = grid.cells.repeat(parts, axis=0).repeat(parts, axis=1)
     return OccupancyGrid(cells, grid.resolution / parts, grid.origin)

@@ -1,4 +1,4 @@
-"""Visible parts of a world that replay pages and pictures show, but that no message of a run contains."""
+"""Data that replay pages and pictures of a run show: objects, places, ramps, floors, zones, and map of the world."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ else:
 class MovableObject:
     """Movable object at its start pose.
 
-    `outlines` are those of its parts, seen from above, in the frame of the object. `closed` and `opened` are the poses
-    of a door panel, whose frame is at the hinge; None for other objects. `mass` is in kg; 0 for an object that cannot
-    be pushed.
+    `outlines` are the outlines of its parts, seen from above, in the frame of the object. `closed` and `opened` are the
+    poses of a door panel; None for other objects. `mass` is in kg; 0 if the object cannot be pushed.
     """
 
     name: str
@@ -41,8 +40,7 @@ class MovableObject:
 class DrivableSurface:
     """Surface on which wheels can roll: a ramp, a sill, or a platform.
 
-    `height` is the height of the highest point in m. `uphill` is the rise per meter along x and y; zeros for a level
-    surface.
+    `height` is the height of the highest point in m. `uphill` is the slope along x and y in m per m.
     """
 
     name: str
@@ -53,7 +51,7 @@ class DrivableSurface:
 
 @dataclass(frozen=True)
 class FrictionRegion:
-    """Region whose floor has another friction than dry concrete (1) at the start of the run."""
+    """Region whose floor does not have the default friction of 1 (rubber on dry concrete) at the start of the run."""
 
     region: str
     outline: Polygon
@@ -64,8 +62,8 @@ class FrictionRegion:
 class FilterZone:
     """Zone or mask of a costmap filter at the start of the run.
 
-    A zone has a `region` and an `outline`, a mask has `cells`. `speed_limit` is in m/s; 0 for none. `robot` is the name
-    of the robot whose stack has the filter.
+    A zone has a `region` and an `outline`. A mask has `cells`. `speed_limit` is in m/s; 0 for none. `robot` is the name
+    of the robot that uses the filter.
     """
 
     filter: Filter
@@ -78,10 +76,10 @@ class FilterZone:
 
 @dataclass(frozen=True)
 class CompressedGrid:
-    """Occupancy grid that can be written as JSON.
+    """Occupancy grid with compressed cells, which can be written as JSON.
 
     `width` and `height` are in cells, and `resolution` is in m per cell. `data` contains the int8 cells row by row,
-    compressed by zlib, in base64.
+    compressed by zlib and encoded in base64.
     """
 
     width: int
@@ -111,8 +109,8 @@ class CompressedGrid:
 class Scenery:
     """Visible parts of the world at the start of a run.
 
-    `things` are movable objects, `ground` are drivable surfaces, `floors` are regions with another friction, and
-    `zones` are those of costmap filters. `map` is set if the map of the world differs from the map of the robot.
+    `places` are named poses, and `zones` are zones and masks of costmap filters. `map` is the map of the world; None if
+    it is the same as the map of the robot.
     """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)

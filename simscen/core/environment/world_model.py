@@ -1,4 +1,4 @@
-"""Plain data of a world: solids, bodies, named places, map, floor friction, and pedestrians."""
+"""Data of a world: solids, bodies, named places, map, friction of the floor, and pedestrians."""
 
 from __future__ import annotations
 
@@ -25,12 +25,14 @@ class World:
     Attributes:
         solids: Parts that never move.
         bodies: Objects that can move.
-        doors: Poses of each door panel when closed and when open, by the name of its body.
-        friction: Friction of the floor by name of region; 1 elsewhere.
+        places: Named poses.
+        regions: Named polygons.
+        doors: Closed pose and open pose of each door panel, by the name of its body.
+        friction: Friction coefficient of the floor by name of region; 1 elsewhere.
         bounds: (min x, min y, max x, max y) in m.
         has_open_ground: Whether the level ground reaches beyond `bounds`.
-        grid: Occupancy map that the world was loaded from (a ROS map); None for other worlds.
-        notes: Warnings of the importer, each with file and element.
+        grid: ROS map that the world was loaded from; None for other worlds.
+        notes: Warnings of the importer, with file and element.
     """
 
     name: str
@@ -48,10 +50,9 @@ class World:
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """World that is prepared once for all its runs.
+    """World with the data that are computed once for all its runs.
 
-    `mesh` contains all fixed solids, and `map` is the occupancy grid that robots get. Both consist of numpy arrays,
-    which remain valid in worker processes that are forked.
+    `mesh` contains all fixed solids. `map` is the occupancy grid that robots receive.
     """
 
     world: World
@@ -65,9 +66,9 @@ DISC_CORNERS = 32
 
 @dataclass(frozen=True)
 class Patch:
-    """Part of the floor with another friction.
+    """Part of the floor with changed friction.
 
-    `friction` is that of rubber wheels. `until` is the last tick at which the patch exists; inf for the whole run.
+    `friction` is the coefficient for rubber wheels. `until` is the last tick of the change; inf if it never ends.
     """
 
     outline: Polygon
@@ -76,29 +77,29 @@ class Patch:
 
 
 def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
-    """Return a polygon with DISC_CORNERS corners on the circle around `center` with `radius` in m."""
+    """Return a polygon with DISC_CORNERS corners on the circle around `center` (x, y in m) with `radius` in m."""
     turns = [2 * math.pi * k / DISC_CORNERS for k in range(DISC_CORNERS)]
     return tuple((center[0] + radius * math.cos(turn), center[1] + radius * math.sin(turn)) for turn in turns)
 
 
 Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "threatening"]
 """Reaction of a pedestrian to the robot, with the names of HuNavSim."""
-Unseen = Literal["robots", "people", "objects"]
-"""What a pedestrian can ignore; "people" are other pedestrians."""
+Ignorable = Literal["robots", "people", "objects"]
+"""Obstacles that a pedestrian can ignore; "people" are other pedestrians."""
 Repeat = Literal["once", "loop", "back_and_forth"]
 """Order in which a pedestrian walks to its goals."""
 
-BODY_HEIGHT_M = 1.7
-"""Height of the upright cylinder that represents a pedestrian."""
+PEDESTRIAN_HEIGHT_M = 1.7
+"""Default height of the upright cylinder that represents a pedestrian."""
 
 
 @dataclass(frozen=True)
 class WalkingPedestrian:
     """Pedestrian that starts at rest at `pose` and walks to `goals` (x, y in m) one after the other.
 
-    `speed` is the preferred speed in m/s; `radius` and `height` of the body are in m. Pedestrians of the same `group`
-    stay together. `blind_to` lists what the pedestrian ignores. Behaviors other than regular and impassive are
-    reactions: they begin within `reacts_within` m of a robot and last for `reacts_for` s.
+    `speed` is the preferred speed in m/s. `radius` and `height` of the body are in m. Pedestrians of the same `group`
+    stay together. `blind_to` contains the obstacles that the pedestrian ignores. A `behavior` other than regular and
+    impassive is a reaction: it begins within `reacts_within` m of a robot and lasts for `reacts_for` s.
     """
 
     name: str
@@ -107,19 +108,19 @@ class WalkingPedestrian:
     repeat: Repeat = "once"
     speed: float = 1.3
     radius: float = 0.25
-    height: float = BODY_HEIGHT_M
+    height: float = PEDESTRIAN_HEIGHT_M
     behavior: Behavior = "regular"
     group: str | None = None
-    blind_to: frozenset[Unseen] = frozenset()
+    blind_to: frozenset[Ignorable] = frozenset()
     reacts_within: float = 0.0
     reacts_for: float = 0.0
 
 
 @dataclass(frozen=True)
 class PedestrianAction:
-    """Something that a pedestrian did: it reached a goal, began a reaction to a robot, or ended it (calmed).
+    """Action of the pedestrian `name`: it reached a goal, began to react to a robot, or ended its reaction (calmed).
 
-    `name` is that of the pedestrian. `about` is the number of the goal (from 1) or the name of the robot.
+    `about` is the number of the goal, counted from 1, or the name of the robot.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Planar and spatial geometry: poses, polygons, shapes, meshes, rays and scripted paths.
+"""Geometry in the plane and in space: poses, polygons, shapes, meshes, rays, and scripted paths.
 
 Lengths are in meters and angles in radians. Frames follow ROS REP 103.
 """

@@ -24,10 +24,9 @@ WheelValues = tuple[float, float, float, float]
 class MecanumWheels:
     """Kinematics of a base with four mecanum wheels.
 
-    The wheels have the given `radius` and the distances `half_base` (along x) and `half_track` (along y) from the
-    center, in m. `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from
-    above, the upper rollers point to the center, and the lower ones form an O. Source: Taheri, Qiao and Ghaeminezhad,
-    "Kinematic Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015, here for any slant.
+    The wheels are `half_base` m (along x) and `half_track` m (along y) from the center. `radius` is in m. `slant` is
+    the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the rollers form an X.
+    Source: Taheri, Qiao and Ghaeminezhad, "Kinematic Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015.
     """
 
     radius: float
@@ -41,10 +40,7 @@ class MecanumWheels:
         return self.half_track + self.slant * self.half_base
 
     def speeds(self, motion: Twist) -> WheelValues:
-        """Return the wheel speeds in rad/s for a velocity of the base.
-
-        For a displacement in m and rad instead of a velocity, the result is in rad.
-        """
+        """Return the wheel speeds in rad/s for a velocity of the base."""
         forward, left, turn = motion.vx, self.slant * motion.vy, self.lever * motion.wz
         return (
             (forward - left - turn) / self.radius,
@@ -54,10 +50,7 @@ class MecanumWheels:
         )
 
     def motion(self, speeds: WheelValues) -> Twist:
-        """Return the velocity of the base that fits the wheel speeds in rad/s best: the pseudo-inverse of `speeds`.
-
-        For wheel rotations in rad instead of speeds, the result is a displacement in m and rad.
-        """
+        """Return the velocity of the base for wheel speeds in rad/s, by the method of least squares."""
         front_left, front_right, rear_left, rear_right = (self.radius * speed / 4 for speed in speeds)
         return Twist(
             front_left + front_right + rear_left + rear_right,

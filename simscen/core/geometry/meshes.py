@@ -1,4 +1,7 @@
-"""Operations on triangle meshes: submeshes, convexity test, tiles of nearby faces, and detection of drivable solids."""
+"""Operations on triangle meshes: submeshes, convexity test, tiles of nearby faces, and search of drivable solids.
+
+`vertices` are (n, 3) in m. `faces` are (m, 3) indices of vertices.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +19,19 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     Faces = npt.NDArray[np.int32]
-    Numbers = npt.NDArray[np.int64]
+    Indices = npt.NDArray[np.int64]
     Mask = npt.NDArray[np.bool_]
 
 MAX_CONVEX_FACES = 400
-"""Meshes with more faces are treated as concave without a test."""
+"""Maximum number of faces of a mesh that `is_convex` tests."""
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
 """Orders of coordinates in a cross product."""
 CONVEX_TOLERANCE_M = 1e-6
-"""Distance in m by which vertices of a convex mesh may lie outside the plane of a face."""
+"""Distance in m by which a vertex of a convex mesh may lie outside the plane of a face."""
 
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
-    """Return a mesh of the given faces, with only the vertices that they use."""
+    """Return a mesh of the given faces, without the vertices that no face uses."""
     if faces.size < len(vertices) // 8:
         used, indices = np.unique(faces, return_inverse=True)
         return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
@@ -38,7 +41,7 @@ def submesh(vertices: Array, faces: Faces) -> Mesh:
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
-    """Return a mesh of the faces that are partly between `heights`, the lowest and the highest z in m."""
+    """Return a mesh of the faces that are at least partly between two `heights`: minimum and maximum z in m."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
     outside_range = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
@@ -46,7 +49,7 @@ def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float,
 
 
 def is_convex(mesh: Mesh) -> bool:
-    """Return whether a mesh is its own convex hull; False for meshes with more than MAX_CONVEX_FACES faces."""
+    """Return whether a mesh is convex; False for meshes with more than MAX_CONVEX_FACES faces."""
     if len(mesh.faces) > MAX_CONVEX_FACES:
         return False
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
@@ -59,26 +62,26 @@ def is_convex(mesh: Mesh) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FaceTiles:
-    """Faces of a mesh, sorted into n square tiles of the plane to find those near a point quickly.
+    """Faces of a mesh, grouped by square tiles of the xy plane for a fast search of nearby faces.
 
-    Tile k contains `faces[starts[k]:starts[k + 1]]`. All corners of its faces lie between `low[k]` and `high[k]`, given
-    as x and y in m.
+    Tile k contains `faces[starts[k]:starts[k + 1]]`. The bounding box of these faces extends from `low[k]` to
+    `high[k]`, given as (x, y) in m.
     """
 
     faces: Faces
-    starts: Numbers
+    starts: Indices
     low: Array
     high: Array
 
     def __len__(self) -> int:
         return len(self.low)
 
-    def tile(self, number: int) -> Faces:
-        """Return the faces of the tile with this index."""
-        return self.faces[self.starts[number] : self.starts[number + 1]]
+    def tile(self, index: int) -> Faces:
+        """Return the faces of a tile."""
+        return self.faces[self.starts[index] : self.starts[index + 1]]
 
     def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Return which tiles may have a face within `within` m of the point (x, y)."""
+        """Return a mask of the tiles whose bounding box is within `within` m of the point (x, y)."""
         point = (x, y)
         outside = np.maximum(np.maximum(self.low - point, point - self.high), 0.0)
         found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
@@ -86,7 +89,7 @@ class FaceTiles:
 
 
 def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Sort faces by their centers into square tiles of `edge` x `edge` m."""
+    """Group faces by square tiles of `edge` x `edge` m. The center of a face determines its tile."""
     corners = vertices[faces, :2]
     squares = np.floor(corners.mean(axis=1) / edge)
     order = np.lexsort((squares[:, 1], squares[:, 0]))
@@ -99,11 +102,11 @@ def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
 
 
 FLOOR_HEIGHT_M = 0.005
-"""Height up to which faces are ignored: wheels roll on the ground plane instead, which has no edges."""
+"""Height up to which faces belong to the floor."""
 MAX_SLOPE_RAD = math.radians(50)
-"""Slope above which faces are walls for every robot: rubber on dry concrete (friction 1) holds up to 45°."""
+"""Maximum slope of faces that wheels can roll on. Steeper faces are walls."""
 SOLIDS_PER_BATCH = 64
-"""Number of solids that are compared with all others at once, to limit memory."""
+"""Number of solids that `drivable_solids` compares with all other solids at once, which limits memory."""
 
 SolidIndices = frozenset[int]
 """Indices into `TriangleMesh.names`."""
@@ -119,34 +122,34 @@ def face_normals(mesh: TriangleMesh) -> Array:
 
 
 def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
-    """Return which faces are above FLOOR_HEIGHT_M, face upwards, and are at most `max_slope` rad steep."""
+    """Return a mask of the faces above the floor that point upwards and are at most `max_slope` rad steep."""
     top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
     found: Mask = (face_normals(mesh)[:, 2] >= math.cos(max_slope)) & (top > FLOOR_HEIGHT_M)
     return found
 
 
 @cached_on_instance
-def drivable_solids(mesh: TriangleMesh, reach: float) -> SolidIndices:
-    """Return the indices of the fixed solids that wheels can roll on if they can climb steps of `reach` m.
+def drivable_solids(mesh: TriangleMesh, max_step: float) -> SolidIndices:
+    """Return the indices of the solids that a robot can drive onto if its wheels climb steps of `max_step` m.
 
-    A solid is drivable if its upward faces begin at most `reach` m above the floor, or if their bounding box is at most
-    `reach` m away from that of a drivable solid. All other solids are walls: only the hull of the robot touches them.
+    The upward faces of such a solid begin at most `max_step` m above the floor, or their bounding box is at most
+    `max_step` m away from the upward faces of another drivable solid.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]
     bottom = corners[:, :, 2].min(axis=1)
-    if not (bottom <= reach).any():
+    if not (bottom <= max_step).any():
         return frozenset()
     owners, solid = np.unique(mesh.owners[faces], return_inverse=True)
     low, high = np.full((len(owners), 3), math.inf), np.full((len(owners), 3), -math.inf)
     np.minimum.at(low, solid, corners.min(axis=1))
     np.maximum.at(high, solid, corners.max(axis=1))
-    reached = low[:, 2] <= reach
+    reached = low[:, 2] <= max_step
     newly_reached: Mask = reached
     while newly_reached.any():
         adjacent = np.zeros(len(owners), dtype=np.bool_)
         for batch in np.array_split(np.flatnonzero(newly_reached), 1 + newly_reached.sum() // SOLIDS_PER_BATCH):
-            apart = (low[:, None] > high[batch] + reach) | (high[:, None] + reach < low[batch])
+            apart = (low[:, None] > high[batch] + max_step) | (high[:, None] + max_step < low[batch])
             adjacent |= np.any(~np.any(apart, axis=2), axis=1)
         newly_reached = adjacent & ~reached
         reached = reached | adjacent

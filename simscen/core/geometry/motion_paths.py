@@ -1,4 +1,7 @@
-"""Poses of bodies on scripted paths, and bounds of their speed and of their movement per tick."""
+"""Poses of bodies on scripted paths, and upper bounds of their speed and of their displacement per tick.
+
+A segment is the part of a path between two consecutive poses. `leg` is the index of a segment.
+"""
 
 import itertools
 import math
@@ -12,15 +15,14 @@ from simscen.core.geometry.shapes import MotionPath
 SMOOTH_PEAK_SPEED_RATIO = 1.5
 """Ratio of peak speed to mean speed of a segment with smooth easing."""
 MAX_STEP_M = 0.1
-"""Longest distance that any part of a scripted body may move per tick. Contact is tested once per tick, so a faster
-body could pass through a robot unnoticed. All robots are wider than this."""
+"""Maximum distance that any point of a scripted body may move per tick; a faster body can pass through a robot."""
 Step = tuple[float, float, float]
-"""Displacement along x and y in m, and rotation in rad; or a velocity in m/s and rad/s."""
+"""Displacement (x, y, yaw) in m and rad, or velocity in m/s and rad/s."""
 _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 def pose_at(path: MotionPath, seconds: float) -> Pose2:
-    """Return the pose on the path, `seconds` after it started."""
+    """Return the pose on the path, `seconds` after its start."""
     times = path.times
     if len(times) == 1:
         return path.poses[0]
@@ -30,7 +32,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
     duration = times[leg + 1] - times[leg]
     part = (local - times[leg]) / duration if duration > 0 else 1.0
     if path.ease == "spline":
-        return _on_curve(path, leg, part)
+        return _spline_pose(path, leg, part)
     if path.ease == "smooth":
         part = part * part * (3.0 - 2.0 * part)
     return Pose2(
@@ -41,7 +43,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
 
 
 class PathSampler:
-    """Samples a path at height `z` (m). It caches values of the current segment, so that increasing times are fast."""
+    """Computes poses on a path at the height `z` (m). Fast for increasing times, because it caches the segment."""
 
     def __init__(self, path: MotionPath, z: float) -> None:
         self._path, self._z = path, z
@@ -52,7 +54,7 @@ class PathSampler:
         self._leg: PathSegment
 
     def at(self, seconds: float) -> Pose3:
-        """Return the pose in space, `seconds` after the path started; equal to `pose_at` in the plane."""
+        """Return the pose in space, `seconds` after the start of the path. x, y, and yaw are those of `pose_at`."""
         path, z = self._path, self._z
         if not self._even:
             return Pose3.planar(pose_at(path, seconds), z)
@@ -79,9 +81,8 @@ class PathSampler:
 class PathSegment(NamedTuple):
     """Segment between two poses of a path.
 
-    `begin` and `duration` are in s of path time. `x`, `y` and `yaw` are the start pose. `dx` and `dy` are the
-    displacement in m, and `turn` is the rotation in rad over the whole segment. `qz` and `qw` are the quaternion of the
-    initial heading.
+    `begin` and `duration` are in s of path time. `x`, `y` and `yaw` are the start pose. `dx`, `dy` (m), and `turn`
+    (rad) are the displacement over the whole segment. `qz` and `qw` are the quaternion of the start pose.
     """
 
     begin: float
@@ -107,19 +108,19 @@ class PathSegment(NamedTuple):
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
     """Return an upper bound in m/s of the speed of any point within `reach` m of the origin of the body.
 
-    The result is inf if the path contains a jump. The bound is exact for linear and smooth easing.
+    The result is inf if the path contains a jump.
     """
     speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
-    if path.mode == "loop" and _meters(_step(path.poses[-1], path.poses[0]), reach) > 0:
+    if path.mode == "loop" and _max_distance(_displacement(path.poses[-1], path.poses[0]), reach) > 0:
         return math.inf
     return max(speeds, default=0.0)
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return an upper bound in m of the distance that a point within `reach` m of the origin moves in any `seconds`.
+    """Return an upper bound in m of the distance that a point of the body moves within a period of `seconds`.
 
-    Jumps are left out: a segment without duration, or a loop that does not end where it begins. Worlds of Gazebo
-    contain such jumps on purpose.
+    The point is within `reach` m of the origin of the body. Jumps do not count: segments without duration, and the
+    return to the first pose in a loop.
     """
     durations = [end - begin for begin, end in itertools.pairwise(path.times)]
     lengths = [_speed(path, leg, reach) * duration if duration > 0 else 0.0 for leg, duration in enumerate(durations)]
@@ -142,7 +143,7 @@ def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
 
 
 def too_fast_message(name: str, step: float) -> str:
-    """Return the error message for a scripted body that moves `step` m in one tick, more than MAX_STEP_M."""
+    """Return the error message for a scripted body that moves `step` m in one tick."""
     return (
         f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
         f"than {MAX_STEP_M:g} m"
@@ -159,7 +160,7 @@ def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -
 
 
 class SweptSegment(NamedTuple):
-    """Straight segment from (x, y) to (to_x, to_y), and the largest `deviation` of a path from it, in m."""
+    """Straight line from (x, y) to (to_x, to_y), and the maximum `deviation` of a path segment from it, in m."""
 
     x: float
     y: float
@@ -169,7 +170,7 @@ class SweptSegment(NamedTuple):
 
 
 def swept_segments(path: MotionPath) -> list[SweptSegment]:
-    """Return segments such that each position on the path is within `deviation` of one of them."""
+    """Return a straight line for each segment of the path."""
     (x, y, _), *_ = poses = path.poses
     legs = range(len(path.times) - 1)
     return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _deviation(path, leg)) for leg in legs] or [
@@ -178,29 +179,29 @@ def swept_segments(path: MotionPath) -> list[SweptSegment]:
 
 
 def _deviation(path: MotionPath, leg: int) -> float:
-    """Return an upper bound of the deviation in m: a cubic curve lies in the convex hull of its control points."""
+    """Return an upper bound in m of the distance of a segment from the straight line between its ends."""
     if path.ease != "spline":
         return 0.0
-    third = (path.times[leg + 1] - path.times[leg]) / 3
-    return third * max(_meters(_velocity(path, k), 0.0) for k in (leg, leg + 1))
+    third = (path.times[leg + 1] - path.times[leg]) / 3  # a cubic curve lies in the convex hull of its control points
+    return third * max(_max_distance(_spline_velocity(path, k), 0.0) for k in (leg, leg + 1))
 
 
 def _speed(path: MotionPath, leg: int, reach: float) -> float:
-    """Return an upper bound of the speed in m/s on segment `leg` of any point within `reach` m of the origin."""
-    step, seconds = _step(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
+    """Return an upper bound in m/s of the speed on a segment of any point within `reach` m of the origin."""
+    step, seconds = _displacement(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
     if path.ease == "spline":
         # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
-        before, after = _velocity(path, leg), _velocity(path, leg + 1)
+        before, after = _spline_velocity(path, leg), _spline_velocity(path, leg + 1)
         middle = [3.0 * displacement / seconds - a - b for displacement, a, b in zip(step, before, after, strict=True)]
-        return max(_meters(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
-    meters = _meters(step, reach)
+        return max(_max_distance(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
+    meters = _max_distance(step, reach)
     if meters == 0:
         return 0.0
     return meters / seconds * (SMOOTH_PEAK_SPEED_RATIO if path.ease == "smooth" else 1.0) if seconds > 0 else math.inf
 
 
-def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
-    """Return the pose of a spline after the fraction `part` of the time of segment `leg`."""
+def _spline_pose(path: MotionPath, leg: int, part: float) -> Pose2:
+    """Return the pose on a spline after the fraction `part` of the duration of a segment."""
     begin, end = path.poses[leg], path.poses[leg + 1]
     duration = path.times[leg + 1] - path.times[leg]
     smooth_part = part * part * (3.0 - 2.0 * part)
@@ -208,14 +209,14 @@ def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
     x, y, yaw = (
         start + smooth_part * displacement + leaving * before + arriving * after
         for start, displacement, before, after in zip(
-            begin, _step(begin, end), _velocity(path, leg), _velocity(path, leg + 1), strict=True
+            begin, _displacement(begin, end), _spline_velocity(path, leg), _spline_velocity(path, leg + 1), strict=True
         )
     )
     return Pose2(x, y, wrap(yaw))
 
 
-def _velocity(path: MotionPath, k: int) -> Step:
-    """Return the velocity of a spline at pose k in m/s and rad/s."""
+def _spline_velocity(path: MotionPath, k: int) -> Step:
+    """Return the velocity of a spline at pose k in m/s and rad/s (Catmull-Rom)."""
     last = len(path.poses) - 1
     if 0 < k < last:
         before, after = k - 1, k
@@ -224,22 +225,22 @@ def _velocity(path: MotionPath, k: int) -> Step:
     else:
         return 0.0, 0.0, 0.0
     seconds = path.times[before + 1] - path.times[before] + path.times[after + 1] - path.times[after]
-    steps = [_step(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
+    steps = [_displacement(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
     x, y, yaw = ((a + b) / seconds for a, b in zip(*steps, strict=True))
     return x, y, yaw
 
 
-def _step(begin: Pose2, end: Pose2) -> Step:
+def _displacement(begin: Pose2, end: Pose2) -> Step:
     return end.x - begin.x, end.y - begin.y, wrap(end.yaw - begin.yaw)
 
 
-def _meters(step: Step, reach: float) -> float:
-    """Return an upper bound in m of the displacement of any point within `reach` m of the origin."""
+def _max_distance(step: Step, reach: float) -> float:
+    """Return an upper bound in m of the distance that any point within `reach` m of the origin moves in a step."""
     return math.hypot(step[0], step[1]) + reach * abs(step[2])
 
 
 def _fold_repetitions(path: MotionPath, seconds: float) -> float:
-    """Return the path time with the same pose in the first repetition; unchanged if the path does not repeat."""
+    """Convert the time on a repeated path to the time of the same pose in the first repetition."""
     first, duration = path.times[0], path.times[-1] - path.times[0]
     since = seconds - first
     if duration <= 0 or since <= 0 or path.mode == "once":

@@ -1,4 +1,4 @@
-"""Polygons in the plane: distances to points, validity, decomposition into convex pieces, and signed separation.
+"""Polygons in the plane: distances, validity, decomposition into convex pieces, and path simplification.
 
 A polygon is a sequence of corners (x, y) in m. Its last corner is connected to the first one.
 """
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 Corner = tuple[float, float]
 
 MIN_WIDTH_M = 1e-6
-"""Width below which a polygon counts as one without area."""
+"""Minimum width of a valid polygon."""
 POINT = ((0.0, 0.0),)
-"""Outline of a body that is only a point."""
+"""Outline of a robot that is treated as a point."""
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m from a point to a filled polygon; 0 inside. The heading has no effect."""
+    """Return the distance in m from the position of a pose to a polygon; 0 inside."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     if polygon_contains(corners, (point.x, point.y)):
         return 0.0
@@ -34,7 +34,7 @@ def distance_to_polygon(point: Pose2, corners: Sequence[Corner]) -> float:
 
 
 def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, 2) lie inside the polygon (even-odd rule)."""
+    """Return a mask (n,) of the points (n, 2) that lie inside the polygon (even-odd rule)."""
     is_inside = np.zeros(len(points), dtype=np.bool_)
     for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if ay != by:
@@ -44,7 +44,7 @@ def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[n
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m from a position inside a polygon to its border; -1 for a position outside."""
+    """Return the distance in m from the position of a pose to the border of the polygon around it; -1 if outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):
         return -1.0
     return min(
@@ -53,9 +53,9 @@ def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
 
 
 def polygon_defect(ring: Sequence[Corner]) -> str | None:
-    """Return what is wrong with a ring of corners, such as "encloses no area"; None if it is the border of one area.
+    """Return why a polygon is invalid: "encloses no area" or "crosses or touches itself"; None if it is valid.
 
-    Repeated corners count once, so a ring may end with its first corner.
+    The ring of corners may end with its first corner.
     """
     corners = without_repeated_corners(ring)
     if _encloses_no_area(corners):
@@ -76,7 +76,7 @@ def polygon_defect(ring: Sequence[Corner]) -> str | None:
 
 
 def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
-    """Return the corners without those that equal the corner before them."""
+    """Return the corners, without each corner that is equal to the previous one."""
     return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
 
 
@@ -94,7 +94,7 @@ def _encloses_no_area(corners: Sequence[Corner]) -> bool:
 
 
 def _folds_back(a: Corner, b: Corner, c: Corner) -> bool:
-    """Return whether the path from a over b to c reverses its direction at b."""
+    """Return whether the path a, b, c reverses its direction at b."""
     return signed_double_area(a, b, c) == 0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0
 
 
@@ -142,10 +142,8 @@ def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
 
 
 def _ray_crosses_edge(point: Corner, a: Corner, b: Corner) -> bool:
-    """Return whether a ray from the point along +x crosses the edge from a to b.
-
-    Of the two ends of an edge, only the lower one belongs to it, so that a ray through a corner crosses one edge.
-    """
+    """Return whether a ray from the point along +x crosses the edge from a to b."""
+    # Only the lower end belongs to an edge, so that a ray through a corner crosses one edge.
     if (a[1] > point[1]) == (b[1] > point[1]):
         return False
     return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
@@ -156,10 +154,10 @@ Piece = tuple[Corner, ...]
 
 
 def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
-    """Decompose a valid ring into convex counterclockwise polygons that cover it exactly once.
+    """Decompose a polygon into convex counterclockwise polygons that do not overlap.
 
-    Ear clipping, then removal of unnecessary diagonals (Hertel and Mehlhorn, 1983). The result has at most four times
-    the minimum number of pieces. Raises ValueError for a ring that intersects itself.
+    Triangulates by ear clipping, then merges triangles (Hertel and Mehlhorn, 1983). Raises ValueError for a polygon
+    that intersects itself.
     """
     corners = without_repeated_corners(ring)
     if sum(signed_double_area(corners[0], a, b) for a, b in pairwise(corners)) < 0:
@@ -183,7 +181,7 @@ def _triangles(corners: list[Corner]) -> list[Piece]:
 
 
 def _triangle_at(corners: Sequence[Corner], k: int) -> tuple[Corner, Corner, Corner]:
-    """Return corner k with the corners before and after it."""
+    """Return corner k between the previous and the next corner."""
     return corners[k - 1], corners[k], corners[(k + 1) % len(corners)]
 
 
@@ -204,7 +202,7 @@ def _is_ear(corners: Sequence[Corner], k: int) -> bool:
 
 
 def _merge_triangles(triangles: Sequence[Piece]) -> list[Piece]:
-    """Join neighboring triangles and pieces as long as the results are convex."""
+    """Join triangles with a common edge as long as the results are convex (Hertel and Mehlhorn)."""
     pieces = dict(enumerate(triangles))
     owner = {edge: number for number, piece in pieces.items() for edge in _edges(piece)}
     for a, b in list(owner):
@@ -224,22 +222,21 @@ def _edges(piece: Piece) -> list[tuple[Corner, Corner]]:
 
 
 def _rotated_to(piece: Piece, corner: Corner) -> Piece:
-    """Return the same polygon with `corner` as its first corner."""
+    """Return the same polygon, starting with `corner`."""
     k = piece.index(corner)
     return (*piece[k:], *piece[:k])
 
 
 def _is_convex(corners: Sequence[Corner]) -> bool:
-    """Return whether a valid counterclockwise ring never turns right."""
+    """Return whether a valid counterclockwise polygon is convex."""
     return all(signed_double_area(*_triangle_at(corners, k)) >= 0 for k in range(len(corners)))
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
-    """Return the signed distance (n,) in m between two filled polygons: `moving` at `poses` (n, 3), and `fixed`.
+    """Return the signed distance (n,) in m between two polygons: `moving`, placed at `poses` (n, 3), and `fixed`.
 
-    A positive value is the distance between the nearest points. A negative value means that the polygons overlap: its
-    magnitude is the length of the shortest translation that separates them. For concave polygons, it is that of the
-    pair of convex pieces with the deepest overlap, which is a lower bound. `moving` may be a single point. Raises
+    The distance is negative if the polygons overlap. The magnitude is then the length of the shortest translation that
+    separates them; for concave polygons, a lower bound of this length. `moving` may be a single point. Raises
     ValueError for a polygon that intersects itself.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
@@ -255,14 +252,14 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
 
 
 POSES_PER_BATCH = 64
-"""Number of consecutive poses with one common search for nearby boxes; they are close together in a drive."""
+"""Number of consecutive poses that share one search for nearby boxes."""
 
 
 def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
-    """Return the smallest `separation` (n,) of `moving` at `poses` (n, 3) from any of many rectangles.
+    """Return the signed distance (n,) in m, as in `separation`, between a moving polygon and the nearest rectangle.
 
-    `boxes` (m, 4) are min x, min y, max x, max y in m. The result is inf if there are none. For speed, only rectangles
-    that can be the nearest are compared exactly, first for a batch of poses and then for each pose.
+    The polygon `moving` is placed at `poses` (n, 3). `boxes` (m, 4) are the rectangles as min x, min y, max x, max y in
+    m. The result is inf without rectangles.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
@@ -280,9 +277,9 @@ def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) 
 
 
 def _can_be_nearest(points: Array, boxes: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Return which boxes (m, 4) can be the nearest to a polygon that lies within `reach` m of each point (n, 2).
+    """Return a mask (n, m) of the boxes (m, 4) that can be the nearest one to a polygon around each point (n, 2).
 
-    The distances of a box from the point and from the polygon differ by at most `reach`. The result is (n, m).
+    The corners of the polygon are within `reach` m of the point.
     """
     beside = np.maximum(boxes[:, :2] - points[:, np.newaxis], points[:, np.newaxis] - boxes[:, 2:])
     outside = np.maximum(beside, 0.0)
@@ -304,11 +301,10 @@ def _transformed_corners(poses: Array, corners: Array) -> Array:
 
 
 def _convex_separation(moving: Array, still: Array) -> Array:
-    """Return the separations (n,) of n pairs of convex counterclockwise polygons, (n, h, 2) and (n, r, 2).
+    """Return the signed distances (n,) of n pairs of convex counterclockwise polygons, (n, h, 2) and (n, r, 2).
 
-    By the separating axis theorem, two convex polygons are apart if and only if one of them lies on the outer side of
-    an edge of the other. If they overlap, the smallest overlap along an edge normal is the shortest translation that
-    separates them.
+    The method is the separating axis theorem: polygons that overlap do so along all edge normals, and the smallest
+    overlap is the shortest translation that separates them.
     """
     along = np.maximum(_separation_along_normals(still, moving), _separation_along_normals(moving, still))
     apart = np.minimum(_distance_to_border(moving, still), _distance_to_border(still, moving))
@@ -317,9 +313,9 @@ def _convex_separation(moving: Array, still: Array) -> Array:
 
 
 def _separation_along_normals(polygon: Array, points: Array) -> Array:
-    """Return the largest signed distance (n,) along an outward edge normal from `polygon` to `points`.
+    """Return the largest gap (n,) in m between polygons (n, m, 2) and points (n, k, 2) along an edge normal.
 
-    `polygon` is (n, m, 2), and `points` are (n, k, 2). For each edge, the innermost of the points counts.
+    The gap of an edge is the signed distance of the innermost point from the edge; negative inside.
     """
     if polygon.shape[1] < 2:
         return np.full(len(points), -np.inf)
@@ -331,7 +327,7 @@ def _separation_along_normals(polygon: Array, points: Array) -> Array:
 
 
 def _distance_to_border(points: Array, polygon: Array) -> Array:
-    """Return the smallest distance (n,) of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
+    """Return the smallest distance (n,) in m of the points (n, k, 2) from the border of `polygon` (n, m, 2)."""
     along = np.roll(polygon, -1, axis=1) - polygon
     squared = np.maximum((along**2).sum(axis=2), np.finfo(np.float64).tiny)[:, np.newaxis]
     offset = points[:, :, np.newaxis] - polygon[:, np.newaxis]
@@ -342,10 +338,10 @@ def _distance_to_border(points: Array, polygon: Array) -> Array:
 
 
 def path_corners(path: Array, tolerance: float) -> list[int]:
-    """Return the indices of the inner corners of a path (n, 2), simplified to straight lines.
+    """Simplify a path (n, 2) to straight lines, and return the indices of their corners without the two ends.
 
-    The path deviates from the lines by at most `tolerance` m. The first and the last point are not in the result.
-    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973).
+    The path deviates from the lines by at most `tolerance` m. Source: Douglas and Peucker, Algorithms for the reduction
+    of the number of points (1973).
     """
     line, offsets = path[-1] - path[0], path - path[0]
     along = np.clip(offsets @ line / max(float(line @ line), 1e-9), 0.0, 1.0)

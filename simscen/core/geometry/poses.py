@@ -1,4 +1,4 @@
-"""Poses and rigid motions in the plane and in space, in m and rad, with the frames of ROS REP 103."""
+"""Poses in the plane and in space, in m and rad, with the axes of ROS REP 103."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, V
 
 
 class Pose2(NamedTuple):
-    """Position (m) and heading (rad) in the plane. A variable `a_from_b` is the pose of frame b in frame a."""
+    """Position (m) and heading (rad) in the plane.
+
+    As a transform, the pose of frame b in frame a is named `a_from_b`: it converts coordinates from b to a.
+    """
 
     x: float
     y: float
@@ -76,7 +79,7 @@ class Pose2(NamedTuple):
         return _new_pose(Pose2, (-c * x - s * y, s * x - c * y, turned if turned != -_PI else _PI))
 
     def between(self, other: Pose2) -> Pose2:
-        """Return the pose `other` relative to this one; both are in the same frame."""
+        """Return `other` in the frame of this pose: `b_from_c` for `a_from_b.between(a_from_c)`."""
         x, y, yaw = self
         far, aside, turn = other
         c, s = _cos(yaw), _sin(yaw)
@@ -85,7 +88,7 @@ class Pose2(NamedTuple):
         return _new_pose(Pose2, (along, left, turned if turned != -_PI else _PI))
 
     def apply(self, points: Array) -> Array:
-        """Transform points (n, 2) from the frame at this pose to its parent frame."""
+        """Return `points_in_a` (n, 2) for `a_from_b.apply(points_in_b)`."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         moved: Array = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
         return moved
@@ -96,7 +99,7 @@ class Pose2(NamedTuple):
 
 
 class Pose3(NamedTuple):
-    """Position (m) and orientation in space; the orientation is a unit quaternion (x, y, z, w)."""
+    """Position (m) and orientation in space, as a unit quaternion (qx, qy, qz, qw)."""
 
     x: float = 0.0
     y: float = 0.0
@@ -108,7 +111,7 @@ class Pose3(NamedTuple):
 
     @classmethod
     def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose3:
-        """Return the pose with fixed-axis roll, pitch and yaw, as in URDF and SDF."""
+        """Return the pose at (x, y, z) in m with fixed-axis roll, pitch and yaw in rad, as in URDF and SDF."""
         cr, sr = math.cos(roll / 2), math.sin(roll / 2)
         cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
         cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -122,9 +125,9 @@ class Pose3(NamedTuple):
 
     @classmethod
     def planar(cls, pose: Pose2, z: float = 0.0) -> Pose3:
-        """Return the pose in space of a pose in the plane at height `z` (m).
+        """Convert a pose in the plane to a level pose in space at the height `z` (m).
 
-        An infinite heading, which corrupted odometry can have, becomes nan.
+        If the heading is not finite, the orientation is nan.
         """
         x, y, yaw = pose
         half = yaw / 2 if _isfinite(yaw) else math.nan
@@ -142,7 +145,7 @@ class Pose3(NamedTuple):
 
     @property
     def is_level(self) -> bool:
-        """Whether the pose has no roll and pitch."""
+        """Whether roll and pitch are 0."""
         return self.qx == 0.0 and self.qy == 0.0
 
     def rotation(self) -> Array:
@@ -152,13 +155,13 @@ class Pose3(NamedTuple):
         return np.array([[a, d, 2 * (x * z + y * w)], [b, e, 2 * (y * z - x * w)], [c, f, 1 - 2 * (x * x + y * y)]])
 
     def apply(self, points: Array) -> Array:
-        """Transform points (n, 3) from the frame at this pose to its parent frame."""
+        """Return `points_in_a` (n, 3) for `a_from_b.apply(points_in_b)`."""
         moved: Array = points @ self.rotation().T + np.array(self.position)
         return moved
 
     def compose(self, other: Pose3) -> Pose3:
         """Return `a_from_c` for `a_from_b.compose(b_from_c)`."""
-        x, y, z = self._moved(other.position)
+        x, y, z = self._transform_point(other.position)
         ax, ay, az, aw = self.quaternion
         bx, by, bz, bw = other.quaternion
         return Pose3(
@@ -169,8 +172,8 @@ class Pose3(NamedTuple):
             aw * bw - ax * bx - ay * by - az * bz,
         )  # fmt: skip
 
-    def _moved(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Transform a point from this frame to the parent frame; without numpy if the pose is level, for speed."""
+    def _transform_point(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return `point_in_a` for `a_from_b` and `point_in_b`. Level poses do not need numpy, which is faster."""
         if self.qx != 0 or self.qy != 0:
             x, y, z = self.apply(np.array([point]))[0].tolist()
             return x, y, z
@@ -191,5 +194,5 @@ class Pose3(NamedTuple):
 
     @property
     def plane(self) -> Pose2:
-        """Position and heading on the ground."""
+        """Position and heading in the plane: x, y, and yaw."""
         return Pose2(self.x, self.y, self.yaw)

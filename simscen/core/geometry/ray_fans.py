@@ -1,4 +1,4 @@
-"""Interface of ray casters, fans of rays such as those of a lidar, and their buffers for Embree.
+"""Interface of ray casters, fans of rays such as the beams of a lidar, and buffers of rays for Embree.
 
 Embree casts rays in packets of 16 (`RTCRayHit16`).
 """
@@ -20,25 +20,24 @@ Singles = npt.NDArray[np.float32]
 PACKET_SIZE = 16
 """Number of rays per packet."""
 _ROWS = 21
-"""Number of values per ray, one row of a packet each.
+"""Number of rows of a packet. Each row contains one value of all 16 rays.
 
-In order: start (3), minimum distance, direction (3), time, maximum distance, mask, id, flags, and 9 values of the hit.
+Rows: start (3), minimum distance, direction (3), time, maximum distance, mask, id, flags, and 9 values of the hit.
 """
-_END, _MASK, _HIT = 8, 9, 17
-"""Row of the maximum distance, row of the mask, and first row of the ids of the hit."""
+_LENGTH_ROW, _MASK_ROW, _HIT_ID_ROW = 8, 9, 17
+"""Rows of the maximum distance and of the mask, and first row of the ids of the hit geometry."""
 _PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
 """Alignment of packets, and size of values, in bytes."""
 _ALL_BITS = 0xFFFFFFFF
-"""As a mask: the ray hits all geometries. As an id: nothing was hit."""
+"""Mask of a ray that hits all geometries, and id of the hit geometry if nothing was hit."""
 MIN_DIRECTION_COMPONENT = 2e-18
-"""Smaller direction components are set to 0. Embree treats components within 1e-18 as positive, but groups the rays of
-a packet by the signs of their components, so that a packet with such rays would not hit anything."""
+"""Magnitude below which components of directions are set to 0, because Embree misses hits with smaller components."""
 
 
 class RayPackets:
-    """Buffer of `count` rays for Embree: `starts` and `directions` (packets, 3, 16), and `ends` (packets, 16).
+    """Buffer of `count` rays for Embree: `starts` and `directions` (packets, 3, 16), and `lengths` (packets, 16).
 
-    `ends` are the maximum lengths of the rays in m. Embree overwrites them with the distances of the hits.
+    `lengths` are the maximum lengths of the rays in m. Embree replaces them with the distances of hits.
     """
 
     def __init__(self, count: int) -> None:
@@ -48,32 +47,29 @@ class RayPackets:
             : packets * _ROWS * PACKET_SIZE
         ].reshape(packets, _ROWS, PACKET_SIZE)
         words = rows.view(np.uint32)
-        words[:, _MASK] = words[:, _HIT:] = _ALL_BITS
+        words[:, _MASK_ROW] = words[:, _HIT_ID_ROW:] = _ALL_BITS
         self.starts: Singles = rows[:, :3]
         self.directions: Singles = rows[:, 4:7]
-        self.ends: Singles = rows[:, _END]
+        self.lengths: Singles = rows[:, _LENGTH_ROW]
         self._count = count
         first, size = rows.ctypes.data, _ROWS * PACKET_SIZE * _VALUE_BYTES
         self.addresses = [c_void_p(first + number * size) for number in range(packets)]
         """Address of each packet."""
 
-    def put(self, starts: Array, directions: Array, ends: float | Singles) -> None:
-        """Set the rays: they begin at `starts` (n, 3) and extend along `directions` (n, 3) up to the lengths `ends`.
-
-        Rays of negative length, which Embree skips, fill up the last packet.
-        """
+    def set_rays(self, starts: Array, directions: Array, lengths: float | Singles) -> None:
+        """Set the start points (n, 3), the directions (n, 3), and the maximum lengths (n,) of all rays."""
         for rows, values in ((self.starts, starts), (self.directions, directions)):
             flat = np.zeros((len(rows) * PACKET_SIZE, 3), dtype=np.float32)
             flat[: self._count] = values
             rows[:] = flat.reshape(-1, PACKET_SIZE, 3).swapaxes(1, 2)
         self.directions[np.abs(self.directions) < MIN_DIRECTION_COMPONENT] = 0.0
-        last = np.full(len(self.ends) * PACKET_SIZE, -1.0, dtype=np.float32)
-        last[: self._count] = ends
-        self.ends[:] = last.reshape(-1, PACKET_SIZE)
+        padded = np.full(len(self.lengths) * PACKET_SIZE, -1.0, dtype=np.float32)  # Embree skips negative lengths
+        padded[: self._count] = lengths
+        self.lengths[:] = padded.reshape(-1, PACKET_SIZE)
 
     def distances(self) -> Singles:
-        """Return the current length (n,) of each ray in m: the distance of the hit after Embree has cast the rays."""
-        return self.ends.flatten()[: self._count]
+        """Return the distance (n,) of the hit of each ray in m, after Embree has cast the rays."""
+        return self.lengths.flatten()[: self._count]
 
 
 ALL_PACKETS = slice(None)
@@ -81,16 +77,13 @@ ALL_PACKETS = slice(None)
 
 
 class RayFan:
-    """Evenly spaced rays in one plane with a common origin, as those of a lidar.
-
-    All scans use the same buffers, which each scan overwrites.
-    """
+    """Evenly spaced rays in one plane with a common origin, such as the beams of a lidar."""
 
     def __init__(self, first: float, increment: float, count: int) -> None:
-        """Ray k points at `first` + k `increment` rad in the x-y plane. The rays cover at most a full turn."""
+        """Create `count` rays. Ray k has the direction `first` + k `increment` (rad) in the x-y plane."""
         self.rays = RayPackets(count)
-        """Rays as set by the methods below; copies of the last ray fill the last packet."""
-        angles = first + increment * np.minimum(np.arange(PACKET_SIZE * len(self.rays.ends)), count - 1)
+        """Buffer of the rays. Copies of the last ray fill the last packet."""
+        angles = first + increment * np.minimum(np.arange(PACKET_SIZE * len(self.rays.lengths)), count - 1)
         self._first, self._increment, self._count = first, increment, count
         self._full = 2 * math.pi / increment
         self._flat = np.array((np.cos(angles), np.sin(angles)))
@@ -99,7 +92,7 @@ class RayFan:
         return self._count
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
-        """Return origins (n, 3) and unit directions (n, 3) of the rays if the frame of the fan is at `pose`."""
+        """Return origins (n, 3) and unit directions (n, 3) of the rays of a fan at `pose`."""
         (x, y), rotation = self._flat[:, : self._count], pose.rotation()
         return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ rotation.T
 
@@ -108,7 +101,7 @@ class RayFan:
         self.rays.starts[packets] = np.array(((x,), (y,), (z,)), dtype=np.float32)
 
     def set_directions(self, forward: Vector, left: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Set the directions of the rays in the given packets; `forward` and `left` are the x and y axes of the fan."""
+        """Set the directions of the rays in the given packets. `forward` and `left` are the x and y axes of the fan."""
         directions = self.rays.directions[packets]
         flat = (
             self._flat
@@ -121,12 +114,12 @@ class RayFan:
 
     def set_length(self, reach: float) -> None:
         """Set the maximum length of all rays in m."""
-        self.rays.ends[:] = reach
+        self.rays.lengths[:] = reach
 
     def rays_towards(self, x: float, y: float, min_dot: float) -> list[slice]:
-        """Return the ranges of rays whose unit direction has a dot product of at least `min_dot` with (x, y).
+        """Return the index ranges of the rays whose direction has a dot product with (x, y) of at least `min_dot`.
 
-        (x, y) is in the frame of the fan. The ranges may contain a few more rays at their ends.
+        (x, y) is in the frame of the fan. The ranges can be slightly too long.
         """
         far = math.hypot(x, y)
         if min_dot > far:
@@ -144,22 +137,19 @@ class RayFan:
 
 
 class RayCaster(Protocol):
-    """Finds what rays hit: all solids except the robot that carries the sensor."""
+    """Computes the distances at which rays hit solids, except the robot that carries the sensor.
+
+    The same geometry gives the same distances, bit for bit, regardless of earlier calls.
+    """
 
     @abstractmethod
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3).
+        """Return the distances (n,) in m from `origins` (n, 3) along unit `directions` (n, 3).
 
-        The distance is inf if nothing is hit within `reach` m; a shorter reach is faster.
-
-        *Given* the same geometry *then* the same distances, bit for bit, regardless of earlier calls.
+        The distance is inf if nothing is hit within `reach` m.
         """
         ...
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Singles:
-        """Return the distances (n,) in m for the rays of a fan with its frame at `pose`.
-
-        Values beyond `reach` mean that nothing was hit. Implementations can be faster than `cast`, because all rays
-        have the same origin.
-        """
+        """Return the distances (n,) in m for the rays of a fan at `pose`. Larger values than `reach` mean no hit."""
         return self.cast(*fan.at(pose), reach)

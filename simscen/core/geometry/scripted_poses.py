@@ -1,4 +1,4 @@
-"""Poses of objects on scripted paths, computed in one batch for many ticks because this is faster."""
+"""Poses of objects on scripted paths, computed in one batch for many ticks."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -13,10 +13,10 @@ _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 class PredictedPoses:
-    """Poses of all objects at each of `ticks`, a range in which only scripted paths move objects.
+    """Poses of all objects in a range of ticks in which only scripted paths move objects.
 
-    `names` are the objects that move, and `table` (ticks, names, 7) contains their poses as x, y, z and a quaternion.
-    `all_objects` contains all objects by name; only the poses of those at rest are used.
+    `names` are the moving objects. `table` (ticks, names, 7) contains their poses as x, y, z and a quaternion.
+    `all_objects` contains the poses of all objects, and is used for objects at rest.
     """
 
     def __init__(self, ticks: range, names: tuple[str, ...], table: Array, all_objects: Mapping[str, Pose3]) -> None:
@@ -25,7 +25,7 @@ class PredictedPoses:
         """Whether no object is at rest."""
 
     def at(self, tick: int) -> "PosesAtTick | None":
-        """Return the poses at a tick, or None outside of `ticks`."""
+        """Return the poses at a tick; None if it is not in `ticks`."""
         return PosesAtTick(self, self.ticks.index(tick)) if tick in self.ticks else None
 
     def farther_than(self, point: Vector, distance: float) -> set[str]:
@@ -43,13 +43,13 @@ class PredictedPoses:
 
     @cached_property
     def all_moved(self) -> list[bool]:
-        """For each tick, whether every object has another pose than at the tick before."""
+        """Whether the poses of all objects have changed since the previous tick, for each of `ticks`."""
         moved = (self.table[1:] != self.table[:-1]).any(axis=2).all(axis=1)
         return [False, *(moved & self.complete).tolist()]
 
 
 class PosesAtTick(Mapping[str, Pose3]):
-    """Poses of all objects by name at one tick, that of `row` of `predicted.table`. Each pose is created on access."""
+    """Poses of all objects by name at one tick. `row` is the index of the tick in `predicted`."""
 
     __slots__ = ("predicted", "row")
 
@@ -79,14 +79,10 @@ class PosesAtTick(Mapping[str, Pose3]):
 
 
 class BatchPathSampler:
-    """Samples many paths at many times at once, with exactly the results of `PathSampler.at`.
-
-    Segments with rotation or easing are sampled one by one, because the sine of numpy may differ in the last bit. They
-    are rare: most segments have a constant heading.
-    """
+    """Computes poses on many paths at many times at once. The results are bit-identical to `PathSampler.at`."""
 
     def __init__(self, paths_and_heights: Sequence[tuple[MotionPath, float]]) -> None:
-        """Take the paths, each with its constant height in m."""
+        """Prepare the segments of the paths. Each path is paired with its constant height in m."""
         self._tracks = [PathSampler(*pair) for pair in paths_and_heights]
         self._z = np.array([z for _, z in paths_and_heights])
         paths = [path for path, _ in paths_and_heights]
@@ -126,10 +122,11 @@ class BatchPathSampler:
         poses = np.zeros((*local.shape, 7))
         poses[..., 0], poses[..., 1], poses[..., 2] = x + part * dx, y + part * dy, self._z
         poses[..., 5], poses[..., 6] = qz, qw
+        # Rotations and easing are computed one by one, because the sine of numpy may differ in the last bit.
         for row, column in np.argwhere(self._turns[legs]).tolist():
             poses[row, column] = self._tracks[column].at(float(seconds[row, column]))
         return poses
 
 
 _PLACEHOLDER = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-"""Segment in place of those of a path that is sampled one by one; `turn` is not 0, which selects this."""
+"""Replaces the segments of paths with easing. Its `turn` is not 0, so that its poses are computed one by one."""

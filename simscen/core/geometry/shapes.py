@@ -1,7 +1,6 @@
-"""Shapes, solids, bodies, and the paths that move bodies. Physics, ray casting and maps use the same solids.
+"""Shapes, solids, bodies, and the paths that move bodies.
 
-Each shape is given in its own frame: boxes, cylinders, capsules and cones are centered, with z as their axis. Sizes are
-in m.
+Boxes, cylinders, capsules and cones are centered at the origin of their frame, with z as their axis. Sizes are in m.
 """
 
 from __future__ import annotations
@@ -84,21 +83,21 @@ Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
 
 @dataclass(frozen=True)
 class Solid:
-    """Shape at a pose. `pose` is the pose of the shape in the frame of its body, or in the world if it is fixed."""
+    """Shape at a pose. `pose` is in the frame of the body, or in the world frame for a solid that never moves."""
 
     shape: Shape
     pose: Pose3 = Pose3()
     name: str = ""
     friction: float = 1.0
-    """Friction of the surface with rubber wheels; 1 for dry concrete."""
+    """Friction coefficient of the surface for rubber wheels; 1 for dry concrete."""
 
 
 @dataclass(frozen=True)
 class Body:
     """Rigid body that can move.
 
-    `pose` is its start pose in the world, and `solids` are in its own frame. `mass` is in kg; 0 means that it cannot be
-    pushed: only the scenario moves it. `path` is the path on which it moves from the start of the run.
+    `pose` is the start pose in the world frame. `solids` are in the frame of the body. `mass` is in kg; 0 if collisions
+    do not move the body. `path` is the path that the body follows from the start of the run.
     """
 
     name: str
@@ -110,16 +109,14 @@ class Body:
 
 @dataclass(frozen=True)
 class MotionPath:
-    """Path through planar poses: at path time `times[k]` (s), a body on the path is at `poses[k]`.
+    """Scripted path of a body through planar poses: at path time `times[k]` (s), the body is at `poses[k]`.
 
-    The body first waits for `start` seconds at path time `phase`; then the path time increases. `mode` is "once" (stay
-    at the end), "loop" (start over), or "back_and_forth". `ease` is the motion between two poses:
+    The path time begins at `phase` (s) and increases after a wait of `start` seconds. `mode` is "once" (stay at the
+    end), "loop" (start over), or "back_and_forth". `ease` is the motion between two poses:
 
     - "linear": constant velocity.
-    - "smooth": from rest to rest, with 3 u² - 2 u³ of the distance after the fraction u of the time; the peak speed is
-      1.5 times the mean speed.
-    - "spline": cubic Hermite curve for position and heading, with Catmull-Rom velocities at pose k for uneven times,
-      (p[k+1] - p[k-1]) / (t[k+1] - t[k-1]); at rest at both ends, except in a loop.
+    - "smooth": from rest to rest, with 3 u² - 2 u³ of the distance after the fraction u of the time.
+    - "spline": cubic Hermite curve with Catmull-Rom velocities; at rest at both ends, except in a loop.
 
     Headings take the shorter rotation between two poses.
     """
@@ -132,11 +129,11 @@ class MotionPath:
     phase: float = 0.0
 
     def elapsed(self, seconds: float) -> float:
-        """Return the path time, `seconds` after the path started. It keeps increasing when the path repeats."""
+        """Return the path time, `seconds` after the start of the path. It keeps increasing when the path repeats."""
         return self.phase + max(0.0, seconds - self.start)
 
     def has_ended(self, seconds: float) -> bool:
-        """Return whether the motion has ended, `seconds` after the path started."""
+        """Return whether the motion has ended, `seconds` after the start of the path."""
         return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 
 
@@ -144,9 +141,9 @@ class MotionPath:
 class TriangleMesh:
     """One mesh of many solids: `vertices` (n, 3) in m, and `faces` (m, 3).
 
-    `owners` (m,) are the indices of the solids that the faces belong to. `names`, `frictions`, and `hulls` have one
-    element per solid. `frictions` are those of the surfaces; empty if all are 1. `hulls` are the ranges of the vertices
-    of convex solids, and None for other solids; empty if convexity was not tested.
+    `owners` (m,) contains the index of the solid of each face. `names`, `frictions`, and `hulls` have one element per
+    solid. `frictions` is empty if all are 1. `hulls` contains the range of vertices of each convex solid, and None for
+    each concave solid; it is empty if convexity was not tested.
     """
 
     vertices: Array
@@ -158,17 +155,15 @@ class TriangleMesh:
 
 
 MAX_SAGITTA_M = 0.0005
-"""Greatest depth by which a facet may cut into a circle: half of the resolution of lidars."""
+"""Default maximum depth by which a facet may cut into a circle."""
 FACET_COUNT_RANGE = (12, 192)
-"""Smallest and greatest number of facets of a circle."""
+"""Minimum and maximum number of facets of a circle."""
 
 
 def facet_count(radius: float, max_sagitta: float = MAX_SAGITTA_M) -> int:
-    """Return the number of facets that approximate a circle of `radius` m.
+    """Return the number of facets that approximate a circle of `radius` m, a multiple of 4 in FACET_COUNT_RANGE.
 
-    No facet cuts deeper than `max_sagitta` m into the circle, unless this requires more facets than FACET_COUNT_RANGE
-    allows. One of n facets cuts by r (1 - cos(π/n)). The result is a multiple of 4, so that the extents along x and y
-    are exact.
+    A facet cuts at most `max_sagitta` m deep into the circle, if the maximum number of facets allows it.
     """
     fewest, most = FACET_COUNT_RANGE
     needed = math.pi / math.acos(1 - max_sagitta / radius) if radius > max_sagitta else fewest

@@ -1,4 +1,4 @@
-"""Goals, paths, beliefs, and results of navigation, with the names and error codes of Nav2."""
+"""Goals, paths, pose estimates, and results of navigation, with the names and error codes of Nav2."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""Recovery behavior; `retrace` is one of simscen, the others have Nav2's names."""
+"""Recovery behavior with Nav2's name. Only simscen has `retrace`: drive back along the trail."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
 """Reason for a new plan to the same goal.
 
-In this order: the old plan is blocked, the robot has left it, an obstacle is too close to it, a better plan is
-possible, the rolling window has moved, a recovery has ended, or the planning period has passed.
+- `blocked`, `tight`: An obstacle is on the old plan, or too close to it.
+- `missed`: The robot has left the old plan.
+- `better`: A better plan exists.
+- `window`: The rolling window of the global costmap has moved.
+- `recovery`, `rate`: A recovery has ended, or the planning period has passed.
 """
 
 
@@ -55,16 +58,16 @@ class ErrorCode(IntEnum):
     NAVIGATE_TIMEOUT = 9003
 
 
-_THROUGH_POSES = {**{code + 100: code for code in range(200, 209)}, **{code + 100: code for code in range(9000, 9004)}}
-"""ComputePathThroughPoses and NavigateThroughPoses use the codes of the actions for one pose plus 100."""
+_SINGLE_POSE_CODES = {code + 100: code for code in (*range(200, 209), *range(9000, 9004))}
+"""Codes of ComputePathToPose and NavigateToPose by the codes of the same errors of the …ThroughPoses actions."""
 
 
 def error_code(number: int) -> ErrorCode | int:
-    """Return Nav2's error code with this number, or the number itself if ErrorCode does not contain it.
+    """Return the member of ErrorCode with this number, or the number itself if there is none.
 
-    For an error of an action through several poses, return the code of the same error of the action to one pose.
+    Numbers of …ThroughPoses actions are replaced by the number of the same error of the …ToPose action.
     """
-    number = _THROUGH_POSES.get(number, number)
+    number = _SINGLE_POSE_CODES.get(number, number)
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
 
 
@@ -81,9 +84,9 @@ class TaskResult(str, Enum):
 class Goal:
     """Pose in the map frame that the robot must reach within the tolerances (m, rad).
 
-    `timeout` is the maximum simulated time in s; None for no limit. A `via` goal is only passed: without a stop, with
-    any heading, and in one plan with the next goal (Nav2's NavigateThroughPoses). `wait` is the simulated time in s for
-    which the robot stays at the goal (Nav2's WaitAtWaypoint).
+    `timeout` is the maximum simulated time in s; None for no limit. If `via`, the robot passes the pose with any
+    heading and without a stop, as in Nav2's NavigateThroughPoses. `wait` is the simulated time in s for which the robot
+    stays at the goal, as in Nav2's WaitAtWaypoint.
     """
 
     name: str
@@ -95,7 +98,7 @@ class Goal:
     wait: float = 0.0
 
     def at(self, pose: Pose2) -> Goal:
-        """Return the same goal with another pose, for example in another frame."""
+        """Return the same goal with another pose."""
         return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
 
 
@@ -113,10 +116,10 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Initial estimate for a localizer.
+    """Initial pose estimate for a localizer.
 
-    `pose` is in the map frame; None if the robot can be anywhere on the map. `std` are the standard deviations of x, y
-    (m) and yaw (rad).
+    `pose` is in the map frame; None if the robot can be anywhere on the map. `std` contains the standard deviations of
+    x, y (m) and yaw (rad).
     """
 
     pose: Pose2 | None
@@ -125,10 +128,10 @@ class Estimate:
 
 @fast_dataclass(eq=False)
 class Belief:
-    """Output of a localizer: the estimated `pose` in the map frame and its covariance (3, 3) over x, y (m), yaw (rad).
+    """Pose estimate of a localizer: the `pose` in the map frame and its covariance (3, 3) of x, y (m), yaw (rad).
 
     `map_from_odom` is the transform that the localizer publishes on /tf. `particles` (n, 4) are x, y, yaw, weight;
-    empty for a localizer without particles. `updated` is the tick of the newest measurement that the estimate uses.
+    empty for a localizer without particles. `updated` is the tick of the newest measurement in the estimate.
     """
 
     pose: Pose2
@@ -142,24 +145,24 @@ Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
 """Nav2's navigation actions: one goal after the other, all goals in one drive, or waypoints with a task at each."""
 
 FAILED = "failed"
-"""Value of `expect` for a goal that must fail, no matter with which error code."""
+"""Value of the YAML key `expect` of a goal that must fail with any error code."""
 
 
 def loop_goal_name(name: str, loop: int) -> str:
-    """Return the name of a goal in a loop over the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
+    """Return the name of a goal in a repetition of the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
     return name if loop == 1 else f"{name}#{loop}"
 
 
-LOOP_NAME = re.compile(r"(.+)#[0-9]+")
-"""Pattern of `loop_goal_name` for loops after the first."""
+LOOP_GOAL_NAME = re.compile(r"(.+)#[0-9]+")
+"""Pattern of the names that `loop_goal_name` returns for loops after the first."""
 
 
 def matches_goal_name(name: str, requested: str | None) -> bool:
-    """Return whether the goal `name` is meant by `requested`.
+    """Return whether `requested` selects the goal `name`.
 
-    A request of `shelf` means the goal in every loop, `shelf#2` only in the second loop, and None any goal.
+    `shelf` selects the goal in every loop, `shelf#2` only in the second loop, and None selects all goals.
     """
     if requested is None or name == requested:
         return True
-    loop = LOOP_NAME.fullmatch(name)
+    loop = LOOP_GOAL_NAME.fullmatch(name)
     return loop is not None and loop[1] == requested

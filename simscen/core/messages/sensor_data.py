@@ -1,6 +1,6 @@
-"""Sensor readings, and their conversion for sensors that are tilted.
+"""Sensor readings, and conversion of the readings of tilted sensors.
 
-Each reading contains the name of its sensor in the robot file and the tick at which it was measured.
+Each reading contains the name of its `sensor` in the robot file and the `tick` at which it was measured.
 """
 
 from __future__ import annotations
@@ -30,10 +30,13 @@ UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.
 class Scan:
     """Planar lidar scan.
 
-    `ranges` (n,) are in m; by REP 117, inf if nothing was hit up to `range_max`, -inf if a hit is closer than
-    `range_min`, and nan if a beam gave no valid measurement. Beam k points at `angle_min + k * angle_increment` in the
-    lidar frame, which is at `mount` in the base frame of the robot. For a lidar that is not level, `tilted_mount` is
-    its pose in space and `mount` the projection of this pose on the plane; see `level_scan`. None for a level lidar.
+    Attributes:
+        ranges: Range (n,) of each beam in m. As in REP 117, inf if nothing was hit up to `range_max`, -inf if a hit is
+            closer than `range_min`, and nan if the measurement is invalid.
+        angle_min: Direction of the first beam in the lidar frame in rad.
+        angle_increment: Angle between consecutive beams in rad.
+        mount: Pose of the lidar frame in the base frame, projected on the ground plane.
+        tilted_mount: Pose of the lidar frame in the base frame in 3D; None for a level lidar.
     """
 
     sensor: str
@@ -51,7 +54,7 @@ class Scan:
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
-        """Return the points (m, 2) that beams hit, in the base frame of the robot."""
+        """Return the x and y of the hits (m, 2) in the base frame of the robot."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
         flat = np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
@@ -62,10 +65,10 @@ class Scan:
 
 @fast_dataclass()
 class Odometry:
-    """Dead reckoning: `pose` in the odom frame, `twist` in the base frame.
+    """Odometry: `pose` in the odom frame, and `twist` in the base frame.
 
-    `twist_variance` contains the variances of the errors of vx, vy and wz, which are independent. `pose_covariance` is
-    the covariance of the accumulated error in the odom frame. As in ROS, only zeros mean that it is unknown.
+    `twist_variance` contains the variances of vx, vy and wz. `pose_covariance` is in the odom frame. As in ROS, all
+    zeros mean unknown.
     """
 
     sensor: str
@@ -78,10 +81,10 @@ class Odometry:
 
 @fast_dataclass()
 class Imu:
-    """Reading of an IMU: angular velocity (rad/s) about, and acceleration (m/s²) along x, y, z of the sensor frame.
+    """Reading of an IMU: angular velocity (rad/s) and acceleration (m/s²) along x, y, z of the sensor frame.
 
-    As measured by accelerometers, a sensor at rest has an upward acceleration of 1 g. The sensor frame is at `mount` in
-    the base frame. The variances are those of the white noise of each axis, without the bias; 0 if unknown, as in ROS.
+    The acceleration of a sensor at rest is 1 g upwards. `mount` is the pose of the sensor frame in the base frame. The
+    variances are those of the white noise of each axis, without the bias; 0 if unknown, as in ROS.
     """
 
     sensor: str
@@ -106,8 +109,8 @@ class Bump:
 class Image:
     """Image of a depth camera: `rgb` (h, w, 3), and `depth` (h, w) in m along the optical axis, inf if nothing was hit.
 
-    The camera is at `mount` in the base frame of the robot and looks along the x axis of its own frame. `field_of_view`
-    is the horizontal angle in rad; 0 if unknown. Pixels are square.
+    `mount` is the pose of the camera in the base frame; the camera looks along its x axis. `field_of_view` is the
+    horizontal angle in rad; 0 if unknown. Pixels are square.
     """
 
     sensor: str
@@ -123,19 +126,19 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Height below which `level_scan` takes hits for the floor, or half the height of the lidar if this is less."""
+"""Minimum height of hits that `level_scan` uses, unless half the height of the lidar is lower. Lower hits are floor."""
 MAX_HEIGHT_M = 2.0
-"""Height above which `level_scan` ignores hits; `max_obstacle_height` of Nav2's costmap."""
+"""Maximum height of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
 AT_BASE = Pose3()
 """Mount of a sensor whose frame is the base frame."""
 
 
 def level_scan(scan: Scan) -> Scan:
-    """Convert the scan of a tilted lidar to that of a level lidar at the same position, like pointcloud_to_laserscan.
+    """Convert the scan of a tilted lidar to the scan of a level lidar at the same position.
 
-    Each level beam gets the nearest hit of the tilted beams in its direction, rounded to the nearest beam. Only hits
-    between MIN_HEIGHT_M and MAX_HEIGHT_M count; a tilted beam without a hit gives inf. If no tilted beam gives a range,
-    the result is nan, because it is unknown what is in this direction. The scan of a level lidar is returned unchanged.
+    As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M or
+    above MAX_HEIGHT_M are ignored. The range is inf if nothing was hit, and nan in directions without a usable beam.
+    The scan of a level lidar is returned unchanged.
     """
     if scan.tilted_mount is None:
         return scan
@@ -156,10 +159,7 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Return the reading rotated to the axes of the base frame.
-
-    The acceleration is still that at the position of the sensor, where the centripetal acceleration is included.
-    """
+    """Return the reading along the axes of the base frame, with the acceleration at the position of the sensor."""
     if imu.mount == AT_BASE:
         return imu
     quaternion = imu.mount.quaternion
@@ -177,8 +177,8 @@ def _level_beams(
 ) -> tuple[float, float, Array, Array, Array]:
     """Return angle_min and angle_increment of the level scan, and three arrays (count,) for the tilted beams.
 
-    The arrays are the index of the level beam that a tilted beam contributes to, and the horizontal and the vertical
-    part of the unit vector along the tilted beam.
+    The arrays contain the index of the level beam in the same direction, and the horizontal and the vertical part of
+    the unit vector along the tilted beam. `first` and `increment` are the angles of the tilted beams in rad.
     """
     rotation = mount.rotation()
     angles = first + increment * np.arange(count, dtype=np.float64)

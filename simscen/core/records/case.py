@@ -1,4 +1,4 @@
-"""Case, the parts of a scenario that criteria need besides the trace, and Run, a judged run with its case and trace."""
+"""Parts of a scenario that criteria need (Case), and a judged run with its recorded trace (Run)."""
 
 import math
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Passage:
-    """Narrow passage on the shortest path to a goal: a line between two static solids.
+    """Narrow passage on the shortest path to a goal: a line between two static solids, which the path crosses.
 
-    A robot on this path must cross the line, so that an obstacle on the line blocks it. `goal` is the name of the goal.
-    `ends` are in m in the world frame. `between` contains the names of the solids; "" for a solid without a name.
+    `goal` is the name of the goal. `ends` are the ends of the line in m in the world frame. `between` contains the
+    names of the solids; "" for a solid without a name.
     """
 
     goal: str
@@ -52,28 +52,28 @@ class Passage:
 ROBOT_NAME = ""
 """Name of the robot in a scenario with only one robot."""
 CLEARANCE_RANGE_M = 2.0
-"""Distance around the robot within which clearance is measured in every run; farther only if a criterion needs it."""
+"""Default of `Case.clearance_range`."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """The parts of a scenario that criteria need. They are stored in the log, so that judging needs no other file.
+    """Parts of a scenario that criteria need to judge its runs. The log of each run contains them.
 
     Attributes:
         start: Start pose of the robot.
         goals: Goals of the scenario, in order.
-        shortest: For each goal name, the length in m of the shortest path from the previous goal (or the start) through
-            the static world for a disc of the robot's inscribed radius; inf if there is none.
+        shortest: Length in m, by goal name, of the shortest path from the previous goal or the start. The path is for a
+            disc of radius `inscribed_radius` in the static world; inf if there is no path.
         regions: Regions of the world by name.
         footprint: Footprint of the robot in the base frame; empty if unknown.
         inscribed_radius: Radius in m of the largest circle around the base that fits in the footprint.
         time_limit: Maximum simulated time of the run in s.
-        clearance_range: Distance in m around the robot within which clearance was measured. Larger values are cut off.
+        clearance_range: Distance in m up to which clearance is measured. Larger clearances are recorded as this value.
         disturbances: The events of the scenario, followed by its faults.
         sent: Goals that events can send.
-        passages: Narrow passages on the shortest paths, goal by goal, in driving direction.
+        passages: Narrow passages on the shortest paths, in driving direction.
         masks: Filter masks that criteria refer to, by file name.
-        expected: For each goal that is expected to fail, by name: "failed", or the name of an error code.
+        expected: Expected failures by goal name: "failed", or the name of an error code.
     """
 
     start: Pose2
@@ -92,18 +92,21 @@ class Case:
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:
-        """The goals in order, followed by those that events can send."""
+        """Goals of the scenario, followed by the goals that events can send."""
         return *self.goals, *self.sent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """A run: its `result` (outcome, verdicts, metrics), and the `trace` and `case` that the result is based on.
+    """A simulated and judged run.
 
     Attributes:
+        result: Outcome, verdicts, and metrics.
+        trace: Recorded states, readings, decisions, and events.
+        case: Parts of the scenario that the criteria used.
         log: MCAP file of the run; None if none was requested.
-        stack: Description that an external stack gave of itself; empty for the reference stack.
-        robots: The run of each of several robots by name, e.g. `run.robots["left"].trace`; `trace`, `case`, and `stack`
+        stack: Name, version, and settings that an external stack has sent; empty for the reference stack.
+        robots: For several robots, one run for each robot by name. `trace`, `case`, and `stack` of the run itself
             are then those of the first robot.
     """
 
@@ -115,7 +118,7 @@ class Run:
     robots: Mapping[str, "Run"] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """Return a description with the reasons of a failure, which `assert run.passed` shows."""
+        """Return the scenario, the seed, the outcome, and the reasons of a failure."""
         unsatisfied = [(v.id, v.tightest) for v in self.result.verdicts if v.status is not Status.PASS]
         reasons = [
             f"{name} {finding.measured} ({finding.limit})" for name, finding in unsatisfied if finding is not None

@@ -1,4 +1,4 @@
-"""Result of a comparison of several stacks or sessions with a baseline."""
+"""Comparison of the results of several stacks, or of several sessions (calls of `simscen run`), with a baseline."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,9 +20,10 @@ class OutcomeCounts:
 
 @dataclass(frozen=True)
 class Flip:
-    """Scenario and seed that passed with only one of two stacks or sessions.
+    """Scenario and seed that passed with one of two stacks or sessions, and failed with the other.
 
-    `passed` and `failed` are the names of the stacks or sessions; `why` is the criterion that failed.
+    `passed` is the name of the stack or session that passed, and `failed` of the one that failed. `why` is the
+    criterion that failed.
     """
 
     scenario: str
@@ -34,12 +35,16 @@ class Flip:
 
 @dataclass(frozen=True)
 class MetricDifference:
-    """Difference of a metric between a stack or session and the baseline, over `pairs` of runs.
+    """Difference of a metric between a stack or session and the baseline.
 
-    The runs of a pair have the same scenario, variation, and seed. `baseline` and `value` are the means of both, and
-    `difference` is `value` minus `baseline`. `interval` is the 95 % confidence interval of the difference; None for too
-    few pairs. `lower`, `equal`, and `higher` are the numbers of pairs in which the value is lower than, equal to, or
-    higher than that of the baseline. `p` is the p-value of Wilcoxon's signed-rank test.
+    Attributes:
+        pairs: Number of pairs of runs. Both runs of a pair have the same scenario, variation, and seed.
+        baseline: Mean of the metric for the baseline.
+        value: Mean of the metric for the stack or session.
+        difference: `value` minus `baseline`.
+        interval: 95 % confidence interval of the difference; None for too few pairs.
+        lower: Number of pairs in which the metric is lower than for the baseline. `equal` and `higher` are analogous.
+        p: P-value of Wilcoxon's signed-rank test.
     """
 
     metric: str
@@ -57,11 +62,11 @@ class MetricDifference:
 
 @dataclass(frozen=True)
 class ScenarioChange:
-    """Significant change of the pass rate or of the mean of a metric.
+    """Significant change of the pass rate or of the mean of a metric, relative to the baseline.
 
-    `scenario` is "all scenarios" for the pass rate over all. `what` is "pass rate" or the name of a metric, and
-    `baseline` and `value` are its means. `p` is the p-value, adjusted for the number of tests (Holm). `is_worse` is
-    None for a metric of which neither direction is better.
+    `scenario` is a scenario or "all scenarios". `what` is "pass rate" or the name of a metric. `baseline` is the mean
+    for the baseline, and `value` the mean for the other stack or session. `p` is the p-value with Holm's adjustment for
+    multiple tests. `is_worse` is None for a metric without a better direction.
     """
 
     scenario: str
@@ -83,8 +88,8 @@ class BaselineComparison:
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
         unpaired_runs: Number of runs without a partner.
-        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. The only
-            metric that is compared in these pairs is `collisions`.
+        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Of the metrics of
+            these pairs, only `collisions` is compared.
         flips: Pairs in which only one run passed.
         p: P-value of the sign test of the flips.
         differences: Difference of each metric.
@@ -104,11 +109,11 @@ class BaselineComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of stacks or sessions, of which the first one is the baseline.
+    """Comparison of stacks or sessions. The first one is the baseline.
 
-    `stacks` maps the name of each stack to its value of --stack, or the name of each session to its output folder.
-    `outcomes` contains the outcomes by scenario and by name of the stack or session. `against` contains the comparison
-    of each of the others with the baseline.
+    `stacks` contains the value of --stack for each stack by name, or the output folder of each session by name.
+    `outcomes` contains the outcomes by scenario, and then by stack or session. `against` contains one comparison with
+    the baseline for each further stack or session.
     """
 
     stacks: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""Events that a run records, disturbances that a scenario schedules, and what faults can target."""
+"""Recorded events of a run, disturbances (events and faults) of a scenario, and the kinds of targets of faults."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,10 +10,7 @@ Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
 
 
 class EventKind(str, Enum):
-    """Kinds of events.
-
-    The comment beside each kind says what `Event.name` contains, and after the semicolon, the keys of `Event.data`.
-    """
+    """Kinds of recorded events. A comment beside each kind states the meaning of `Event.name` and `Event.data`."""
 
     GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
     GOAL_REACHED = "goal.reached"  # goal; index
@@ -50,13 +47,13 @@ class EventKind(str, Enum):
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 
     def __str__(self) -> str:
-        """Return the value, as written in logs."""
+        """Return the value, which logs contain."""
         return self.value
 
 
 @dataclass(frozen=True)
 class Event:
-    """Event that was recorded at `tick`. The meaning of `name` and `data` depends on the kind; see EventKind."""
+    """Recorded event. The meaning of `name` and `data` depends on `kind`."""
 
     tick: int
     kind: EventKind
@@ -68,9 +65,9 @@ class Event:
 class Disturbance:
     """Event or fault that a scenario schedules.
 
-    `when` is the trigger as written in the scenario; "" for a fault that is active from the start. If `required`, the
-    run fails unless the disturbance takes place. `line` is the line in the scenario file; 0 if unknown. For a step of a
-    sequence, `after` is the index of the event before it; None for other disturbances.
+    `when` is the trigger in the words of the scenario; "" for a fault that is active from the start. If `required`, the
+    run fails unless the disturbance takes place. `line` is the line in the scenario file; 0 if unknown. `after` is the
+    index of the previous event in a sequence (`then`); None for other disturbances.
     """
 
     name: str
@@ -82,7 +79,7 @@ class Disturbance:
 
     @property
     def trigger(self) -> str:
-        """Trigger in words, e.g. "when time: 10 s"."""
+        """Trigger as text, e.g. "when time: 10 s" or "from the start"."""
         if self.after is not None:
             return f"then when {self.when}" if self.when else "then at once"
         return f"when {self.when}" if self.when else "from the start"
@@ -92,9 +89,9 @@ class Disturbance:
 class DisturbanceOutcome:
     """Outcome of a disturbance.
 
-    `fired` are the ticks at which its trigger fired. `happened` is True if it took effect. `effect` describes in one
-    line what it changed, or why it had no effect. `tick` is the tick of the first change, or of the first attempt if
-    nothing changed; None if there was no attempt.
+    `fired` contains the ticks at which the trigger fired. `happened` is True if the disturbance took effect. `effect`
+    is one line about the change, or about the reason for no change. `tick` is the tick of the first change, or of the
+    first attempt if nothing changed; None without an attempt.
     """
 
     disturbance: Disturbance
@@ -110,16 +107,16 @@ class DisturbanceOutcome:
 
 
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
-"""What faults of sensors change: readings of these classes of core.messages.sensor_data."""
+"""Classes of sensor readings, in core.messages.sensor_data, that faults can change."""
 COMMAND = "Command"
-"""What faults of `cmd_vel` change: velocity commands from the stack to the base."""
+"""Target kind `cmd_vel`: velocity commands from the stack to the base."""
 WHEELS = "Wheels"
-"""What faults of `wheels` change: the motion that the motors execute, and the motion that odometry measures."""
+"""Target kind `wheels`: the motion that the motors execute, and the motion that odometry measures."""
 BELIEF = "Belief"
-"""What faults of `localizer` change: the estimated pose that the navigator receives."""
+"""Target kind `localizer`: the estimated pose that the navigator receives."""
 MAP = "Map"
-"""What faults of `map` change: the map that the stack receives."""
-KIND_BY_INSTANCE = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
-"""What faults change, by the name in a scenario that is not a sensor. A sensor of the same name takes precedence."""
-FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_INSTANCE.values())
-"""All elements that the set `affects` of a fault can contain."""
+"""Target kind `map`: the map that the stack receives."""
+KIND_BY_TARGET_NAME = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
+"""Target kinds of faults by name in a scenario. A sensor of the same name takes precedence."""
+FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_TARGET_NAME.values())
+"""All kinds of targets that a fault can have in its attribute `affects`."""

@@ -1,4 +1,4 @@
-"""Result of a run, on which all reports are based, and the key that identifies a run in a session."""
+"""Result of a run, and the key that identifies a run in a session (one call of `simscen run`)."""
 
 import shlex
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Verdict
 
 
 class Outcome(str, Enum):
-    """Outcome of a run. ERROR means that the run could not be completed; the robot may or may not be the cause."""
+    """Outcome of a run. ERROR means that the run could not be completed."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -26,9 +26,9 @@ class Outcome(str, Enum):
 
 
 REPEAT_SUFFIX = "again"
-"""Suffix of the stack name in the key of a repetition; not allowed as the name of a stack."""
+"""Suffix of `RunKey.stack_name` for a repeated run."""
 _SEPARATOR = "@"
-"""Separator of variation and stack in folder names; not allowed in their names."""
+"""Separator of variation and stack in folder names."""
 
 
 @total_ordering
@@ -36,9 +36,9 @@ _SEPARATOR = "@"
 class RunKey:
     """Identifies a run in a session.
 
-    `scenario` is the id of the scenario. `variation` and `stack_name` are "" if there is only one. If each run is
-    repeated to check that it is deterministic, `stack_name` ends with `again` for the repetition. Keys are ordered by
-    scenario, variation, seed, and stack.
+    `scenario` is the id of the scenario. `variation` and `stack_name` are "" if there is only one. Each run can be
+    repeated to check that it is deterministic; `stack_name` of the repetition ends with REPEAT_SUFFIX. Keys are ordered
+    by scenario, variation, seed, and stack.
     """
 
     scenario: str
@@ -55,30 +55,30 @@ class RunKey:
 
     @property
     def test(self) -> str:
-        """Name that the option `-k` selects: the scenario id, with the variation in brackets as in pytest."""
+        """Scenario id, with the variation in brackets as in pytest. The option `-k` selects runs by this name."""
         return scenario_title(self.scenario, self.variation)
 
     @property
     def folder(self) -> str:
-        """Folder of the run in the folder of its scenario, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
+        """Name of the output folder of the run, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
         label = _SEPARATOR.join(part for part in (self.variation, self.stack_name) if part)
         return "-".join(part for part in (f"seed-{self.seed}", label) if part)
 
     @property
-    def twin(self) -> "RunKey":
-        """Key of the repetition of this run, which must have the same result."""
+    def repetition(self) -> "RunKey":
+        """Key of the repetition of this run."""
         return replace(self, stack_name=".".join(part for part in (self.stack_name, REPEAT_SUFFIX) if part))
 
     @property
-    def first(self) -> "RunKey":
-        """Key of the run that this one repeats; the key itself if this is no repetition."""
-        return (
-            replace(self, stack_name=self.stack_name[: -len(REPEAT_SUFFIX)].removesuffix(".")) if self.repeats else self
-        )
+    def original(self) -> "RunKey":
+        """Key of the run that this run repeats; the key itself if this run is no repetition."""
+        if not self.is_repetition:
+            return self
+        return replace(self, stack_name=self.stack_name[: -len(REPEAT_SUFFIX)].removesuffix("."))
 
     @property
-    def repeats(self) -> bool:
-        """Whether this is a repetition, which is only compared with the first run."""
+    def is_repetition(self) -> bool:
+        """Whether this run repeats another run."""
         return self.stack_name == REPEAT_SUFFIX or self.stack_name.endswith(f".{REPEAT_SUFFIX}")
 
 
@@ -92,8 +92,8 @@ class RunFailure:
     """Reason why a run could not be completed.
 
     `kind` is the error type in JUnit, such as crashed, timeout, out-of-memory, invalid, interrupted, not-run, or
-    internal. `tail` is the end of the worker's output, to be shown unchanged. `by_stack` is True if the stack under
-    test crashed, did not answer, or gave an invalid answer.
+    internal. `tail` is the last output of the worker process. `by_stack` is True if the stack under test crashed, did
+    not answer, or gave an invalid answer.
     """
 
     kind: str
@@ -107,19 +107,19 @@ class RunResult:
     """Result of a run. It does not depend on the machine, the time of day, or the working folder.
 
     Attributes:
-        path: Scenario file relative to the root.
-        verdicts: Verdicts of required events and faults that did not take place, followed by those of the criteria.
-        lines: Line of each verdict in the scenario file, in the same order. A line is 0 if unknown; empty if all are.
-        metrics: Value of each metric; None if the run has no value for it.
+        path: Scenario file relative to the root, the folder that contains all files of a scenario.
+        verdicts: Verdicts of required events and faults that did not take place, followed by the criteria's verdicts.
+        lines: Line of each verdict in the scenario file, in the same order; 0 if unknown. Empty if all are unknown.
+        metrics: Value of each metric; None if the metric is undefined for the run.
         undefined: Reason for each metric that is None.
         events: Number of events by kind.
         disturbances: Outcome of each event and fault of the scenario.
         ended: Reason why the simulation stopped.
         simulated: Simulated time in s.
-        tick_rate: Ticks per second, for the ticks in findings.
-        error: Reason why the run could not be completed; None exactly if the outcome is not ERROR.
+        tick_rate: Ticks per second.
+        error: Reason why the run could not be completed; None for other outcomes than ERROR.
         stack: Value of the option --stack, with files relative to the root; "" for the stack of the scenario.
-        reason: Reason that the scenario gives for an expected failure or for skipping the run.
+        reason: Reason in the scenario for an expected failure or for skipping the run.
     """
 
     key: RunKey
@@ -144,7 +144,7 @@ class RunResult:
 
     @property
     def again(self) -> str:
-        """Command that repeats the run, to be executed in the root of the scenario."""
+        """Command that repeats the run if it is executed in the root."""
         varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
         return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])

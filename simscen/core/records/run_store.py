@@ -1,4 +1,4 @@
-"""Compressed storage of the results of many runs, as a list and by key, for sessions with very many runs."""
+"""Compressed storage in memory for the results of many runs, as a list and by key."""
 
 import pickle
 import sys
@@ -10,14 +10,13 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 
 MAX_UNCOMPRESSED = 2000
-"""Number of results that a store keeps uncompressed, because this is faster."""
+"""Number of results that a store keeps uncompressed."""
 
 
 class RunStore(Sequence[RunFinished]):
-    """List of results. Those after the first MAX_UNCOMPRESSED are compressed, to about 1 kB each.
+    """List of results. After the first MAX_UNCOMPRESSED results, further ones are stored in compressed form.
 
-    A compressed result is decompressed each time it is read. Iterate over the store instead of converting it to a list,
-    which would need memory for all results at once.
+    A compressed result is decompressed each time it is read.
     """
 
     def __init__(self, runs: Iterable[RunFinished] = ()) -> None:
@@ -44,7 +43,7 @@ class RunStore(Sequence[RunFinished]):
         return self.select(sorted(range(len(self)), key=self._order.__getitem__))
 
     def select(self, indices: Iterable[int]) -> "RunStore":
-        """Return a store with the results at these indices. Nothing is decompressed."""
+        """Return a store with the results at these indices."""
         found = RunStore()
         found._sample = self._sample
         for index in indices:
@@ -96,7 +95,7 @@ class FinishedRuns(Mapping[RunKey, RunFinished]):
         self.store.append(run)
 
     def index(self, key: RunKey) -> int | None:
-        """Return the index in `store` of the newest result of a run; None if there is no result."""
+        """Return the index of the newest result of a run in `store`; None if there is no result."""
         return self._index.get(key)
 
     def __getitem__(self, key: RunKey) -> RunFinished:

@@ -1,4 +1,4 @@
-"""Events of a session, from which all reports are made."""
+"""Events of a session (one call of `simscen run`), from which reports are made."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from simscen.core.records.study import Study
 
 @dataclass(frozen=True)
 class Artifacts:
-    """Paths of the files of a run, as they are printed; "" for a file that was not written."""
+    """Paths of the output files of a run, as they are printed; "" for a file that was not written."""
 
     folder: str = ""
     mcap: str = ""
@@ -22,10 +22,17 @@ class Artifacts:
 
 @dataclass(frozen=True)
 class SessionStarted:
-    """First event of a session: `total` runs of `scenarios` files on `workers` processes.
+    """First event of a session.
 
-    `ids` contains the titles of scenarios and variations, and `stacks` the values of --stack. `twice` is True if each
-    run is repeated and must have the same result.
+    Attributes:
+        version: Version of simscen.
+        total: Number of runs.
+        scenarios: Number of scenarios.
+        workers: Number of worker processes.
+        folder: Path of the output folder.
+        ids: Titles of the scenarios and variations.
+        stacks: Values of --stack.
+        twice: Whether each run is repeated to check that both have the same result.
     """
 
     version: str
@@ -41,16 +48,16 @@ class SessionStarted:
 def session_started(
     version: str, runs: Sequence[RunKey], workers: int, folder: Path, stacks: tuple[str, ...]
 ) -> SessionStarted:
-    """Return the first event of a session with these runs."""
+    """Return the first event of a session with these runs. `folder` is the output folder."""
     ids = tuple(sorted({key.test for key in runs}))
     scenarios = len({key.scenario for key in runs})
-    twice = any(key.repeats for key in runs)
+    twice = any(key.is_repetition for key in runs)
     return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks, twice)
 
 
 @dataclass(frozen=True)
 class RunStarted:
-    """A worker has started a run of the scenario file `path`. `time_limit` is the maximum simulated time in s."""
+    """A run of the scenario file `path` has started. `time_limit` is the maximum simulated time in s."""
 
     key: RunKey
     path: str
@@ -70,9 +77,14 @@ class RunProgress:
 class RunFinished:
     """A run has finished: its result, and data that are valid only in this session.
 
-    `wall` is the wall time in s. `again` is the command that repeats the run, and `file` the path of the scenario, both
-    relative to the working folder; "" if they equal those of the result. `tags` are those of the scenario, and
-    `warnings` those of the external stack. `resumed` is True if --resume took the result from an earlier session.
+    Attributes:
+        wall: Wall time of the run in s.
+        artifacts: Output files.
+        again: Command that repeats the run in the working folder; "" if it is the same as `result.again`.
+        file: Path of the scenario, relative to the working folder; "" if it is the same as `result.path`.
+        tags: Tags of the scenario.
+        warnings: Warnings of the external stack.
+        resumed: Whether the result is from an earlier session (--resume).
     """
 
     result: RunResult
@@ -100,15 +112,15 @@ class SessionFinished:
     """Last event of a session.
 
     Attributes:
-        passed: Number of runs that passed. `failed`, `errors`, and `skipped` are those with other outcomes.
-        simulated: Simulated time of all runs in s.
+        passed: Number of runs that passed. `failed`, `errors`, and `skipped` are the numbers of other outcomes.
+        simulated: Sum of the simulated times of all runs in s.
         wall: Wall time of the session in s.
         interrupted: Whether the session ended before all runs were finished.
-        junit: Path of the JUnit report; "" if there is none, as for the other paths.
+        junit: Path of the JUnit report; "" if there is none.
         folder: Path of the output folder.
         comparison: Comparison of the stacks; None for one stack.
         expected: Number of runs that failed as expected.
-        page: Path of the report page.
+        page: Path of the report page; "" if there is none.
         study: Result of `simscen study`; None for other commands.
     """
 

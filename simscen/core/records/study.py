@@ -1,4 +1,7 @@
-"""Result of a study: pass rate of many runs of one scenario, the claim about it, and what influences the margins."""
+"""Result of a study: many runs of one scenario, to find out how often and why it fails.
+
+A margin is the distance between the measured value of a criterion and its limit.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +12,7 @@ from simscen.core.records.run_result import RunKey
 
 
 class ClaimStatus(str, Enum):
-    """Decision on a claim. BLOCKED means that simscen could not complete some runs, which prevents a decision."""
+    """Decision on a claim. BLOCKED: no decision is possible, because some runs could not be completed."""
 
     HELD = "held"
     REFUTED = "refuted"
@@ -24,15 +27,14 @@ class ClaimResult:
     Attributes:
         method: Statistical method that decides the claim.
         min_rate: Claimed minimum of the pass rate.
-        confidence: Probability, for example 0.95, with which a decision that the claim holds must be right.
+        confidence: Minimum probability, for example 0.95, that a decision for the claim is right.
         max_runs: Maximum number of runs.
         status: Decision on the claim.
         passed: Number of passed runs among `runs`.
         runs: Number of runs that decide the claim.
         errors: Number of runs that could not be completed.
-        limits: Lower and upper confidence limit of the pass rate. Each limit is valid with the probability
-            `confidence`; for the method `anytime`, both are valid at once with this probability. None for `sprt`, which
-            has no valid limits, and before the first run.
+        limits: Lower and upper confidence limit of the pass rate. Each limit holds with the probability `confidence`;
+            for the method `anytime`, both hold together. None for `sprt`, and before the first run.
         target: Pass rate of a robot that `sprt` should accept; None for other methods.
         power: Minimum probability that `sprt` does not reject such a robot; None for other methods.
     """
@@ -54,8 +56,8 @@ class ClaimResult:
 class RateRow:
     """Pass rate of the runs in which a parameter has one value or lies in one range of values.
 
-    `path` is the YAML path of the parameter, and `value` is the value or range as text. `limits` are those of the 95 %
-    confidence interval; None if the runs are not random.
+    `path` is the YAML path of the parameter. `value` is the value or range as text. `limits` is the 95 % confidence
+    interval; None if the values are not random.
     """
 
     path: str
@@ -67,12 +69,15 @@ class RateRow:
 
 @dataclass(frozen=True)
 class ParameterEffect:
-    """Association of a parameter with the margin of a criterion over `runs`.
+    """Association of a parameter with the margin of a criterion.
 
-    `path` is the YAML path of the parameter. `is_ordered` is True if its values are numbers. `effect` is then
-    Spearman's rank correlation, from -1 to 1: negative if the margin falls as the value rises. For other values,
-    `effect` is epsilon squared of the Kruskal-Wallis test, from 0 to 1. `p` is the p-value, adjusted for the number of
-    tests (Holm).
+    Attributes:
+        path: YAML path of the parameter.
+        effect: Spearman's rank correlation (-1 to 1) for numbers. Epsilon squared of the Kruskal-Wallis test (0 to 1)
+            for other values.
+        p: P-value with Holm's adjustment for multiple tests.
+        runs: Number of runs.
+        is_ordered: Whether the values of the parameter are numbers.
     """
 
     path: str
@@ -89,18 +94,18 @@ class Study:
 
     Attributes:
         scenario: Id of the scenario.
-        is_random: Whether the runs are independent random draws, so that a pass rate has an interval.
+        is_random: Whether the values of the parameters were drawn at random, independently for each run.
         passed: Number of runs that passed.
-        failed: Number of runs that failed. A stack that crashes or does not answer counts as failed.
+        failed: Number of runs that failed. A run whose stack crashes or does not answer counts as failed.
         errors: Number of runs that simscen could not complete.
-        claim: Result of the claim under `acceptance`; None if the scenario has none.
-        limits: 95 % confidence limits of the pass rate; None if the runs are not random.
+        claim: Result of the claim about the pass rate; None if the scenario has no `acceptance`.
+        limits: 95 % confidence interval of the pass rate; None if the values are not random.
         rates: Pass rate by value of each varied parameter.
         effects: Association of parameters with margins, strongest first.
-        worst: Smallest margin of each criterion that has margins: the run, the margin, and its unit.
-        values: Values of the varied parameters by run, and by YAML path.
-        coverage: Fraction of all pairs of values of two parameters that occurred in a run; None for random values.
-        accepted: Fraction of the drawn values that met the condition `require`; None if the scenario has none.
+        worst: Run, smallest margin, and unit of the margin, by criterion.
+        values: Values of the varied parameters, by run and then by YAML path.
+        coverage: Fraction of the possible pairs of values of two parameters that were run; None for random values.
+        accepted: Fraction of the drawn values that met the condition `require`; None without such a condition.
     """
 
     scenario: str

@@ -1,7 +1,6 @@
-"""Recorded run: a Moment for each beat while the run is simulated, and the Trace of the whole run for judging it.
+"""Recording of a run: a Moment for each beat, and the Trace of the whole run.
 
-The simulation passes each Moment to the MCAP recorder and to the TraceBuilder. Reading the log gives the same Trace, so
-that a run can be judged again without simulating it.
+A beat is a tick at which a sensor, the stack, or a sample of the ground truth is due.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ else:
 class Truth(NamedTuple):
     """True state of the robot: `pose` of its base in the world frame, `twist` in the base frame.
 
-    `clearance` is the distance in m from the robot to the nearest obstacle, negative if they overlap, and cut off at
-    `Case.clearance_range`. `objects` are the poses of movable objects in the world frame, by name.
+    `clearance` is the distance in m from the robot to the nearest obstacle, up to the measuring range; negative if they
+    overlap. `objects` contains the poses of movable objects in the world frame, by name.
     """
 
     pose: Pose3
@@ -51,7 +50,7 @@ class DeferredTruth(Protocol):
 
 
 class LogLine(NamedTuple):
-    """Log message of a stack for /rosout: `level` of severity as in rcl_interfaces, `name` of the logger, and text."""
+    """Log message of a stack on /rosout, with the severity `level` of rcl_interfaces and the `name` of the logger."""
 
     level: int
     name: str
@@ -59,7 +58,7 @@ class LogLine(NamedTuple):
 
 
 class CostGrid(NamedTuple):
-    """Costmap as Nav2 publishes it: its `name`, "global" or "local", its frame, and the costs as 0 … 100 or -1."""
+    """Published costmap: `name` is "global" or "local", and `grid` contains the costs as 0 … 100, or -1 if unknown."""
 
     name: str
     frame: str
@@ -68,10 +67,10 @@ class CostGrid(NamedTuple):
 
 @fast_dataclass(eq=False)
 class Decision:
-    """Output of the stack for a beat: the velocity `command` for the base, and what the stack publishes.
+    """Output of the stack at one beat: the velocity `command` in the base frame, and published messages.
 
-    A belief or plan is None, and a tuple is empty, if nothing new is published. `lines` are log messages. `odometry` is
-    the output of the odometry filter of the stack.
+    Attributes without a new message are None or empty. `belief` is the pose estimate, `lines` are log messages, and
+    `odometry` is the output of the odometry filter.
     """
 
     command: Twist
@@ -88,9 +87,8 @@ class Decision:
 class Moment:
     """Everything that is recorded at one beat.
 
-    `sample` is the sample of the ground truth; None on beats without one. `readings` are those that the stack received,
-    with faults applied. `events` are those of the world and the scenario; `decision.events` are those of the stack. A
-    trace contains both, in this order.
+    `sample` is the ground truth; None at beats without a sample. `readings` are the readings that the stack received,
+    with faults applied. `events` are the events of the world and the scenario, without the events of the stack.
     """
 
     tick: int
@@ -101,24 +99,24 @@ class Moment:
 
     @property
     def truth(self) -> Truth | None:
-        """The true state of the robot; None on beats without a sample."""
+        """The ground truth; None at beats without a sample."""
         sample = self.sample
         return sample if sample is None or isinstance(sample, Truth) else sample.truth()
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Recording of a whole run. The tick of a sample is the beat at which it arrived, even if it was measured earlier.
+    """Recording of a whole run. Samples have the tick of the beat at which they were received.
 
     Attributes:
         tick_rate: Ticks per second.
         truth: True x, y, yaw of the robot in the world frame (m, m, rad).
         velocity: True vx, vy, wz of the robot in the base frame (m/s, m/s, rad/s), at the ticks of `truth`.
-        clearance: Distance from the hull to the nearest obstacle (m), at the ticks of `truth`.
+        clearance: True distance from the robot to the nearest obstacle (m), at the ticks of `truth`.
         belief: Estimated x, y, yaw in the map frame, followed by the upper triangle of the covariance: xx, xy, xyaw,
             yy, yyaw, yawyaw.
-        odometry: x, y, yaw in the odom frame, of the first odometry sensor.
-        command: vx, vy, wz as sent to the wheels, at each change and at least 20 times per second.
+        odometry: x, y, yaw of the first odometry sensor in the odom frame.
+        command: Commanded vx, vy, wz of the base, at each change and at least 20 times per second.
         scans: Ticks at which the stack received a scan.
         plans: Plans in the order in which they were made.
         events: Events of the world, the scenario, and the stack, in order.
@@ -155,7 +153,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Sampled signal: `ticks` (n,) in ascending order, and `values` (n, k), k values per sample."""
+    """Sampled signal with k values per sample: `ticks` (n,) in ascending order, and `values` (n, k)."""
 
     ticks: Ticks
     values: Array
@@ -164,9 +162,9 @@ class Samples:
         return len(self.ticks)
 
     def at(self, ticks: Ticks) -> Array:
-        """Return the values (m, k) at each of the `ticks` (m,): those of the newest sample (sample and hold).
+        """Return the values (m, k) of the newest sample at each of the `ticks` (m,).
 
-        Before the first sample, the values are those of the first sample.
+        At ticks before the first sample, return the first sample.
         """
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
 

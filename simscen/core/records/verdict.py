@@ -1,4 +1,4 @@
-"""Verdicts of criteria, declarations of expected failures, and the evidence that a verdict needs from a log."""
+"""Verdicts of criteria, declarations of expected failures, and the evidence that criteria need from a log."""
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
@@ -8,8 +8,8 @@ from enum import Enum
 class Status(str, Enum):
     """Status of a finding or verdict.
 
-    INCONCLUSIVE means that the trace does not contain what is needed to decide. ERROR means that nothing was checked,
-    or that the trace is invalid.
+    INCONCLUSIVE: the trace (the recorded states of the run) does not contain the necessary data. ERROR: nothing was
+    checked, or the trace is invalid.
     """
 
     PASS = "pass"
@@ -26,12 +26,11 @@ class Finding:
         what: Measured quantity, such as "path_length" or "goal shelf".
         measured: Measured value as text.
         limit: Limit as text.
-        margin: Distance of the value from the limit in `unit`, negative if the limit is violated; None if the bound has
-            no margin.
+        margin: Distance of the value from the limit in `unit`; negative if the limit is violated; None if undefined.
         value: Measured value in `unit`; None if it is not a number.
-        tick: Tick with the smallest margin; None if the bound does not belong to a time.
+        tick: Tick with the smallest margin; None if the value does not belong to a tick.
         place: True position (x, y) of the robot in m at this tick; None if unknown.
-        detail: Lines that explain the result.
+        detail: Explanation, as lines of text.
     """
 
     status: Status
@@ -48,10 +47,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a criterion: the status of its worst finding.
+    """Result of a criterion.
 
-    `criterion` is the key of the criterion, and `id` the name of the verdict in reports. `severity` is "fail" if a
-    violation fails the run, and "warn" if it is only reported.
+    `criterion` is the key of the criterion in the scenario. `id` is the name of the verdict in reports. `severity` is
+    "fail" if a violation fails the run, and "warn" if a violation is only reported.
     """
 
     criterion: str
@@ -67,17 +66,17 @@ class Verdict:
 
     @property
     def tightest(self) -> Finding | None:
-        """The finding with the smallest margin among those with the status of the verdict; None without findings."""
+        """Of the findings with the status of the verdict, the one with the smallest margin; None without findings."""
         deciding = [f for f in self.findings if f.status is self.status]
         return min(deciding, key=lambda f: f.margin if f.margin is not None else float("inf"), default=None)
 
 
 @dataclass(frozen=True)
 class ExpectedFailure:
-    """Statement of a scenario that its runs fail, and for which reason.
+    """Declaration in a scenario that its runs are expected to fail.
 
-    `criteria` are the ids of the verdicts that must fail; empty if any may fail. `line` is the line in the scenario
-    file; 0 if unknown.
+    `criteria` contains the ids of the verdicts that must fail; empty if any verdict may fail. `line` is the line in the
+    scenario file; 0 if unknown.
     """
 
     reason: str
@@ -108,16 +107,15 @@ class Evidence(str, Enum):
 
 
 POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
-"""Evidence that is needed to compare the true position with positions on the map."""
+"""Evidence for comparing the true position of the robot with positions on the map."""
 
 
 @dataclass(frozen=True)
 class LogCoverage:
-    """States which evidence a log lacks, each with the reason.
+    """Evidence that a log lacks, with the reason for each.
 
-    `missing` evidence is not in the log at all, `partial` evidence only for a part of the time. The log of another
-    recorder (`recorded_by_simscen` False) may contain signals that are irregular or not finite. In a log of simscen,
-    such signals mean that the simulation or the log is broken.
+    `missing` evidence is not in the log. `partial` evidence is in the log only for a part of the time. Only in logs of
+    other recorders may signals be irregular or not finite; `recorded_by_simscen` is then False.
     """
 
     missing: Mapping[Evidence, str] = field(default_factory=dict)
@@ -125,13 +123,13 @@ class LogCoverage:
     recorded_by_simscen: bool = True
 
     def lacking(self, required: Set[Evidence]) -> list[Evidence]:
-        """Return the required evidence that is not in the log at all."""
+        """Return the required evidence that is missing."""
         return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
 
     def with_gaps(self, gaps: Mapping[Evidence, str]) -> "LogCoverage":
-        """Return the coverage with more partial evidence: `gaps` contains the reason for each."""
+        """Return the coverage with additional partial evidence. `gaps` contains the reasons."""
         return replace(self, partial={**gaps, **self.partial})
 
 
 COMPLETE_COVERAGE = LogCoverage()
-"""Coverage of a run that was just simulated: nothing is missing."""
+"""Coverage of a log in which nothing is missing."""

@@ -60,14 +60,14 @@ def labeled_key(key: RunKey, session: str) -> RunKey:
 
     Keys of repetitions are returned unchanged.
     """
-    if key.repeats:
+    if key.is_repetition:
         return key
     scenario = f"{key.scenario} ({key.stack_name})" if key.stack_name else key.scenario
     return replace(key, scenario=scenario, stack_name=session)
 
 
 def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significance: Significance) -> Comparison:
-    runs = {one.key: one for one in results if not one.key.repeats and one.outcome is not Outcome.SKIPPED}
+    runs = {one.key: one for one in results if not one.key.is_repetition and one.outcome is not Outcome.SKIPPED}
     baseline, *others = stacks
     return Comparison(
         stacks,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
+from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
 from simscen.faults.base import FaultTarget
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import STACK_CANNOT
@@ -34,7 +34,7 @@ def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Faul
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: FaultTarget(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
-        for name, kind in KIND_BY_INSTANCE.items()
+        for name, kind in KIND_BY_TARGET_NAME.items()
     }
     sensors = {
         name: FaultTarget(sensor.reading_type, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)

@@ -110,7 +110,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
-            case Keepout(mask=str(name)) if not len(masks[name].forbidden):
+            case Keepout(mask=str(name)) if not len(masks[name].occupied_boxes):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
                 yield CheckProblem(("pass", index, "keepout", "mask"), message)
             case Speed(mask=spec) if spec is not None and not spec.speed_limits(masks[spec.file].grid).has_limits:
@@ -130,10 +130,10 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
             continue
         name, keys = entry.chosen.mask, ("pass", index, "keepout", "mask")
         mask = masks[name]
-        if not len(mask.forbidden):
+        if not len(mask.occupied_boxes):
             continue
         start = mask.to_mask_frame(np.array([scene.start]))
-        if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
+        if separation_from_boxes(start, scene.outline, mask.occupied_boxes)[0] < 0:
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = _mask_test(mask.grid)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simscen.core.environment.world_model import Behavior, Unseen, WalkingPedestrian
+from simscen.core.environment.world_model import Behavior, Ignorable, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polygons import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
@@ -56,7 +56,7 @@ class _Reaction:
 
     behavior: Behavior = "regular"
     duration: float = 0.0
-    blind_to: frozenset[Unseen] = frozenset()
+    blind_to: frozenset[Ignorable] = frozenset()
 
 
 def fit_pedestrians(objects: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:

@@ -12,7 +12,7 @@ from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
-from simscen.core.records.events import KIND_BY_INSTANCE
+from simscen.core.records.events import KIND_BY_TARGET_NAME
 from simscen.faults.base import FaultSetting, SensorSimulator
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Camera, Mount, RobotSpec
@@ -47,7 +47,7 @@ class FaultSettingFactory:
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
             clock=self._clock,
             now=self._now,
-            kind=sensor.reading_type if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
+            kind=sensor.reading_type if sensor is not None else KIND_BY_TARGET_NAME[entry.sensor],
             simulator=None if sensor is None else self._simulator(entry.sensor, sensor.chosen),
         )
 

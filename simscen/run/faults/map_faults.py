@@ -8,7 +8,7 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.random_streams import Streams
-from simscen.core.records.events import KIND_BY_INSTANCE, MAP
+from simscen.core.records.events import KIND_BY_TARGET_NAME, MAP
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.preparation import PreparedScenario
@@ -36,7 +36,7 @@ def _apply_to_robot(prepared: PreparedScenario, streams: Streams) -> PreparedSce
     for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
         if (
             grid is not None
-            and KIND_BY_INSTANCE.get(entry.sensor) == MAP
+            and KIND_BY_TARGET_NAME.get(entry.sensor) == MAP
             and entry.sensor not in prepared.robot.sensors
         ):
             disturbed = _disturb_map(grid, entry, streams.generator(f"fault{name}#1"), prepared)

@@ -72,7 +72,7 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
                 key = scenario.key(seed)
                 if options.only is not None and key not in options.only:
                     continue
-                for run_key in (key, key.twin) if options.twice else (key,):
+                for run_key in (key, key.repetition) if options.twice else (key,):
                     jobs.append(
                         Job(len(jobs), scenario, run_key, run_folder(out, run_key), options.wall_limit, options.replay)
                     )
@@ -203,8 +203,8 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 def _folder(run: RunFinished, earlier: Path) -> Path:
     """Return the folder of the run in the earlier session. Its name can contain the name of the stack."""
     stack = run.result.stack.partition("=")[0]
-    labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
-    return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)
+    labeled = run_folder(earlier, replace(run.key.original, stack_name=stack))
+    return labeled if not run.key.original.stack_name and labeled.is_dir() else run_folder(earlier, run.key.original)
 
 
 def _disagreement(new_path: Path, earlier_path: Path) -> str | None:

@@ -138,7 +138,7 @@ class MeshScene:
         The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `ends` (n,) m long.
         """
         rays = RayPackets(len(origins))
-        rays.put(origins - self.center, directions, ends)
+        rays.set_rays(origins - self.center, directions, ends)
         self._scene.shorten(rays)
         return rays.distances()
 
@@ -220,7 +220,7 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
     cone = fan.rays_towards(
         ahead, left, math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
     )
-    ends = fan.rays.ends
+    ends = fan.rays.lengths
     found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
     # `max` would take ten times as long as `item(argmax())`.
     return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= distance - radius]

@@ -17,7 +17,7 @@ def test_another_seed_or_name_gives_another_stream(seed, name):
 
 
 def test_integers_for_engines_lie_in_their_range():
-    seeds = [Streams(seed).integer("planner#1") for seed in range(1, 500)]
+    seeds = [Streams(seed).library_seed("planner#1") for seed in range(1, 500)]
     assert min(seeds) >= 1
     assert max(seeds) <= MAX_SEED
     assert len(set(seeds)) == len(seeds)

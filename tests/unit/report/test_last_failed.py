@@ -33,7 +33,7 @@ def session(tmp_path, passed, failed, crashed):
 
 
 def key(name):
-    return RunKey(name.removesuffix("_again"), 1).twin if name.endswith("_again") else RunKey(name, 1)
+    return RunKey(name.removesuffix("_again"), 1).repetition if name.endswith("_again") else RunKey(name, 1)
 
 
 def failed_in(folder):

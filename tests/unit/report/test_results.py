@@ -33,7 +33,7 @@ def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
 
 
 def test_second_runs_of_a_comparison_are_no_evidence(passed, failed):
-    again = [replace(run, result=replace(run.result, key=run.key.twin)) for run in (passed, failed)]
+    again = [replace(run, result=replace(run.result, key=run.key.repetition)) for run in (passed, failed)]
     assert as_document([passed, failed, *again])["suite"] == as_document([passed, failed])["suite"]
 
 

@@ -27,7 +27,7 @@ def told(events, slow=None, columns=None):
 
 def keyed(run, number, name="faults/lidar_off", again=False):
     key = RunKey(name, number)
-    return of(run, key=key.twin if again else key)
+    return of(run, key=key.repetition if again else key)
 
 
 AT_80 = """\
@@ -134,7 +134,7 @@ def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
 def test_second_runs_stand_in_the_same_column(passed):
     pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
     key = pair[0].key
-    _, first, second = told([session_started("0.1.0", [key, key.twin], 1, Path("out"), ()), *pair])
+    _, first, second = told([session_started("0.1.0", [key, key.repetition], 1, Path("out"), ()), *pair])
     assert first.index("18.2 s") == second.index("18.2 s")
 
 

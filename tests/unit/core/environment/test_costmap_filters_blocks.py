@@ -27,7 +27,7 @@ def test_a_mask_in_blocks_has_every_cell_that_says_something_once(cells):
 
 @given(CELLS)
 def test_occupied_mask_cells_are_forbidden(cells):
-    boxes = mask_blocks(OccupancyGrid(cells, 0.5)).forbidden
+    boxes = mask_blocks(OccupancyGrid(cells, 0.5)).occupied_boxes
     assert np.prod(boxes[:, 2:] - boxes[:, :2], axis=1).sum() == 0.25 * np.count_nonzero(cells == 100)
 
 

@@ -14,15 +14,15 @@ def test_no_two_runs_of_a_session_have_the_same_folder() -> None:
     """Names of variations may hold dashes, dots and the names of stacks."""
     several = [RunKey("a", 1, v, s) for v, s in product(("x", "x-b", "x.again"), ("a", "b-a", "a.again"))]
     alone = [RunKey("a", 1, v) for v in ("x", "x-b", "again", "x.again")]
-    for keys in (several, [*alone, *(key.twin for key in alone)]):
+    for keys in (several, [*alone, *(key.repetition for key in alone)]):
         assert len({key.folder for key in keys}) == len(keys)
 
 
 def test_the_second_of_two_equal_runs_keeps_its_variation() -> None:
     key = RunKey("a", 1, "speed=0.5", "mine")
-    assert key.twin.folder == "seed-1-speed=0.5@mine.again"
-    assert key.twin.first == key
-    assert RunKey("a", 1, "again").repeats is False
+    assert key.repetition.folder == "seed-1-speed=0.5@mine.again"
+    assert key.repetition.original == key
+    assert RunKey("a", 1, "again").is_repetition is False
 
 
 def test_runs_are_in_the_order_of_variations_then_seeds() -> None:

@@ -201,7 +201,7 @@ def test_pairs_without_any_difference_have_p_1() -> None:
 def test_keys_of_sessions_keep_the_stack_in_the_name_of_the_scenario() -> None:
     assert labeled_key(RunKey("a", 1, "slow"), "now") == RunKey("a", 1, "slow", "now")
     assert labeled_key(RunKey("a", 1, "slow", "dwb"), "now") == RunKey("a (dwb)", 1, "slow", "now")
-    second = RunKey("a", 1).twin
+    second = RunKey("a", 1).repetition
     assert labeled_key(second, "now") == second
 
 
