@@ -1,4 +1,4 @@
-"""Base classes of criteria and of the metrics of plug-ins, and the specification that selects such a metric."""
+"""Base classes of criteria and of the metrics of plug-ins, and the specification that selects a plug-in's metric."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ if TYPE_CHECKING:
 
 
 class Criterion(ABC):
-    """Requirement on the trace of a run. Subclasses are the specifications of the entries of `pass`.
+    """Requirement that a run must meet to pass. Subclasses are the specifications of the entries of `pass`.
 
-    `trace` is what the run recorded, and `case` what the scenario defines: goals, regions, footprint, time limit.
-    *Given* the same trace and case *then* the findings are the same. Each bound that is checked gives a finding, so
-    that no findings mean that nothing was checked.
+    `judge` depends only on the trace (the recorded states, readings, and events of the run) and on the case (goals,
+    regions, footprint, and time limit of the scenario).
     """
 
     @property
@@ -34,41 +33,41 @@ class Criterion(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence without which the criterion cannot be judged. By default (None) all that simscen records."""
+        """Kinds of information that the log must contain; None for everything that simscen records."""
         return None
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound that is checked, in the order of the specification."""
+        """Return one finding for each bound that was checked; an empty list means that nothing was checked."""
 
 
 class Measure(ABC):
     """Metric of a plug-in, which a scenario requests under `metrics`. It has no bound and cannot fail a run.
 
-    `trace` and `case` are those of Criterion. *Given* the same trace and case *then* the result is the same.
+    The value depends only on the trace and the case, as for a Criterion.
     """
 
     unit: ClassVar[str] = ""
-    """SI unit of the number; "" for none."""
+    """SI unit of the value; "" for a value without a unit."""
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence without which the metric cannot be computed. By default (None) all that simscen records."""
+        """Kinds of information that the log must contain; None for everything that simscen records."""
         return None
 
     @abstractmethod
     def measure(self, trace: Trace, case: Case) -> float | str:
-        """Return the value in SI units, which must be finite, or the reason why this run has no value."""
+        """Return the finite value in SI units, or as text the reason why the run has no value."""
 
 
 class AnyMeasure(Choice):
-    """Metric of an installed plug-in, selected by its key. simscen's own metrics are reported for every run."""
+    """Metric of an installed plug-in, selected by its key."""
 
     group: ClassVar[str] = "metric"
 
     @property
     def measure(self) -> Measure:
-        """The metric that is selected."""
+        """The selected metric."""
         measure = self.chosen
         assert isinstance(measure, Measure)
         return measure

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 SEARCH_MARGIN_M = 0.5
-"""Clearance is measured this far beyond the bound, so that a verdict can state the margin."""
+"""Distance beyond the bound up to which clearance is measured, so that a verdict can state the margin."""
 
 
 class Clearance(Spec, Criterion):
     """The robot kept a minimum distance from everything solid.
 
     What is measured: the smallest true distance between the robot's hull and the surface of anything solid, over the
-        whole run. Surfaces within 2 m of the robot are searched, or within `min` plus 0.5 m if this is more.
+        whole run. The measuring range is 2 m, or `min` plus 0.5 m if this is more.
     When it fails: the distance is below `min`.
     Why this: a near miss can become a collision; the margin shows the risk before the first contact.
     Source: bench-mr's ClearingMetric, but computed from the true geometry, not from a map or a scan.
@@ -50,7 +50,7 @@ class Clearance(Spec, Criterion):
         return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the finding for the smallest clearance, which may be infinite. Raises InvalidTrace if one is nan."""
+        """Return the finding for the smallest clearance. Raises InvalidTrace if a clearance is nan."""
         distances = clearance(trace).values[:, 0]
         if not len(distances):
             return [undecided("clearance", "no clearance was recorded", f"≥ {self.min:.2f} m")]
@@ -65,7 +65,7 @@ class Clearance(Spec, Criterion):
 
 
 DRIVING_SPEED_M_S = 0.1
-"""Speed above which a robot counts as driving for `while_driving`."""
+"""Minimum speed of a driving robot for `while_driving`."""
 
 
 class PersonalSpace(Spec, Criterion):

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 MOVING_SPEED_M_S = 0.1
-"""Speed up to which the robot did not cause a contact, as in the CollisionTest of CARLA."""
+"""Minimum speed of a robot that causes a contact, as in the CollisionTest of CARLA."""
 
 LOOKBACK_S = 0.1
-"""The fastest motion in this time before a contact decides who caused it, because the contact stops the robot."""
+"""Time before a contact in which the robot must reach MOVING_SPEED_M_S to have caused the contact."""
 
 MAX_DETAILS = 5
 """Maximum number of contacts that a finding lists."""
 
 
 class Collisions(Spec, Criterion):
-    """The robot had not more collisions than allowed, and none was harder than allowed.
+    """The robot had at most the allowed number of collisions, and no collision was too hard.
 
     What is measured: the number of contacts that begin between the robot and anything but the ground, and the impulse
         of each contact.
@@ -55,8 +55,7 @@ class Collisions(Spec, Criterion):
     people: bool = False
     """Count only contacts with people: pedestrians and members of crowds."""
     caused_by_robot: bool = False
-    """Count only contacts before which the robot itself moved, and not those with something that hit a standing
-    robot."""
+    """Count only contacts that a moving robot caused, and no contacts of a standing robot with a moving object."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -66,9 +65,9 @@ class Collisions(Spec, Criterion):
         return frozenset({Evidence.CONTACTS, *speed_needed, *people_needed})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for the number of collisions and, if it is bounded, for the largest impulse.
+        """Return findings for the number of collisions and, with `max_impulse`, for the largest impulse.
 
-        Raises MissingEvidence with `caused_by_robot` if the trace has no velocity.
+        Raises MissingEvidence if `caused_by_robot` is set and the trace has no velocity.
         """
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's path nor its contacts were recorded")]
@@ -81,7 +80,7 @@ class Collisions(Spec, Criterion):
         if self.caused_by_robot:
             hits = [event for event in hits if _is_caused_by_robot(trace, event, case)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max
-        details = [_describe(trace, hit) for hit in hits[:MAX_DETAILS]]
+        details = [_describe_contact(trace, hit) for hit in hits[:MAX_DETAILS]]
         if len(hits) > MAX_DETAILS:
             details.append(f"and {len(hits) - MAX_DETAILS} more")
         decisive = (trace, hits[min(limit or 0, len(hits) - 1)].tick) if hits else None
@@ -99,11 +98,12 @@ class Collisions(Spec, Criterion):
         hardest = max(hits, key=_impulse, default=None)
         value = 0.0 if hardest is None else _impulse(hardest)
         at = None if hardest is None else (trace, hardest.tick)
-        details = [] if hardest is None else [_describe(trace, hardest)]
+        details = [] if hardest is None else [_describe_contact(trace, hardest)]
         return at_most("collision impulse", value, self.max_impulse, "N s", at=at, detail=details)
 
 
 def _impulse(hit: Event) -> float:
+    """Return the impulse of a contact in N s. Raises InvalidTrace if it is not a number."""
     value = hit.data["impulse"]
     if not isinstance(value, int | float) or math.isnan(value):
         raise InvalidTrace(f"the impulse of the collision with {hit.name} is not a number")
@@ -124,7 +124,8 @@ def _is_caused_by_robot(trace: Trace, hit: Event, case: Case) -> bool:
     return bool(fastest.max() > MOVING_SPEED_M_S)
 
 
-def _describe(trace: Trace, hit: Event) -> str:
+def _describe_contact(trace: Trace, hit: Event) -> str:
+    """Return time, object, position, speed, and impulse of a contact as text."""
     text = f"t = {trace.seconds(hit.tick):.2f} s: touched {hit.name or 'something'}"
     x, y, speed_m_s, impulse = (hit.data.get(key) for key in ("x", "y", "speed", "impulse"))
     if isinstance(x, int | float) and isinstance(y, int | float):

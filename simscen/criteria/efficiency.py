@@ -30,7 +30,7 @@ class TimeToGoal(Spec, Criterion):
 
     What is measured: the simulated time from the acceptance of the first goal to the report that the last goal is
         reached. With `goal`, the time from the acceptance of this goal to the report that it is reached. Goals that
-        events send count too. Preempted goals and goals that are expected to fail need not be reached.
+        events send count as well. Preempted goals and goals that are expected to fail need not be reached.
     When it fails: the time is longer than `max`, or a goal was not reached.
     Why this: a robot that hesitates arrives too, but late. Use goals_reached to check the true position on arrival.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
@@ -49,7 +49,7 @@ class TimeToGoal(Spec, Criterion):
         return frozenset({Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for all goals or, with `goal`, one for each goal of this name."""
+        """Return one finding for all goals. With `goal`, return one finding for each goal of this name."""
         outcomes = goal_outcomes(trace, case)
         if self.goal is not None:
             own = [outcome for outcome in outcomes if matches_goal_name(outcome.goal.name, self.goal)]
@@ -68,6 +68,7 @@ class TimeToGoal(Spec, Criterion):
         return [self._judge_time(trace, "time_to_goal", start, unreached[0] if unreached else required[-1])]
 
     def _judge_time(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
+        """Return the finding for the time from the tick `start` until the goal was reached."""
         if outcome.failure:
             return undecided(what, "the robot is expected to fail at this goal")
         if start is None:
@@ -94,11 +95,7 @@ class TimeToGoal(Spec, Criterion):
         return missed(what, "never reached", expected, (trace, tick), [detail])
 
     def _judge_without_start(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
-        """Return the finding for a goal without a recorded acceptance.
-
-        The criterion fails if the robot never reported on the goal in a completed run. Otherwise the log may have begun
-        after the acceptance.
-        """
+        """Return the finding for a goal without a recorded acceptance: failed if the run has no report on the goal."""
         expected = f"to be there within {self.max:.2f} s"
         if outcome.end is None and has_ended(trace):
             return missed(
@@ -111,15 +108,15 @@ class PathLength(Spec, Criterion):
     """The robot drove no farther than allowed.
 
     What is measured: the length of the robot's true path in the plane, in moves of at least 1 cm, over the whole run;
-        and the ratio of this length to that of the shortest path. The shortest path leads a disc with the robot's
-        inscribed radius from the start through all goals, except those at which the robot is expected to fail.
+        and the ratio of this length to the length of the shortest path. The shortest path is for a disc with the
+        robot's inscribed radius, from the start through all goals. Goals that are expected to fail are left out.
     When it fails: the path is longer than `max`, or longer than `max_ratio` times the shortest path.
     Why this: detours and search patterns cost energy and time although every goal is reached.
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" for the ratio. SPL (Anderson 2018) is the
         inverse of the ratio, averaged over many runs.
 
-    The ratio is inconclusive if a goal was not reached, unless the path is already too long, and if an event sends a
-    goal, because the shortest path is then unknown.
+    The ratio is inconclusive if an event sends a goal, because the shortest path is then unknown. It is also
+    inconclusive if a goal was not reached, unless the path is already too long.
 
     Example: `path_length: {max_ratio: 1.4}`
     """
@@ -141,7 +138,7 @@ class PathLength(Spec, Criterion):
         return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for the length and for the ratio, as far as they are bounded. The margins are in m."""
+        """Return one finding for each given bound: the length and the ratio. The margins of both are in m."""
         path = drive(trace)
         findings = [] if self.max is None else [_judge_length(trace, path, "path_length", self.max)]
         if self.max_ratio is not None:
@@ -166,9 +163,9 @@ class PathLength(Spec, Criterion):
 
 
 def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
-    """Return the length in m of the shortest path through all goals, and "".
+    """Return the length in m of the shortest path through all goals, and the reason if it is unknown.
 
-    If the length is unknown, return nan and the reason.
+    The length is nan if it is unknown. The reason is "" if the length is known.
     """
     names = [goal.name for goal in case.goals if goal.name not in case.expected]
     repeated = sorted({name for name in names if names.count(name) > 1})
@@ -186,6 +183,7 @@ def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
 
 
 def _judge_length(trace: Trace, path: DrivenPath, what: str, limit: float, context: str = "") -> Finding:
+    """Return the finding for the length of a path. The tick is the first one at which the limit was exceeded."""
     decisive = int(np.argmax(path.travelled > limit)) if path.length > limit else len(path.ticks) - 1
     at = (trace, int(path.ticks[decisive])) if len(path.ticks) else None
     return at_most(what, path.length, limit, "m", at=at, context=context)

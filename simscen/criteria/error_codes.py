@@ -1,4 +1,4 @@
-"""Error codes of Nav2: how specifications state them, and how recorded events do."""
+"""Nav2's error codes in specifications and in recorded events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simscen.spec.base import Spec
 
 
 def parse_error_code(value: Any) -> ErrorCode:
-    """Parse an error code from its name or number, e.g. GOAL_OCCUPIED or 206. Raises PydanticCustomError for others."""
+    """Return the error code with a name or number, e.g. GOAL_OCCUPIED or 206. Raises PydanticCustomError if unknown."""
     if isinstance(value, ErrorCode):
         return value
     if isinstance(value, str) and value in ErrorCode.__members__:
@@ -30,18 +30,18 @@ def parse_error_code(value: Any) -> ErrorCode:
 
 
 class _ErrorCodeSchema:
-    """JSON schema of an error code: one of the names or numbers."""
+    """Adds the JSON schema of an error code: one of the names or numbers."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"enum": [*ErrorCode.__members__, *(int(code) for code in ErrorCode)]}
 
 
 ErrorCodeValue = Annotated[ErrorCode, PlainValidator(parse_error_code), _ErrorCodeSchema()]
-"""Type of a key whose value is an error code, by name or number."""
+"""Type of a YAML key whose value is the name or number of an error code."""
 
 
-def code_of(event: Event) -> str:
-    """Return the error code of an event: its name in Nav2, or its number if Nav2 has no such code; "NONE" without."""
+def error_code_name(event: Event) -> str:
+    """Return the error code of an event: its name, or its number as text if ErrorCode lacks it; "NONE" without one."""
     name, number = event.data.get("error_name"), event.data.get("error_code")
     if isinstance(name, str) and name:
         return name

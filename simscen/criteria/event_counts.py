@@ -49,8 +49,8 @@ class CountBounds(Spec):
     ) -> list[Finding]:
         """Return one finding for each bound on the number of `events`.
 
-        `what` is the measured quantity, e.g. "replans". `noun` is the singular for one event. `detail` are lines that
-        explain a failure. If the log is truncated, a number below `min` is inconclusive.
+        `what` is the measured quantity, e.g. "replans". `noun` is the name of one event, e.g. "replan". `detail` are
+        lines that explain a failure. In a truncated log, a number below `min` is inconclusive.
         """
         at = (trace, events[-1].tick) if events else None
         findings = counted(what, len(events), noun, self.min, self.max, at=at, detail=detail)
@@ -60,12 +60,12 @@ class CountBounds(Spec):
 
 
 class Replans(CountBounds, Criterion):
-    """The robot replanned as often as it should.
+    """The number of replans was within its bounds.
 
     What is measured: the number of plans that were made for another reason than a new goal.
     When it fails: the number is below `min` or above `max`.
-    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan; and a robot
-        that replans all the time does not follow any plan.
+    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan. A robot that
+        replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
     Example: `replans: {min: 1}`
@@ -95,7 +95,7 @@ class Replans(CountBounds, Criterion):
 
 
 class Recoveries(CountBounds, Criterion):
-    """The robot ran recovery behaviors as often as it should.
+    """The number of recovery behaviors was within its bounds.
 
     What is measured: the number of recovery behaviors that started.
     When it fails: the number is below `min` or above `max`.

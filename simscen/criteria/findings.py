@@ -1,10 +1,10 @@
-"""Functions that create the findings of criteria.
+"""Functions that create findings: results of checks of one bound.
 
-Parameters with the same name have the same meaning in all functions:
+Common parameters:
 
 - `what`: measured quantity, e.g. "path_length".
-- `value` and `limit`: numbers in `unit`; `measured` and `limit`: the same as text if there is no number.
-- `at`: the trace, and the tick that decided the finding; None if it does not belong to a time.
+- `value`, `limit`: measured value and its limit in `unit`. `measured` is a measured value as text.
+- `at`: the trace, and the tick that decided the finding; None if the finding does not belong to a tick.
 - `context`: text after the limit, e.g. "after lidar.off".
 - `detail`: lines that explain a failure.
 """
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 class InvalidTrace(ValueError):
-    """The trace contains invalid values, for example nan, so that no criterion can be judged."""
+    """The trace contains invalid values, such as nan. No criterion can be judged."""
 
 
 class MissingEvidence(ValueError):
-    """The trace lacks what a criterion needs, so that this criterion is inconclusive."""
+    """The trace lacks data that a criterion needs. The criterion is inconclusive."""
 
 
 def at_most(
@@ -39,10 +39,7 @@ def at_most(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that passes if `value` <= `limit`. Raises InvalidTrace if `value` is nan.
-
-    The margin is the distance of the value from the limit.
-    """
+    """Return a finding that passes if `value` <= `limit`. Raises InvalidTrace if `value` is nan."""
     return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
 
 
@@ -56,10 +53,7 @@ def at_least(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that passes if `value` >= `limit`. Raises InvalidTrace if `value` is nan.
-
-    The margin is the distance of the value from the limit.
-    """
+    """Return a finding that passes if `value` >= `limit`. Raises InvalidTrace if `value` is nan."""
     return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
@@ -73,9 +67,9 @@ def counted(
     at: tuple[Trace, int] | None = None,
     detail: Sequence[str] = (),
 ) -> list[Finding]:
-    """Return one finding for each bound on a number of events: at least `low`, and at most `high`.
+    """Return one finding for each bound of a number of events: the minimum `low` and the maximum `high`.
 
-    None means that there is no such bound. `noun` is the singular for one event.
+    A bound of None is not checked. `noun` is the name of one event, e.g. "collision".
     """
     measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
@@ -97,7 +91,7 @@ def counted(
 
 
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
-    """Return an inconclusive finding; `because` is the reason, e.g. that there is nothing to check."""
+    """Return an inconclusive finding with its reason."""
     return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
 
 
@@ -114,7 +108,7 @@ def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = No
 
 
 def format_quantity(value: float, unit: str, digits: int) -> str:
-    """Return a number with its unit as text, e.g. "0.84 s" for 2 decimal digits."""
+    """Return a number with its unit as text, e.g. "0.84 s" with 2 decimal digits."""
     return f"{value:.{digits}f} {unit}".rstrip()
 
 
@@ -162,10 +156,7 @@ def _tick_and_place(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[flo
 
 
 def decimals(value: float, limit: float) -> int:
-    """Return the number of decimal digits with which both numbers differ as text, from 2 to 9; 2 for equal numbers.
-
-    With fewer digits, a report could state that 0.50 s is greater than 0.50 s.
-    """
+    """Return how many decimal digits (2 to 9) are needed to print two numbers differently; 2 for equal numbers."""
     if value == limit or not math.isfinite(value) or not math.isfinite(limit):
         return 2
     return next((digits for digits in range(2, 9) if f"{value:.{digits}f}" != f"{limit:.{digits}f}"), 9)

@@ -11,7 +11,7 @@ import numpy as np
 
 from simscen.core.messages.navigation import FAILED, Goal
 from simscen.core.records.events import Event, EventKind
-from simscen.criteria.error_codes import code_of
+from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.trace_signals.ground_truth import truth
 
 if TYPE_CHECKING:
@@ -19,16 +19,17 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 
-_ARRIVED = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
-_GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+_ARRIVAL_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
+_GOAL_END_KINDS = (*_ARRIVAL_KINDS, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """What the robot reported about a goal.
+    """Outcome of a goal, as the robot reported it.
 
-    `accepted` is the tick at which it accepted the goal, and `end` the event that ended it; None if not reported.
-    `failure` is the failure that the scenario expects: "failed", or the name of an error code; "" if none is expected.
+    `accepted` is the tick at which the robot accepted the goal; None if it did not. `end` is the event that ended the
+    goal; None if the goal did not end. `failure` is the failure that the scenario expects: "failed", or the name of an
+    error code; "" if no failure is expected.
     """
 
     goal: Goal
@@ -38,8 +39,8 @@ class GoalOutcome:
 
     @property
     def reached(self) -> int | None:
-        """The tick at which the robot reported the goal as reached or passed; None if it did not."""
-        return self.end.tick if self.end is not None and self.end.kind in _ARRIVED else None
+        """Tick at which the robot reported the goal as reached or passed; None without such a report."""
+        return self.end.tick if self.end is not None and self.end.kind in _ARRIVAL_KINDS else None
 
     @property
     def must_be_reached(self) -> bool:
@@ -48,19 +49,19 @@ class GoalOutcome:
 
     @property
     def failed_as_expected(self) -> bool:
-        """Whether the goal failed, with the expected error code if the scenario names one."""
+        """Whether the goal failed as the scenario expects."""
         if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
             return False
-        return self.failure in (FAILED, code_of(self.end))
+        return self.failure in (FAILED, error_code_name(self.end))
 
     @property
     def was_preempted(self) -> bool:
-        """Whether another goal was sent before this one was reached. Nav2 then drops this goal."""
+        """Whether another goal replaced this goal before it was reached."""
         return self.end is not None and bool(self.end.data.get("preempted_by"))
 
     @property
     def summary(self) -> str:
-        """The outcome in words, e.g. "failed with NO_VALID_PATH"."""
+        """The outcome as text, e.g. "failed with NO_VALID_PATH"."""
         if self.end is None:
             return "never accepted" if self.accepted is None else "still under way"
         if self.was_preempted:
@@ -70,15 +71,12 @@ class GoalOutcome:
 
 
 def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
-    """Return the outcome of each goal of the scenario and of each goal that an event sent, by time of acceptance.
+    """Return the outcome of each goal of the scenario and of each goal that an event sent, in order of acceptance.
 
-    Goals of the scenario that were never accepted come last. Goals that an event could have sent but did not are left
-    out. If several goals have the same name, the first reports under this name belong to the first goal, and so on.
-
-    Nav2 reports only the status of a whole action. A via pose without reports of its own therefore gets the outcome of
-    the next goal at which the robot stops.
+    Goals of the scenario that were never accepted come last. A via pose (a pose that the robot passes without a stop)
+    without reports gets the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
     """
-    reports = _reports(trace)
+    reports = _reports_by_goal(trace)
     earlier = _earlier_uses([goal.name for goal in case.goals])
     found = [
         GoalOutcome(goal, *_nth(reports.get(goal.name, []), earlier[k]), case.expected.get(goal.name, ""))
@@ -95,7 +93,7 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
 
 
 def outcome_start(outcome: GoalOutcome) -> float:
-    """Return the tick at which the robot accepted the goal, else that of its end; inf if neither was reported."""
+    """Return the tick at which the robot accepted the goal, or else the tick of its end; inf if both are unknown."""
     if outcome.accepted is not None:
         return outcome.accepted
     return math.inf if outcome.end is None else outcome.end.tick
@@ -104,8 +102,8 @@ def outcome_start(outcome: GoalOutcome) -> float:
 def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
     """Return the tick at which the true position was nearest to a via pose, and the distance in m.
 
-    A stack reports a via pose as passed once the robot is near enough, although the robot may come nearer after that.
-    The search therefore lasts from the acceptance of the pose to the end of the next goal at which the robot stops.
+    The search begins when the pose is accepted, and ends with the next goal at which the robot stops. `outcomes`
+    contains the outcomes of all goals in order.
     """
     later = outcomes[outcomes.index(outcome) :]
     stop = next((each for each in later if not each.goal.via), None)
@@ -124,7 +122,7 @@ def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[Goal
 def _with_outcome_of_drive(
     outcome: GoalOutcome, later: list[GoalOutcome], reports: Mapping[str, list[_Report]]
 ) -> GoalOutcome:
-    """Return the outcome, or for a via pose without reports, that of the first of the `later` goals with a stop."""
+    """Return the outcome. For a via pose without reports, it is that of the next goal at which the robot stops."""
     stop = next((each for each in later if not each.goal.via), None)
     if not outcome.goal.via or outcome.goal.name in reports or stop is None or stop.end is None:
         return outcome
@@ -133,7 +131,7 @@ def _with_outcome_of_drive(
 
 
 def _earlier_uses(names: list[str]) -> list[int]:
-    """Return, for each name in the list, how often it occurs earlier in the list."""
+    """Return for each name how often it occurs earlier in the list."""
     uses: dict[str, int] = {}
     counts = []
     for name in names:
@@ -146,10 +144,10 @@ _Report = tuple[int | None, Event | None]
 """Tick at which a goal was accepted, and the event that ended it; None if not reported."""
 
 
-def _reports(trace: Trace) -> dict[str, list[_Report]]:
+def _reports_by_goal(trace: Trace) -> dict[str, list[_Report]]:
     """Return the reports on goals by name, in order."""
     found: dict[str, list[_Report]] = {}
-    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *_GOAL_ENDS):
+    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *_GOAL_END_KINDS):
         reports = found.setdefault(event.name, [])
         if event.kind == EventKind.GOAL_ACCEPTED:
             reports.append((event.tick, None))
@@ -161,4 +159,5 @@ def _reports(trace: Trace) -> dict[str, list[_Report]]:
 
 
 def _nth(reports: list[_Report], k: int) -> _Report:
+    """Return the report with index k, or (None, None) if there is none."""
     return reports[k] if k < len(reports) else (None, None)

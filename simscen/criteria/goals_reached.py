@@ -26,23 +26,23 @@ if TYPE_CHECKING:
 
 
 class GoalsReached(Spec, Criterion):
-    """Every goal was reached: the robot reported so, and its true pose was then at the goal.
+    """Every goal was reached: the robot reported the goal as reached, and its true pose was then at the goal.
 
     A goal with `expect` must fail with the expected error code instead. With navigate_through_poses, the robot must
     pass close to the poses, with any heading. At a goal with `on_reached: {wait: …}`, it must stay for this time.
 
-    Goals of events must be reached too, if they are sent. A preempted goal is dropped, as in Nav2, and need not be
-    reached. If `goals` names a preempted goal, the result is inconclusive.
+    Goals that events send must be reached as well. A preempted goal need not be reached. If `goals` names a preempted
+    goal, the result is inconclusive.
 
-    The stack decides by its estimated pose that a goal is reached. Therefore, the true pose may exceed the goal's
-    tolerance by a margin for localization. To require accuracy, set a `tolerance`, or set the margin to 0.
+    The stack uses its estimated pose to decide that a goal is reached. Therefore, a margin for the localization is
+    added to the goal's tolerance. To require accuracy, set a `tolerance`, or set the margin to 0.
 
     What is measured: for each goal, the distance and the heading error between the goal and the robot's true pose at
         the tick at which the robot reports that the goal is reached.
     When it fails: the robot did not report a goal as reached, reported it while the true pose was out of tolerance, or
         reported it later than `within`.
     Why this: the report of a robot is only as good as its localization. Arena uses only the report, and BARN only the
-        distance, so that neither detects a lost robot that reports success.
+        distance. Neither detects a lost robot that reports success.
     Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the true pose.
 
     Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
@@ -69,7 +69,7 @@ class GoalsReached(Spec, Criterion):
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for distance, heading, and time of each goal reached, and one finding for each other goal."""
+        """Return findings for distance, heading, and time of each reached goal, and one finding for each other goal."""
         outcomes = goal_outcomes(trace, case)
         chosen = [
             outcome
@@ -93,7 +93,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_unsent(self, trace: Trace, case: Case, sent: set[str]) -> list[Finding]:
-        """Return findings for goals that the criterion names but that were never sent."""
+        """Return one finding for each name in `goals` under which no goal was sent."""
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):
@@ -106,14 +106,16 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_unreached(self, trace: Trace, outcome: GoalOutcome) -> Finding:
+        """Return the finding for a goal that the robot did not report as reached; a preempted goal does not fail."""
         if not outcome.was_preempted:
-            return _not_reached(trace, outcome)
+            return _unreached_finding(trace, outcome)
         assert outcome.end is not None
         if self.goals is None:
             return held(f"goal {outcome.goal.name}", outcome.summary, "reached", (trace, outcome.end.tick))
         return undecided(f"goal {outcome.goal.name}", outcome.summary, "reached")
 
     def _judge_reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
+        """Return findings for distance, heading, and time at the report that the goal is reached."""
         goal, tick = outcome.goal, outcome.reached
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
@@ -143,7 +145,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_via(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-        """Return findings for the smallest distance to a via pose and for its time."""
+        """Return findings for the smallest distance from a via pose, and for the time of the report."""
         tick, distance = closest_approach(trace, outcome, outcomes)
         limit, context = self._limit(outcome), "from the pose at the closest approach"
         findings = [at_most(f"goal {outcome.goal.name}", distance, limit, "m", at=(trace, tick), context=context)]
@@ -156,6 +158,7 @@ class GoalsReached(Spec, Criterion):
         return self.tolerance or outcome.goal.xy_tolerance + self.localization_margin
 
     def _judge_time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
+        """Return the finding for the time from the acceptance of a goal to the report that it is reached."""
         what = f"goal {outcome.goal.name} time"
         if outcome.accepted is None or outcome.reached is None:
             return undecided(what, "its acceptance was not recorded", f"≤ {within:.2f} s")
@@ -165,7 +168,7 @@ class GoalsReached(Spec, Criterion):
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
     """Return the finding for a goal that the scenario expects to fail."""
-    what, expected = f"goal {outcome.goal.name}", _expected(outcome)
+    what, expected = f"goal {outcome.goal.name}", _expected_failure_text(outcome)
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)
@@ -173,14 +176,14 @@ def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
     return (held if outcome.failed_as_expected or is_passed_via else missed)(what, outcome.summary, expected, at)
 
 
-def _expected(outcome: GoalOutcome) -> str:
+def _expected_failure_text(outcome: GoalOutcome) -> str:
     return FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
 
 
 def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-    """Return the finding for the time that the robot waited at a goal; none if no wait is required or no goal follows.
+    """Return the finding for the wait at a goal, which ends when the next goal of the scenario is accepted.
 
-    The time ends when the next goal of the scenario is accepted.
+    The list is empty if no wait is required, or if no goal was accepted afterwards.
     """
     later = next(
         (each for each in outcomes if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
@@ -191,7 +194,8 @@ def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[G
     return [at_least(f"goal {outcome.goal.name} wait", waited, outcome.goal.wait, "s", at=(trace, later.accepted))]
 
 
-def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
+def _unreached_finding(trace: Trace, outcome: GoalOutcome) -> Finding:
+    """Return a failed finding for a goal that was not reached; an inconclusive one if the log is truncated."""
     what = f"goal {outcome.goal.name}"
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", "reached")
@@ -204,7 +208,7 @@ def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
 
 
 def _believed_distance(trace: Trace, outcome: GoalOutcome) -> list[str]:
-    """Return a line that states where the robot believed to be when it reported the goal; none if unknown."""
+    """Return a line with the distance of the estimated pose from the goal at the report; empty if it is unknown."""
     tick, goal = outcome.reached, outcome.goal.pose
     if tick is None or not len(trace.belief):
         return []

@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     DistanceFunction = Callable[[Array], Array]
 
 RESOLUTION_M = 0.005
-"""The smallest distance between two samples is found with this accuracy."""
+"""Accuracy of the smallest distance."""
 
 
 class Keepout(Spec, Criterion):
     """No part of the robot entered a region, or the occupied cells of a keepout mask.
 
     What is measured: the smallest distance between the robot's footprint and the region or the occupied cells, over the
-        whole run, with straight motion between two samples of the truth. If they overlap, the distance is negative: it
-        is the shortest way by which the robot could be moved out. Shapes that are not convex are divided into convex
-        pieces, and masks into rectangles of equal cells; the deepest overlap of two pieces counts.
+        whole run. Between two samples of the true pose, motion is assumed to be straight. A negative distance is the
+        depth of an overlap: the shortest way by which the robot could be moved out. Concave shapes are divided into
+        convex pieces, and masks into rectangles; the deepest overlap of two pieces counts.
     When it fails: the distance is below `distance`.
     Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
@@ -51,7 +51,7 @@ class Keepout(Spec, Criterion):
     region: RegionName | None = None
     """Name of the region."""
     mask: MaskFile | None = None
-    """Instead of a region: map YAML file of a filter mask, relative to this file; only occupied cells are forbidden.
+    """Map YAML file of a filter mask, relative to this file, instead of a region. Only occupied cells are forbidden.
 
     The stack receives the mask only if `stack.keepout_mask` names it as well."""
     distance: NonNegativeLength = 0.0
@@ -85,19 +85,19 @@ class Keepout(Spec, Criterion):
         if not len(poses):
             return [undecided(what, "the robot's path was not recorded", limit)]
         if not self.while_on:
-            distance, tick = _nearest(trace, poses, case, distances)
+            distance, tick = _smallest_distance(trace, poses, case, distances)
             return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
         paths = [clip_samples(poses, *span) for span in enabled_spans(trace, "keepout", self.region, self.grace)]
-        found = [_nearest(trace, path, case, distances) for path in paths if len(path)]
+        found = [_smallest_distance(trace, path, case, distances) for path in paths if len(path)]
         if not found:
             return [undecided(what, NEVER_SWITCHED, limit)]
         distance, tick = min(found)
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
     def _distance_function(self, case: Case) -> DistanceFunction | str:
-        """Return a function that computes distances (n,) of the footprint at poses (n, 3).
+        """Return a function from poses (n, 3) to signed distances (n,) of the footprint from the region or mask.
 
-        If there is nothing to keep out of, return the reason.
+        If there is no region or mask, return the reason as text.
         """
         hull = case.footprint or POINT
         if self.region is None:
@@ -117,13 +117,12 @@ class Keepout(Spec, Criterion):
         return lambda poses: separation(poses, hull, region)
 
 
-def _nearest(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
-    """Return the smallest signed distance along the driven path, and its tick. Teleportation is not part of the path.
+def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
+    """Return the smallest signed distance in m along the driven path, and its tick. Teleportation does not count.
 
-    Intervals between two samples are bisected as long as they may contain a distance that is smaller by at least
-    RESOLUTION_M than the smallest one found so far: while no point of the robot moves by more than d, the distance
-    changes by at most d.
+    Intervals between two samples are bisected as long as they may contain a distance that is smaller by RESOLUTION_M.
     """
+    # While no point of the robot moves by more than d, the distance changes by at most d.
     radius = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])
     states = np.column_stack((poses.values[:, :2], yaw, distances(poses.values), poses.ticks))
@@ -142,7 +141,7 @@ def _nearest(trace: Trace, poses: Samples, case: Case, distances: DistanceFuncti
 
 
 def _is_teleported(trace: Trace, poses: Samples) -> Flags:
-    """Return, for each interval between two samples, whether the robot was teleported in it."""
+    """Return a mask (n - 1,) of the intervals between two samples in which the robot was teleported."""
     placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
     teleported = np.zeros(len(poses) + 1, dtype=bool)
     teleported[np.searchsorted(poses.ticks, placed, side="right")] = True

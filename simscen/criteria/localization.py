@@ -1,4 +1,4 @@
-"""The criteria `localization_error`, `relocalized_within`, and `localization_consistency`, which judge localization."""
+"""The criteria `localization_error`, `relocalized_within`, and `localization_consistency`."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Trace
 
 NO_BELIEF = "the robot never reported an estimated pose"
-"""Reason of inconclusive findings."""
+"""Reason of inconclusive findings if the trace has no estimated pose."""
 
 
 class LocalizationError(Spec, Criterion):
     """The localization error of the robot stayed small.
 
-    What is measured: the distance between the estimated and the true position, and the heading error, each time that
-        the stack publishes a belief, and all the time while its newest belief is over 1 s old. The trajectories are not
-        aligned, because an alignment would hide the error.
+    What is measured: the distance between the estimated and the true position, and the heading error. Both are measured
+        whenever the stack publishes an estimated pose (belief), and continuously while its newest belief is over 1 s
+        old. The trajectories are not aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound.
     Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
     Source: evo's APE (metrics.py) and Beluga's benchmarks.
@@ -49,7 +49,7 @@ class LocalizationError(Spec, Criterion):
     max_yaw: PositiveAngle | None = None
     """Bound on the largest heading error."""
     after: Duration = 0.0
-    """Simulated time at which the evaluation begins, so that the filter can converge before."""
+    """Simulated time at which the evaluation begins. The filter can converge before."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> LocalizationError:
@@ -77,13 +77,13 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, error.select(is_counted))
+        return self._judge_bounds(trace, error.select(is_counted))
 
-    def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
+    def _judge_bounds(self, trace: Trace, error: Samples) -> list[Finding]:
         distances, angles = error.values.T
         findings = []
         if self.max is not None:
-            findings.append(_worst(trace, error, distances, "localization_error", self.max, "m"))
+            findings.append(_judge_largest(trace, error, distances, "localization_error", self.max, "m"))
         if self.rmse is not None:
             rmse = float(np.sqrt(np.mean(distances**2)))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
@@ -93,18 +93,19 @@ class LocalizationError(Spec, Criterion):
             bound = at_most("localization_error final", float(distances[-1]), self.final, "m", at=at)
             findings.append(_if_complete(trace, bound))
         if self.max_yaw is not None:
-            findings.append(_worst(trace, error, angles, "localization_error yaw", self.max_yaw, "rad"))
+            findings.append(_judge_largest(trace, error, angles, "localization_error yaw", self.max_yaw, "rad"))
         return findings
 
 
 def _if_complete(trace: Trace, finding: Finding) -> Finding:
-    """Return the finding, or an inconclusive one if the log is truncated, because the final error is then unknown."""
+    """Return the finding, or an inconclusive one if the log is truncated."""
     if has_ended(trace):
         return finding
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
-def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:
+def _judge_largest(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:
+    """Return the finding for the largest of `values` (n,), which belong to the ticks of `error`."""
     k = int(np.argmax(values))
     return at_most(what, float(values[k]), limit, unit, at=(trace, int(error.ticks[k])))
 
@@ -112,13 +113,13 @@ def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float,
 class RelocalizedWithin(Spec, Criterion):
     """The robot relocalized in time.
 
-    A robot is lost if its belief is not within the tolerances of the true pose.
+    A robot is lost if its belief (the estimated pose) is not within the tolerances of the true pose.
 
     What is measured: the time from each start of `after`, or from the start of the run, until the belief of a lost
         robot is within the tolerances again and stays there for `hold`.
     When it fails: the time is longer than `time`.
     Why this: after a wrong initial pose or a kidnapping, the robot must correct its belief. A belief that is near the
-        true pose by chance, and only for an instant, does not count as corrected.
+        true pose only for an instant does not count as corrected.
     Source: the kidnapped robot problem, Thrun, Burgard, Fox: Probabilistic Robotics, chapters 7 and 8.
 
     Inconclusive if the robot was never lost within `time`, or if the run ended too early for a decision.
@@ -163,6 +164,7 @@ class RelocalizedWithin(Spec, Criterion):
         return f"after {self.after}" if self.after is not None else "after the start"
 
     def _judge_start(self, trace: Trace, start: int, error: Samples) -> Finding:
+        """Return the finding for the time from the tick `start` to the relocalization."""
         later = error.ticks >= start
         ticks, errors = error.ticks[later], error.values[later]
         is_localized = (errors[:, 0] <= self.tolerance) & (errors[:, 1] <= self.yaw_tolerance)
@@ -195,25 +197,24 @@ class LocalizationConsistency(Spec, Criterion):
     What is measured: the normalized estimation error squared (NEES) e' P⁻¹ e, where e is the error of the estimated
         pose (x, y, yaw) and P is its covariance. One sample is taken per `every`. The average over the run is 3 if the
         covariance is correct.
-    When it fails: the average is above a bound that a consistent belief keeps with `probability`: the robot is
-        overconfident. It also fails if a covariance is singular, like that of a collapsed particle set. With
-        `both_sides`, it also fails if the average is below a lower bound.
+    When it fails: the average is above its upper bound (the robot is overconfident), or a covariance is singular. With
+        `both_sides`, it also fails if the average is below its lower bound. A correct covariance keeps the bounds with
+        the given `probability`.
     Why this: a filter that is wrong but has a small covariance does not recover.
     Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
 
-    The bounds assume that the samples are independent. Errors that follow each other in a run are similar, so `every`
-    should be longer than an error typically lasts. For a strict test, compare many runs at the same time, as
-    `simscen bench nav` does.
+    The bounds assume that the samples are independent. Therefore, `every` should be longer than an error typically
+    lasts. For a strict test, compare many runs at the same simulated time, as `simscen bench nav` does.
 
     Example: `localization_consistency: {every: 5 s, after: 10 s}`
     """
 
     probability: Annotated[float, Field(ge=0.5, le=0.9999), Quantity("ratio")] = 0.95
-    """Probability with which a consistent belief passes."""
+    """Probability with which a belief with a correct covariance passes."""
     every: PositiveDuration = 5.0
     """Time between two samples."""
     after: Duration = 0.0
-    """Simulated time at which the evaluation begins, so that the filter can converge before."""
+    """Simulated time at which the evaluation begins. The filter can converge before."""
     both_sides: bool = False
     """Also fail if the covariance is too large."""
 
@@ -247,13 +248,13 @@ class LocalizationConsistency(Spec, Criterion):
         return findings
 
     def _bounds(self, count: int) -> tuple[float | None, float]:
-        """Return lower bound (None without `both_sides`) and upper bound of the average of `count` samples."""
+        """Return the lower and the upper bound of the average of `count` samples; no lower one without `both_sides`."""
         if self.both_sides:
             return nees_mean_bounds(count, DIMENSIONS, self.probability)
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
-        """Return the NEES sampled at regular times from `after` to the last belief; None without covariances."""
+        """Return the NEES (n, 1) at regular times from `after` to the last belief; None without covariances."""
         all_samples = nees_samples(trace)
         if not len(all_samples):
             return None

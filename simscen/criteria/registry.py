@@ -1,4 +1,4 @@
-"""Entries of `pass`: all criteria by key. A new criterion of simscen needs one line here."""
+"""Specification of an entry of `pass`, with all criteria by key."""
 
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
@@ -22,7 +22,7 @@ class AnyCriterion(Choice):
     severity: Literal["fail", "warn"] = "fail"
     """Whether a violation fails the run or is only reported."""
     then: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Condition")] = None
-    """Condition that must hold when the condition of `whenever` holds."""
+    """Condition that must be true whenever the condition `whenever` is true."""
 
     goals_reached: Annotated[Criterion | None, LazySpec("simscen.criteria.goals_reached", "GoalsReached")] = None
     result: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "Result")] = None
@@ -62,7 +62,7 @@ class AnyCriterion(Choice):
 
     @property
     def chosen(self) -> BaseModel:
-        """The specification of the criterion. For `whenever` and `then`, it is the Response that combines them."""
+        """The specification of the criterion. The keys `whenever` and `then` are combined into one Response."""
         if self.whenever is None:
             return super().chosen
         from simscen.criteria.temporal import Response
@@ -71,7 +71,7 @@ class AnyCriterion(Choice):
 
 
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
-    """Return the name of the verdict of each criterion: its id, or its key. Repeated names get a number: speed#2."""
+    """Return the verdict name of each criterion: its `id`, or its key. A repeated name gets a number: speed#2."""
     seen: dict[str, int] = {}
     names = []
     for entry in criteria:

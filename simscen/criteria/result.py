@@ -1,4 +1,4 @@
-"""The criteria `result`, `error_code`, and `no_false_success`, which judge the reported result of the navigation."""
+"""The criteria `result`, `error_code`, and `no_false_success`, which judge the reported result of navigation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.error_codes import ErrorCodeValue, code_of
+from simscen.criteria.error_codes import ErrorCodeValue, error_code_name
 from simscen.criteria.findings import at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
 from simscen.criteria.timeline import end_reason, has_ended
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 class Result(Spec, Criterion):
-    """Navigation ended with the required result, which can be a failure.
+    """Navigation ended with the required result, for example a failure.
 
     What is measured: the result that the robot reports at the end of navigation, and its error code.
-    When it fails: the result or the error code is another one, or the run ended without a result.
+    When it fails: the result or the error code is not the required one, or the run ended without a result.
     Why this: a robot must reject a goal inside an obstacle with the correct error code.
     Source: nav2_simple_commander's TaskResult; the error codes of nav2_msgs' actions.
 
@@ -52,7 +52,7 @@ class Result(Spec, Criterion):
             return [_missing_result(trace, "result", self.status)]
         findings = [_compare(trace, end, "result", end.name, self.status)]
         if self.error_code is not None:
-            findings.append(_compare(trace, end, "error code", code_of(end), self.error_code.name))
+            findings.append(_compare(trace, end, "error code", error_code_name(end), self.error_code.name))
         return findings
 
 
@@ -60,7 +60,7 @@ class ErrorCodeIs(Spec, Criterion):
     """The robot reported the required error code, for a goal or for the whole navigation.
 
     What is measured: the error code of the last report about the goal or, without `goal`, of the end of navigation.
-    When it fails: the error code is another one, or the run ended without a report.
+    When it fails: the error code is not the required one, or the run ended without a report.
     Why this: with several goals, the end of navigation has the error code of only one of them.
     Source: the error codes of nav2_msgs' actions.
 
@@ -88,23 +88,26 @@ class ErrorCodeIs(Spec, Criterion):
         end = _last(trace, *kinds, name=self.goal)
         if end is None:
             return [_missing_result(trace, what, self.code.name)]
-        return [_compare(trace, end, what, code_of(end), self.code.name)]
+        return [_compare(trace, end, what, error_code_name(end), self.code.name)]
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
+    """Return the last event of these kinds for the goal `name`, or for any goal; None if there is none."""
     events = [event for event in trace.of_kind(*kinds) if matches_goal_name(event.name, name)]
     return events[-1] if events else None
 
 
 def _compare(trace: Trace, end: Event, what: str, reported: str, expected: str) -> Finding:
+    """Return a finding that passes if the event `end` reports the expected text."""
     if reported == expected:
         return held(what, reported, expected, (trace, end.tick))
     message = end.data.get("message")
-    details = [f"it ended with {end.name}, {code_of(end)}"] + ([str(message)] if message else [])
+    details = [f"it ended with {end.name}, {error_code_name(end)}"] + ([str(message)] if message else [])
     return missed(what, reported, expected, (trace, end.tick), details)
 
 
 def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
+    """Return a failed finding for a result that was never reported; inconclusive if the log is truncated."""
     when = f"t = {trace.seconds(trace.end):.2f} s"
     if has_ended(trace):
         return missed(
@@ -114,10 +117,10 @@ def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
 
 
 class NoFalseSuccess(Spec, Criterion):
-    """The robot reported no success that was not true. A reported failure is allowed.
+    """The robot did not report a false success. A reported failure is allowed.
 
-    What is measured: the true distance to each goal when the robot reports it as reached; and, when it reports that
-        navigation SUCCEEDED, whether every goal was reached, except preempted ones.
+    What is measured: the true distance to each goal when the robot reports it as reached. When the robot reports that
+        navigation SUCCEEDED, also whether every goal was reached, except preempted goals.
     When it fails: the robot was farther than `tolerance` from a goal that it reported as reached, or it reported
         SUCCEEDED although a goal was not reached.
     Why this: a failed delivery is repeated, but a false success remains unnoticed. Arena, for example, reports
@@ -128,8 +131,7 @@ class NoFalseSuccess(Spec, Criterion):
     """
 
     tolerance: PositiveLength = 1.0
-    """True distance from the goal above which a reported success is false. It is larger than the tolerance of goals,
-    which goals_reached checks."""
+    """True distance from the goal above which a reported success is false."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -137,7 +139,7 @@ class NoFalseSuccess(Spec, Criterion):
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each goal that was reported as reached, and one for each false SUCCEEDED."""
+        """Return one finding for each goal that was reported as reached, and one for each false report of SUCCEEDED."""
         outcomes = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         unknown = [
@@ -157,6 +159,7 @@ class NoFalseSuccess(Spec, Criterion):
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
     def _judge_goal(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> Finding:
+        """Return the finding for the true distance from a goal that the robot reported as reached or passed."""
         assert outcome.reached is not None
         what, at = f"goal {outcome.goal.name}", (trace, outcome.reached)
         if outcome.goal.via:
@@ -179,10 +182,10 @@ def _goal_names(case: Case) -> set[str]:
 
 
 def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
-    """Return a failed finding if the k-th end of navigation was reported as SUCCEEDED without all its goals, else None.
+    """Return a failed finding if the robot falsely reported SUCCEEDED at the k-th end of navigation, otherwise None.
 
-    An end of navigation covers the goals since the previous end. The first end also covers all goals of the scenario,
-    even if they were never accepted.
+    The report is false if a goal since the previous end of navigation was not reached. The first end of navigation
+    covers all goals of the scenario.
     """
     end = ended[k]
     if end.name != "SUCCEEDED":
@@ -198,6 +201,6 @@ def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -
 
 
 def _end_index(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
-    """Return the index of the end of navigation that covers a goal: the first one after its acceptance, or None."""
+    """Return the index of the first end of navigation after a goal was accepted; None if there is none."""
     end_tick = math.inf if outcome.end is None else outcome.end.tick
     return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

@@ -15,7 +15,7 @@ from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
 from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
+from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, ldlj, sparc
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 class Smoothness(Spec, Criterion):
     """The robot drove smoothly.
 
-    What is measured: four quantities, all computed from the true speed over ground of the whole run. Acceleration is
-        the absolute difference of two samples, divided by the time step. Jerk is the absolute second difference,
-        divided by the square of the time step. SPARC (spectral arc length; 0 is perfectly smooth) and LDLJ (log
-        dimensionless jerk; larger is smoother) are dimensionless.
+    What is measured: four quantities of the true speed over ground of the whole run. Acceleration is the absolute
+        difference of two samples, divided by the time step. Jerk is the absolute second difference, divided by the
+        square of the time step. SPARC (spectral arc length; 0 is perfectly smooth) and LDLJ (log dimensionless jerk;
+        larger is smoother) are dimensionless.
     When it fails: the largest acceleration, the largest jerk, or the mean jerk is above its bound, or SPARC or LDLJ is
         below its bound.
     Why this: jerk makes cargo fall over and is uncomfortable. A robot with an oscillating controller reaches its goals,
@@ -39,7 +39,7 @@ class Smoothness(Spec, Criterion):
         jerk: HuNavSim as a first difference, Arena without the time step.
 
     SPARC is sensitive to slow oscillation, LDLJ to stops. Both depend on the duration, so that only runs with the same
-    drive can be compared. They are inconclusive for a robot that never moved.
+    drive can be compared. Both are inconclusive for a robot that never moved.
 
     Example: `smoothness: {max_acceleration: 1 m/s^2, max_jerk: 60 m/s^3}`
     """
@@ -70,45 +70,45 @@ class Smoothness(Spec, Criterion):
         """Return one finding for each given bound."""
         findings = []
         if self.max_acceleration is not None:
-            findings.append(_largest(trace, case, "acceleration", self.max_acceleration, "m/s^2"))
+            findings.append(_judge_largest(trace, case, "acceleration", self.max_acceleration, "m/s^2"))
         if self.max_jerk is not None:
-            findings.append(_largest(trace, case, "jerk", self.max_jerk, "m/s^3"))
+            findings.append(_judge_largest(trace, case, "jerk", self.max_jerk, "m/s^3"))
         if self.max_mean_jerk is not None:
-            findings.append(_mean_jerk(trace, case, self.max_mean_jerk))
+            findings.append(_judge_mean_jerk(trace, case, self.max_mean_jerk))
         if self.min_sparc is not None:
-            findings.append(_dimensionless(trace, "sparc", self.min_sparc))
+            findings.append(_judge_sparc_or_ldlj(trace, "sparc", self.min_sparc))
         if self.min_ldlj is not None:
-            findings.append(_dimensionless(trace, "ldlj", self.min_ldlj))
+            findings.append(_judge_sparc_or_ldlj(trace, "ldlj", self.min_ldlj))
         return findings
 
 
-def _largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
+def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
     """Return the finding for the largest magnitude of a signal."""
-    values = _read(trace, case, name)
+    values = _read_if_available(trace, case, name)
     if isinstance(values, str):
         return undecided(name, values, f"≤ {limit:g} {unit}")
     k = int(np.argmax(np.abs(values)))
     return at_most(name, float(abs(values[k])), limit, unit, at=(trace, int(trace.truth.ticks[k])))
 
 
-def _mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
-    values = _read(trace, case, "jerk")
+def _judge_mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
+    values = _read_if_available(trace, case, "jerk")
     if isinstance(values, str):
         return undecided("mean jerk", values, f"≤ {limit:g} m/s^3")
     return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
 
 
-def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
-    """Return the signal, or the reason why there is none."""
+def _read_if_available(trace: Trace, case: Case, name: SignalName) -> Array | str:
+    """Return the values (n,) of a signal, or as text the reason why it is not available."""
     try:
         return read_signal(name, trace, case, {})
     except SignalUnavailable as reason:
         return str(reason)
 
 
-def _dimensionless(trace: Trace, name: Literal["sparc", "ldlj"], limit: float) -> Finding:
+def _judge_sparc_or_ldlj(trace: Trace, name: Literal["sparc", "ldlj"], limit: float) -> Finding:
     speeds = speed(trace)
-    if not len(speeds) or speeds.values.max() < MOVED_SPEED_M_S:
+    if not len(speeds) or speeds.values.max() < MIN_MOVING_SPEED_M_S:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
     try:
         even_speeds, rate = evenly_sampled_speed(trace)

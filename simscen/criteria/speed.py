@@ -28,14 +28,13 @@ class Speed(Spec, Criterion):
 
     What is measured: the largest true speed over ground and the largest true turn rate, over the whole run, or while
         the robot's center is in a region. With a mask of speed limits, also the difference between the true speed and
-        the limit of the cell at the robot's true center; of all limits from `grace` before to `grace` after, the
-        highest one counts.
+        the limit at the robot's true center. At each time, the highest limit within `grace` before and after counts.
     When it fails: the speed is above `max`, the turn rate is above `max_turn_rate`, or the speed is more than
         `tolerance` above the limit of the mask.
     Why this: on slopes, by slip, or by overshoot, a robot can exceed the limits that its controller is given.
     Source: ScenarioRunner's MaxVelocityTest.
 
-    Inconclusive if the robot was never in the region, or never in limited cells of the mask for longer than two times
+    Inconclusive if the robot was never in the region, or never in limited cells of the mask for longer than twice the
     `grace`.
 
     Example: `speed: {max: 0.5 m/s}`
@@ -93,10 +92,13 @@ class Speed(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound."""
         bounds = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
-        found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in bounds if limit is not None]
-        return found if self.mask is None else [*found, self._by_mask(trace, case, self.mask)]
+        found = [
+            self._judge_largest(trace, case, name, limit, unit) for name, limit, unit in bounds if limit is not None
+        ]
+        return found if self.mask is None else [*found, self._judge_mask(trace, case, self.mask)]
 
-    def _fastest(self, trace: Trace, case: Case, name: str, limit: float, unit: str) -> Finding:
+    def _judge_largest(self, trace: Trace, case: Case, name: str, limit: float, unit: str) -> Finding:
+        """Return the finding for the largest value of the signal `name`, "speed" or "turn_rate"."""
         what, limit_text = name.replace("_", " "), f"≤ {limit:.2f} {unit}"
         signal = ground_truth.speed(trace) if name == "speed" else ground_truth.turn_rate(trace)
         if not len(signal):
@@ -116,8 +118,8 @@ class Speed(Spec, Criterion):
         context = "" if self.in_ is None else f"in {self.in_}"
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
 
-    def _by_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
-        """Return the finding for the limits of a mask."""
+    def _judge_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
+        """Return the finding for the largest excess of the speed over the limits of a mask."""
         limit_text, signal = f"≤ the limits of {mask.file}", ground_truth.speed(trace)
         if not len(signal):
             return undecided("speed", "no velocity was recorded", limit_text)
@@ -128,7 +130,7 @@ class Speed(Spec, Criterion):
             return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
         limits = mask.speed_limits(case.masks[mask.file].grid)
         local_limits = limits.at_points(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
-        highest = _highest_around(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
+        highest = _sliding_maximum(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
             because = f"the robot never was in a limited part of the mask for longer than {2 * self.grace:g} s"
@@ -140,9 +142,9 @@ class Speed(Spec, Criterion):
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """Return, for each sample, whether the robot's center was in the region; None if the world has no such region.
+        """Return a mask (n,) of the samples at which the robot's center was in the region `in`, by default all.
 
-        Without `in`, all samples are True.
+        Return None if the world has no such region.
         """
         if self.in_ is None:
             return np.ones(len(signal), dtype=bool)
@@ -152,8 +154,8 @@ class Speed(Spec, Criterion):
         return points_in_polygon(case.regions[self.in_], positions)
 
 
-def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
-    """Return, for each sample, the largest of the `values` at most `reach` ticks before or after it."""
+def _sliding_maximum(values: Array, ticks: Ticks, reach: int) -> Array:
+    """Return for each sample the largest value within `reach` ticks before and after."""
     first = np.searchsorted(ticks, ticks - reach, side="left")
     end = np.searchsorted(ticks, ticks + reach, side="right")
     padded = np.append(values, -np.inf)

@@ -1,4 +1,4 @@
-"""The criteria `stopped_within` and `stuck`: the robot stopped when it had to, and did not stand still otherwise."""
+"""The criteria `stopped_within` (the robot stopped when it had to) and `stuck` (it made progress otherwise)."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 
 
 STALE_SCAN_S = 0.2
-"""Age of the newest scan above which a finding calls the robot blind: two periods of a 10 Hz lidar."""
+"""Age of the newest scan above which findings call the robot blind: two periods of a 10 Hz lidar."""
 
 
 class StoppedWithin(Spec, Criterion):
     """The robot stopped in time after a fault or an event.
 
-    What is measured: the time from each start of `after` until the robot stands. It stands if its true speed is at most
-        `speed` and its true turn rate at most `turn_rate` for the duration `hold`.
-    When it fails: the time is longer than `time`; or, with `stay`, the robot moves again before the fault or event
-        ends.
+    What is measured: the time from each start of `after` until the robot stands. The robot stands if its true speed is
+        at most `speed` and its true turn rate at most `turn_rate` for the duration `hold`.
+    When it fails: the time is longer than `time`. With `stay`, it also fails if the robot moves again before the fault
+        or event ends.
     Why this: a robot without sensor data must not drive. The true speed counts, because a robot can roll on after a
         command of zero.
     Source: Nav2's collision monitor, whose source_timeout stops a robot without sensor data.
@@ -62,7 +62,7 @@ class StoppedWithin(Spec, Criterion):
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each start of `after`, and with `stay` a second one if the robot stopped.
+        """Return one finding for each start of `after`. With `stay`, add a second finding if the robot stopped.
 
         Raises MissingEvidence if the trace has no velocity.
         """
@@ -83,12 +83,13 @@ class StoppedWithin(Spec, Criterion):
         return f"≤ {self.time:.2f} s after {self.after}"
 
     def _standing_samples(self, trace: Trace) -> Flags:
-        """Return, for each sample of the truth, whether the robot stands."""
+        """Return a mask (n,) of the samples of the truth at which the robot is slow enough to stand."""
         slow = speed(trace).values[:, 0] <= self.speed
         steady = turn_rate(trace).values[:, 0] <= self.turn_rate
         return slow & steady
 
     def _judge_span(self, trace: Trace, span: Span, is_standing: Flags) -> list[Finding]:
+        """Return the findings for one interval in which the fault or event was active."""
         first = max(int(np.searchsorted(trace.velocity.ticks, span.start, side="right")) - 1, 0)
         hold = round(self.hold * trace.tick_rate)
         stop, lasted = first_sustained(trace.velocity.ticks[first:], is_standing[first:], hold, trace.end)
@@ -106,6 +107,7 @@ class StoppedWithin(Spec, Criterion):
         return [found, self._judge_stay(trace, span, until, is_standing)] if self.stay and stop is not None else [found]
 
     def _judge_stay(self, trace: Trace, span: Span, stop: int, is_standing: Flags) -> Finding:
+        """Return the finding that the robot stood from the tick `stop` to the end of the interval."""
         ticks = trace.velocity.ticks
         again = ticks[~is_standing & (ticks > stop) & (ticks < span.end)]
         expected = f"standing until {self.after} ends"
@@ -118,7 +120,7 @@ class StoppedWithin(Spec, Criterion):
 
 
 def _stood_before(trace: Trace, is_standing: Flags, tick: int) -> bool:
-    """Return whether the robot stood just before `tick`."""
+    """Return whether the robot stood at the last sample before `tick`."""
     return bool(is_standing[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 
@@ -175,11 +177,10 @@ class Stuck(Spec, Criterion):
 
 
 def _standstills(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """Return the duration and the end, in ticks, of each period in which the robot stayed within `radius` m.
+    """Divide a drive from tick `start` to `end` into periods, and return the duration and the end of each in ticks.
 
-    The periods follow each other from tick `start` to `end`: as in a progress checker, a new one begins as soon as the
-    robot is more than `radius` away from its position at the begin of the previous one. The list is empty without
-    samples.
+    As in Nav2's progress checker, a period ends when the robot is more than `radius` m away from its position at the
+    begin of the period. The list is empty without samples.
     """
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:

@@ -1,4 +1,8 @@
-"""The criteria `always`, `eventually`, `until`, and `whenever … then`, on conditions that a scenario defines."""
+"""The criteria `always`, `eventually`, `until`, and `whenever … then`, which check conditions over time.
+
+A condition compares signals, such as the clearance, with bounds. Its robustness is the margin by which it is true;
+negative if it is false.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +26,11 @@ if TYPE_CHECKING:
 
 
 class WindowedCriterion(Windowed, TemporalCriterion):
-    """Base class of `always` and `eventually`: a condition that must be true in a window at every or at one sample."""
+    """Base class of `always` and `eventually`: a condition, and the window of time in which it is checked."""
 
     operator: ClassVar[Literal["always", "eventually"]]
 
-    def compared(self) -> list[Condition]:
+    def all_comparisons(self) -> list[Condition]:
         """Return every comparison in the condition."""
         return list(self.comparisons())
 
@@ -36,19 +40,19 @@ class WindowedCriterion(Windowed, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Simulated time in s before which the criterion cannot pass: the end or the begin of the window."""
+        """Simulated time in s before which the criterion cannot pass."""
         return window_horizon(self.operator, self, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness: that of the worst sample for `always`, of the best one for `eventually`."""
+        """Return the smallest robustness in the window for `always`, or the largest one for `eventually`."""
         return windowed_robustness(self.operator, self, self, context)
 
 
 class Always(WindowedCriterion):
     """A condition is true at all times of the run, or of a part of it (a window).
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is that of the
-        sample at which the condition was nearest to being false.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
+        smallest distance in the window.
     When it fails: the condition was false at a sample.
     Why this: the other criteria cover the most frequent requirements. This one covers all that signals can express.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
@@ -64,8 +68,8 @@ class Always(WindowedCriterion):
 class Eventually(WindowedCriterion):
     """A condition is true at least once in the run, or in a part of it (a window).
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is that of the
-        sample at which the condition was met best, or was nearest to being met.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the largest
+        distance in the window.
     When it fails: the condition was true at no sample.
     Why this: some requirements must be met only once, for example that a robot arrives or that a disturbance has an
         effect.
@@ -82,20 +86,18 @@ class Eventually(WindowedCriterion):
 class Until(Release, TemporalCriterion):
     """The condition `hold` is true until the condition `release` becomes true, which must happen within the window.
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin for a release
-        at one sample is the smallest of the margin of `release` at this sample and those of `hold` before. The best
-        release counts.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin at one sample
+        is the smallest distance of `release` at this sample and of `hold` before. The best sample counts.
     When it fails: `release` was not true in the window, or `hold` was false before `release` became true.
     Why this: only this criterion can require an order, for example that a robot does not move before it is localized.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
-    Inconclusive if the run ended before the end of the window, and until then, `hold` was always true and `release`
-    always false.
+    Inconclusive if the run ended before the end of the window, with `hold` always true and `release` always false.
 
     Example: `until: {hold: {signal: speed, op: "<=", value: 0.01 m/s}, release: {signal: localized}, within: 5 s}`
     """
 
-    def compared(self) -> list[Condition]:
+    def all_comparisons(self) -> list[Condition]:
         """Return every comparison in both conditions."""
         return [*self.hold.comparisons(), *self.release.comparisons()]
 
@@ -105,48 +107,48 @@ class Until(Release, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Simulated time in s before which the criterion cannot pass: the begin of the window."""
+        """Simulated time in s before which the criterion cannot pass."""
         return until_horizon(self.release, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness: that of the best release."""
+        """Return the robustness for the best sample at which `release` becomes true."""
         return until_robustness(self.hold, self.release, self, context)
 
 
 class Whenever(Windowed):
-    """Each time that one condition (the premise, `whenever`) is true, another one (the response, `then`) is true too.
+    """Whenever one condition (the premise) is true, another condition (the response, `then`) is true as well.
 
     For a response within some seconds, write `then: {eventually: {…, within: 2 s}}`.
 
     What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
         smallest margin of the response at all samples at which the premise was true.
-    When it fails: at a sample, the premise was true and the response was not.
+    When it fails: at a sample, the premise was true and the response was false.
     Why this: a robot that is lost, blind, or too close to something must react in time, and each time.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
 
     Inconclusive if the run ended before the time for a response was over. Also inconclusive if the premise was never
-    certainly true, because then nothing was tested; `required: false` lets such a run pass.
+    true, because nothing was tested; `required: false` lets such a run pass.
 
     Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
     """  # noqa: E501 (an example is on one line)
 
     required: bool = True
-    """Whether the premise must be true at least once. With `false`, a run in which it never was true passes."""
+    """Whether the premise must be true at least once. With `false`, a run in which it was never true passes."""
 
 
 class Response(Spec, TemporalCriterion):
-    """The criterion `whenever … then`: combines the premise and the response, which are separate keys in a scenario."""
+    """The criterion `whenever … then`, made of two keys of a scenario: the premise and the response."""
 
     premise: Whenever
     response: Condition
 
     @classmethod
     def of(cls, premise: BaseModel | None, response: BaseModel | None) -> Response:
-        """Return the criterion with this premise and response, which must be a Whenever and a Condition."""
+        """Return the criterion for a premise (a Whenever) and a response (a Condition)."""
         assert isinstance(premise, Whenever) and isinstance(response, Condition)
         return cls.model_construct(premise=premise, response=response)
 
-    def compared(self) -> list[Condition]:
+    def all_comparisons(self) -> list[Condition]:
         """Return every comparison in both conditions."""
         return [*self.premise.comparisons(), *self.response.comparisons()]
 
@@ -156,10 +158,10 @@ class Response(Spec, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Simulated time in s before which the criterion cannot pass: when the last response is due."""
+        """Simulated time in s before which the criterion cannot pass."""
         return window_horizon("always", self.response, self.premise)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness: that of the worst response; undecided if the premise was never true."""
+        """Return the smallest robustness of the response at the samples at which the premise was true."""
         premise, required = self.premise, self.premise.required
         return response_robustness(premise, self.response, premise, context, required=required)

@@ -1,4 +1,4 @@
-"""Intervals of a run in which faults, events, and zones were active or a state lasted, and how the run ended."""
+"""Intervals of a run in which faults, events, or zones were active, and how the run ended."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 NEVER_SWITCHED = "no event switched the zone on or off: leave `while_on` out to judge the whole run"
-"""Reason of inconclusive findings."""
+"""Reason of inconclusive findings with `while_on` if no event switched the zone."""
 
 
 @dataclass(frozen=True)
 class Span:
     """Interval from `start` to `end` in ticks.
 
-    `has_end_event` is True if an event in the log ended the interval, and False if it lasts to the end of the run.
+    `has_end_event` is True if an event of the trace ended the interval, and False if it lasts to the end of the run.
     """
 
     start: int
@@ -34,10 +34,9 @@ class Span:
 
 
 def spans(trace: Trace, label: str) -> list[Span]:
-    """Return the intervals in which the fault, event or mark with this label was active, in the order of their starts.
+    """Return the intervals in which the faults, events, or marks with this label were active, in order of start.
 
-    An interval lasts to the end of the run if the log contains no end for it, or if it has no duration. Several entries
-    of a scenario may have the same label; each end belongs to a start of its own entry.
+    An interval without an end, or with an end at its start, lasts to the end of the run.
     """
     starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
     ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
@@ -54,7 +53,7 @@ def _span(trace: Trace, start: int, end: int | None) -> Span:
 
 
 def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
-    """Return text that the fault or event `label` never started, and detail lines with the labels that did start."""
+    """Return a message that the fault or event `label` never started, and detail lines with other labels."""
     started = sorted({event.name for event in trace.of_kind(*_STARTS)})
     names = ", ".join(f"`{name}`" for name in started) or "nothing"
     return f"`{label}` never started; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})", [
@@ -63,7 +62,7 @@ def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
 
 
 def end_reason(trace: Trace) -> str:
-    """Return why the run ended, in words, or that the log is truncated."""
+    """Return as text why the run ended, or that the log is truncated."""
     ends = trace.of_kind(EventKind.RUN_ENDED)
     return ends[-1].name if ends else "the log stops there"
 
@@ -74,11 +73,10 @@ def has_ended(trace: Trace) -> bool:
 
 
 def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) -> list[tuple[int, int]]:
-    """Return the intervals (first tick, last tick) in which the zone in `region` was enabled.
+    """Return the intervals (first tick, last tick) in which a zone of the costmap filter `what` was enabled.
 
-    If `region` is None, the intervals are those of the mask of the costmap filter `what`. The first `grace` seconds
-    after each switch-on are left out. If the first switch is a switch-off, the zone was on from the start. The list is
-    empty if no event switched the zone.
+    `region` is the region of the zone; None for the mask of the filter. Intervals begin `grace` seconds after the zone
+    was enabled. The list is empty if no event switched the zone.
     """
     switches = [e for e in trace.of_kind(EventKind.ZONE_SWITCHED) if (e.name, e.data["filter"]) == (region or "", what)]
     if not switches:
@@ -96,9 +94,9 @@ def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) 
 
 
 def clip_samples(samples: Samples, first: int, last: int) -> Samples:
-    """Return the samples from tick `first` to `last`.
+    """Return the samples from tick `first` to `last`, with samples at these two ticks.
 
-    Samples at these two ticks are added with the newest values (sample and hold), unless they are outside of `samples`.
+    Added samples have the values of the newest sample. Nothing is added outside the time of `samples`.
     """
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
@@ -107,11 +105,10 @@ def clip_samples(samples: Samples, first: int, last: int) -> Samples:
 
 
 def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
-    """Return the first tick from which a state lasts for at least `hold` ticks, and True.
+    """Return the first tick from which a state lasts for at least `hold` ticks, and whether there is such a tick.
 
-    `is_true` states whether the state is true at each of the `ticks`. It lasts until the next tick at which it is not
-    true, or until `end`. If it never lasts that long, return the tick from which it lasts until `end`, and False. This
-    tick is None if the state is not true at the last of the `ticks`.
+    `is_true` contains the state at each of the `ticks`; the last state lasts until the tick `end`. If the state never
+    lasts that long, the returned tick is the start of its last period; None if the last state is False.
     """
     begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
     breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))

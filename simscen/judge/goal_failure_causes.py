@@ -13,7 +13,7 @@ from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.case import Case, Passage
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
-from simscen.criteria.error_codes import code_of
+from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 
 Diagnosis = tuple[list[str], set[str]]
@@ -170,7 +170,7 @@ def _stopped(trace: Trace, tick: int) -> list[str]:
 def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """Return a sentence with the stack's message if it gave up the goal, and with the recoveries before."""
     end = outcome.end
-    if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
+    if end is None or end.tick > tick or error_code_name(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
         return []
     message = end.data.get("message")
     if not message:
@@ -182,7 +182,7 @@ def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """Return a sentence on the recoveries that failed on the way to this goal, with their error codes."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
-    failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
+    failed = Counter(f"{e.name} with {error_code_name(e)}" for e in ended if e.data.get("outcome") == "failed")
     counted = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
     return [f"recoveries failed: {', '.join(counted)}"] if failed else []
 

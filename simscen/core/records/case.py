@@ -105,7 +105,7 @@ class Run:
         trace: Recorded states, readings, decisions, and events.
         case: Parts of the scenario that the criteria used.
         log: MCAP file of the run; None if none was requested.
-        stack: Name, version, and settings that an external stack has sent; empty for the reference stack.
+        stack: Facts that an external stack sent, such as its version; empty for the reference stack.
         robots: For several robots, one run for each robot by name. `trace`, `case`, and `stack` of the run itself
             are then those of the first robot.
     """

@@ -1,1 +1,1 @@
-"""Signal temporal logic: conditions on signals over time, their robustness, and their description in words."""
+"""Signal temporal logic (STL): conditions on signals over time, their robustness, and their description as text."""

@@ -1,4 +1,4 @@
-"""Specification of conditions: comparisons of signals, combined by logical and temporal operators (STL)."""
+"""Specification of conditions: comparisons of signals, combined by operators of signal temporal logic (STL)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDurati
 
 Op = Literal[">=", ">", "<=", "<"]
 OPERATORS = ("signal", "all", "any", "not_", "always", "eventually", "until", "whenever")
-"""Fields of a condition of which exactly one is given."""
+"""Fields of a condition. Exactly one of them must be given."""
 ARGUMENT_KEYS = ("object", "point", "goal", "region", "fault", "event", "recovery", "with_")
-"""Fields of a condition that contain an argument of the signal."""
+"""Fields of a condition that contain arguments of the signal."""
 
 
 class Condition(Spec):
-    """Statement that is true or false at each time of a run: a signal compared with a bound, or a combination of these.
+    """Statement that is true or false at each time of a run: a comparison of a signal, or a combination of conditions.
 
     Exactly one of the keys signal, all, any, not, always, eventually, until, and whenever must be given. `then` belongs
     to whenever; all other keys belong to signal.
@@ -30,12 +30,11 @@ class Condition(Spec):
     signal: SignalName | None = None
     """Name of a signal; `simscen explain signals` lists them."""
     op: Op | None = None
-    """How the signal is compared with `value`; omitted for a yes-or-no signal."""
+    """Comparison of the signal with `value`; omitted for a yes-or-no signal."""
     value: Annotated[float, AnyQuantity()] | None = None
     """Bound, with a unit or in SI units."""
     scale: Annotated[float, AnyQuantity()] | None = None
-    """Amount by which margins of this signal are divided, so that they can be compared with those of signals in other
-    units."""
+    """Divisor of the margins of this signal. It makes signals with different units comparable."""
     object: MoverName | None = None
     """Movable object to which the signal `distance_to` is measured."""
     point: PlaceOrPoint | None = None
@@ -65,8 +64,8 @@ class Condition(Spec):
     until: Release | None = None
     """True if `hold` is true from now on until `release` becomes true."""
     whenever: Condition | None = None
-    """True if, from now on, the condition `then` is true each time that the given one is. Undecided if the given one is
-    never true."""
+    """True if, from now on, the condition `then` is true each time that the given condition is true. Undecided if the
+    given condition is never true."""
     then: Condition | None = None
     """Condition that must be true each time that the condition of `whenever` is true."""
 
@@ -100,13 +99,14 @@ class Condition(Spec):
         return self
 
     def _reject_signal_keys(self, operator: str) -> None:
+        """Raise ValueError if a key that belongs to `signal` is given for another operator."""
         wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
         if wrong:
             raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{operator}`")
 
     @property
     def definition(self) -> Signal:
-        """Definition of the compared signal. Only a comparison has one; a combination raises AssertionError."""
+        """Definition of the compared signal. Raises AssertionError if the condition is no comparison."""
         assert self.signal is not None
         return SIGNALS[self.signal]
 
@@ -116,28 +116,28 @@ class Condition(Spec):
         return {name.rstrip("_"): value for name in ARGUMENT_KEYS if (value := getattr(self, name)) is not None}
 
     def comparisons(self) -> Iterator[Condition]:
-        """Yield all comparisons in this condition, in the order of the operands; itself if it is a comparison."""
+        """Yield all comparisons in this condition; the condition itself if it is a comparison."""
         if self.signal is not None:
             yield self
         for part in self.parts():
             yield from part.comparisons()
 
     def parts(self) -> list[Condition]:
-        """Return the conditions that this condition combines; empty for a comparison."""
+        """Return the operands of this condition; empty for a comparison."""
         until = () if self.until is None else (self.until.hold, self.until.release)
         single = (self.not_, self.always, self.eventually, *until, self.whenever, self.then)
         return [*(self.all or ()), *(self.any or ()), *(part for part in single if part is not None)]
 
 
 class Window(Spec):
-    """Interval of time relative to the time at which a condition is evaluated; without any key, the rest of the run."""
+    """Interval of time after the time of evaluation ("now"). Without any key, it is the rest of the run."""
 
     within: PositiveDuration | None = None
-    """The window lasts from now until this time from now."""
+    """End of the window in s from now. The window begins now."""
     after: PositiveDuration | None = None
-    """The window lasts from this time from now until the end of the run."""
+    """Begin of the window in s from now. The window lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """The window lasts from the first to the second of these times from now."""
+    """Begin and end of the window in s from now."""
 
     @model_validator(mode="after")
     def _check_interval(self) -> Window:
@@ -150,7 +150,7 @@ class Window(Spec):
 
     @property
     def interval(self) -> tuple[float, float | None]:
-        """Begin and end in s from now; an end of None is the end of the run."""
+        """Begin and end in s from now. An end of None is the end of the run."""
         if self.between is not None:
             return self.between[0], self.between[1]
         return self.after or 0.0, self.within
@@ -161,22 +161,22 @@ class Windowed(Window, Condition):
 
 
 class Release(Window):
-    """Two conditions: `hold` must be true until `release` becomes true, which must happen in the window."""
+    """Operands of `until`: `hold` must be true until `release` becomes true, which must happen in the window."""
 
     hold: Condition
     """Condition that must be true at all times before the release."""
     release: Condition
-    """Condition that must become true; from then on, `hold` may be false."""
+    """Condition that must become true. From then on, `hold` may be false."""
 
 
 def _dimension_of(value: Any) -> str:
-    """Return the dimension of the unit at the end of a text; "" without a known unit."""
+    """Return the dimension of the unit at the end of a text, e.g. "length" for "2 m"; "" if the unit is unknown."""
     unit = str(value).split(maxsplit=1)[-1]
     return next((dimension for dimension, units in UNITS.items() if unit in units), "")
 
 
 def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
-    """Raise ValueError if a comparison does not fit its signal, or if it has the same result in every run."""
+    """Raise ValueError if the keys of a comparison do not suit its signal, or if the result is the same in every run."""
     arguments = condition.arguments
     unknown = [key for key in arguments if key not in (*signal.required_arguments, *signal.optional_arguments)]
     if unknown:
@@ -196,7 +196,7 @@ def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
 
 
 def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
-    """Raise ValueError if no value between the minimum and the maximum of the signal can change the comparison."""
+    """Raise ValueError if a comparison is true, or false, for all values between minimum and maximum of the signal."""
     minimum, maximum, unit = signal.minimum, signal.maximum, f" {signal.unit}".rstrip()
     never_below = {">=": value <= minimum, ">": value < minimum, "<": value <= minimum, "<=": value < minimum}[op]
     never_above = {"<=": value >= maximum, "<": value > maximum, ">": value >= maximum, ">=": value > maximum}[op]
@@ -211,10 +211,10 @@ for _model in (Condition, Windowed, Release):
 
 
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """Return the earliest time in s from now at which it can be known that a condition is true.
+    """Return the earliest time in s from now at which a condition can be known to be true.
 
-    If `holds` is False, return the earliest time at which it can be known that the condition is false. A window without
-    an end adds nothing, because it is decided by the end of the run.
+    If `holds` is False, return the earliest time at which it can be known to be false. A window that lasts to the end
+    of the run counts only with its begin.
     """
     if condition.all is not None or condition.any is not None:
         needs_all = (condition.all is not None) == holds
@@ -232,9 +232,9 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
 
 
 def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
-    """Return the `decision_horizon` in s of `operator`, "always" or "eventually", over the condition `part`.
+    """Return the `decision_horizon` in s of `operator` ("always" or "eventually") with the condition `part`.
 
-    It is the end of the window if the condition must be known in the whole window, else the begin of the window.
+    It is the end of the window if the whole window decides, and the begin of the window if one sample can decide.
     """
     begin, end = window.interval
     needs_whole_window = (operator == "always") == holds
@@ -242,5 +242,5 @@ def window_horizon(operator: str, part: Condition, window: Window, holds: bool =
 
 
 def until_horizon(release: Condition, window: Window) -> float:
-    """Return the earliest time in s from now at which `until` can be known to be true: with a release at once."""
+    """Return the earliest time in s from now at which `until` can be known to be true."""
     return window.interval[0] + decision_horizon(release)

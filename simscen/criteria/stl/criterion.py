@@ -1,4 +1,4 @@
-"""Base class of the temporal criteria: finds out whether a condition on signals is met, by which margin, and when."""
+"""Base class of the temporal criteria, which check a condition on signals over time (signal temporal logic)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """Criterion that consists of a condition on named signals."""
+    """Criterion that checks a condition at the start of the run."""
 
     @abstractmethod
-    def compared(self) -> list[Condition]:
-        """Return all comparisons in the condition, in the order of the operands."""
+    def all_comparisons(self) -> list[Condition]:
+        """Return all comparisons in the condition."""
 
     @abstractmethod
     def formula(self) -> str:
@@ -43,23 +43,23 @@ class TemporalCriterion(Criterion):
 
     @abstractmethod
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness of the condition on a run."""
+        """Return the robustness of the condition: the margin by which it is true; negative if it is false."""
 
     @property
     def clearance_range(self) -> float:
-        """Distance in m around the robot up to which clearance must be measured: beyond all bounds on the clearance."""
-        bounds = [one.value for one in self.compared() if one.signal == "clearance" and one.value is not None]
+        """Distance in m around the robot up to which clearance must be measured; 0 without a comparison of it."""
+        bounds = [one.value for one in self.all_comparisons() if one.signal == "clearance" and one.value is not None]
         return max((bound + SEARCH_MARGIN_M for bound in bounds), default=0.0)
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """Evidence that the criterion needs from the log: that of all compared signals."""
-        compared = self.compared()
+        """Evidence that the log must contain for the compared signals."""
+        compared = self.all_comparisons()
         objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
         return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding: whether the condition is true at the start of the run, and the sample that decides."""
+        """Return one finding, with the value of the signal at the sample that decides the condition."""
         formula = self.formula()
         try:
             result = self.evaluate(EvaluationContext(trace, case, has_ended(trace)))
@@ -70,16 +70,17 @@ class TemporalCriterion(Criterion):
             return [self._decisive_finding(trace, result, "low", low)]
         if high < 0:
             return [self._decisive_finding(trace, result, "high", high)]
-        untested = next(result.untested(), None)
+        untested = next(result.untested_responses(), None)
         if untested is not None:
-            return [_untested_finding(untested, formula, optional=untested is result)]
+            return [_untested_finding(untested, formula, with_hint=untested is result)]
         ended = f"the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
         return [undecided("", f"{ended} before `{formula}` was decided", formula)]
 
     def _decisive_finding(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
+        """Return the finding of a decided condition. `value` is its robustness: `bound` of `result` at the start."""
         witness = result.witness(0, bound)
         tick = int(trace.truth.ticks[witness.sample])
-        signal, unit, margin = witness.comparison.definition, _margin_unit(self.compared()), None
+        signal, unit, margin = witness.comparison.definition, _margin_unit(self.all_comparisons()), None
         if unit is None or math.isinf(value):
             unit = signal.unit
         else:
@@ -94,30 +95,28 @@ class TemporalCriterion(Criterion):
             value=None if signal.is_boolean else witness.value,
             tick=tick,
             place=trace.place(tick),
-            detail=_detail(trace, self.formula(), witness),
+            detail=_detail_lines(trace, self.formula(), witness),
         )
 
 
-def _untested_finding(response: ResponseRobustness, formula: str, optional: bool) -> Finding:
-    """Return the inconclusive finding for a `whenever` whose premise was never true.
-
-    If `optional`, it has a line about the key `required`, which only the criterion itself has, not a nested `whenever`.
-    """
+def _untested_finding(response: ResponseRobustness, formula: str, with_hint: bool) -> Finding:
+    """Return the inconclusive finding for a `whenever` whose premise was never true; with a hint at `required`."""
     premise = describe(response.premise_condition)
-    if response.may_have_held:
+    if response.may_be_tested:
         because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"
     else:
         because = f"`{premise}` was never true, so nothing was tested"
-    return undecided("", because, formula, ["`required: false` lets such a run pass"] if optional else [])
+    return undecided("", because, formula, ["`required: false` lets such a run pass"] if with_hint else [])
 
 
-def _detail(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
+def _detail_lines(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
+    """Return the condition and the notes of the witness with their times."""
     times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
     return (f"condition: {formula}", *(f"{what} at t = {seconds:.2f} s" for what, seconds in times))
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the unit of the margin: that of all compared signals, or "" if all have scales; None if units differ."""
+    """Return the common unit of the compared signals; "" if all have a `scale`, None if they are not comparable."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""

@@ -1,4 +1,4 @@
-"""Text of conditions and of their decisive values, for reports."""
+"""Text of conditions, and of the values that decide them, for reports."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from simscen.criteria.stl.robustness import Witness
 
 _SIGNS: dict[Op, str] = {">=": "≥", ">": ">", "<=": "≤", "<": "<"}
-"""Signs as printed."""
+"""Printed sign of each comparison operator."""
 _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
-"""Comparison that is true exactly if the key is false."""
+"""Negation of each comparison operator."""
 
 
 def describe(condition: Condition) -> str:
-    """Return a condition in words, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
+    """Return a condition as text, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_limit(condition)}".rstrip()
     if condition.all is not None:
@@ -38,22 +38,22 @@ def describe(condition: Condition) -> str:
 
 
 def describe_windowed(operator: str, part: Condition, window: Window) -> str:
-    """Return "always …" or "eventually …", with the window in words; `operator` is one of these two words."""
+    """Return "always …" or "eventually …" with the window as text. `operator` is "always" or "eventually"."""
     return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
 
 
 def describe_until(hold: Condition, release: Condition, window: Window) -> str:
-    """Return "… until …", with the window in words."""
+    """Return "… until …" with the window as text."""
     return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
 
 
 def describe_response(premise: Condition, response: Condition) -> str:
-    """Return "whenever …, then …" in words."""
+    """Return "whenever …, then …"."""
     return f"whenever {describe(premise)}, then {describe(response)}"
 
 
 def describe_window(window: Window) -> str:
-    """Return a window in words, e.g. "within 5 s"; "" for the rest of the run."""
+    """Return a window as text, e.g. "within 5 s"; "" for the rest of the run."""
     if window.between is not None:
         return f"between {window.between[0]:g} s and {window.between[1]:g} s"
     if window.after is not None:
@@ -68,7 +68,10 @@ def describe_signal(condition: Condition) -> str:
 
 
 def describe_value(witness: Witness) -> str:
-    """Return the decisive value of a signal with its unit, e.g. "0.62 m"; "yes" or "no" for a yes-or-no signal."""
+    """Return the value of the signal of a witness with its unit, e.g. "0.62 m"; "yes" or "no" for yes-or-no signals.
+
+    A witness is the comparison that decides a condition.
+    """
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -80,7 +83,7 @@ def describe_value(witness: Witness) -> str:
 
 
 def describe_limit(witness: Witness) -> str:
-    """Return the limit that the decisive value must meet, e.g. "≥ 0.50 m"; the opposite below a `not`."""
+    """Return the limit of the comparison of a witness, e.g. "≥ 0.50 m"; the negated limit below a `not`."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -101,5 +104,5 @@ def _limit(condition: Condition) -> str:
 
 
 def _grouped(condition: Condition) -> str:
-    """Return the condition in words, in parentheses unless it is a single comparison."""
+    """Return a condition as text, in parentheses unless it is a single comparison."""
     return describe(condition) if condition.signal is not None else f"({describe(condition)})"

@@ -1,14 +1,11 @@
 """Temporal operators of signal temporal logic (STL) on sampled robustness values.
 
-The robustness of a condition is the margin by which it is true; it is negative if the condition is false. The operators
-follow Donzé and Maler 2010: `always` is the smallest and `eventually` the largest value of the samples in the window.
-`until` is the best value over all samples at which `release` may become true.
+The robustness of a condition is the margin by which it is true; negative if the condition is false. The operators
+follow Donzé and Maler 2010: `always` is the smallest, and `eventually` the largest robustness in the window.
 
-A window can go on after the last sample. Each operator is therefore evaluated twice, with the worst and with the best
-continuation of the trace (Deshmukh et al. 2017, robust online monitoring). The true value lies between these two
-results. If they have different signs, the condition is undecided.
-
-Samples need not be evenly spaced. A window without a sample uses the newest sample before its end (sample and hold).
+A window can extend beyond the last sample. Therefore, each operator is evaluated with the worst and with the best
+assumption about the time after the last sample (Deshmukh et al. 2017, robust online monitoring). If the results have
+different signs, the condition is undecided.
 """
 
 from __future__ import annotations
@@ -33,9 +30,8 @@ if TYPE_CHECKING:
 class Continuation(NamedTuple):
     """Assumption about the time after the last sample.
 
-    `value_after_end` is the robustness assumed for this time: the worst or the best. `run_ended` is True if the run
-    ended at the last sample, so that a window without an end stops there. It is False for a truncated log, after which
-    the run may have gone on.
+    `value_after_end` is the robustness in this time: the worst or the best one. `run_ended` is True if the run ended at
+    the last sample, and False for a truncated log.
     """
 
     value_after_end: float
@@ -44,10 +40,10 @@ class Continuation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SampleWindows:
-    """Window of each sample: its `first` and its `last` sample index, inclusive.
+    """Window of each of n samples: the index `first` and the index `last` of a sample (n,), both inclusive.
 
-    `first` is the number of samples if the window begins after the last one. `past_end` is True if the window reaches
-    beyond the last sample. If `unbounded`, all windows last to the end of the run.
+    `first` is n if the window begins after the last sample. `past_end` (n,) is True if the window extends beyond the
+    last sample. If `unbounded`, all windows last to the end of the run.
     """
 
     first: Indices
@@ -57,9 +53,9 @@ class SampleWindows:
 
     @classmethod
     def of_samples(cls, ticks: Ticks, period: int, begin: int, end: int | None) -> SampleWindows:
-        """Return the windows from `begin` to `end` ticks after each sample; an end of None is the end of the run.
+        """Return the windows from `begin` to `end` ticks after each sample. An end of None is the end of the run.
 
-        `period` is the usual spacing of samples in ticks.
+        `period` is the usual spacing of samples in ticks. A window without a sample contains the newest sample before.
         """
         count = len(ticks)
         first = np.searchsorted(ticks, ticks + begin, side="left")
@@ -73,12 +69,12 @@ class SampleWindows:
 
 
 def always(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return, for each sample, the smallest value in its window."""
+    """Return the smallest of the values (n,) in the window of each sample."""
     return -eventually(-values, windows, Continuation(-continuation.value_after_end, continuation.run_ended))
 
 
 def eventually(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return, for each sample, the largest value in its window."""
+    """Return the largest of the values (n,) in the window of each sample."""
     largest = _range_maximum(values, windows.first, windows.last)
     open_end = windows.past_end | (windows.unbounded and not continuation.run_ended) | (windows.first >= len(values))
     values_in_window: Array = np.where(open_end, np.maximum(largest, continuation.value_after_end), largest)
@@ -86,14 +82,12 @@ def eventually(values: Array, windows: SampleWindows, continuation: Continuation
 
 
 def until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return, for each sample, the robustness of: `hold` is true until `release` becomes true in the window.
+    """Return the robustness (n,) of the condition that `hold` is true until `release` becomes true in the window.
 
-    The result is the smallest robustness of three conditions, which avoids a search over pairs of samples:
-
-    1. `release` becomes true in the window.
-    2. `hold` is true from now to the begin of the window.
-    3. From the begin of the window on, `hold` is true until `release` becomes true, even if that is after the window.
+    `hold` and `release` are the robustness (n,) of two conditions.
     """
+    # Smallest robustness of three conditions: `release` becomes true in the window, `hold` is true before the window,
+    # and from the window on, `hold` is true until `release` becomes true at any time.
     count = len(hold)
     from_window = np.append(_unbounded_until(hold, release, windows, continuation), continuation.value_after_end)
     before = -_range_maximum(-hold, np.arange(count), np.minimum(windows.first, count) - 1)
@@ -102,11 +96,7 @@ def until(hold: Array, release: Array, windows: SampleWindows, continuation: Con
 
 
 def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the robustness of `until` without a window.
-
-    It is computed from the last sample backwards: `release` is true now, or `hold` is true now and `until` at the next
-    sample.
-    """
+    """Return the robustness (n,) of `until` if `release` may become true at any later sample."""
     later = -math.inf if windows.unbounded and continuation.run_ended else continuation.value_after_end
     results = []
     for holds, releases in np.column_stack((hold, release))[::-1].tolist():
@@ -118,8 +108,7 @@ def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, contin
 def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
     """Return the maximum of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
 
-    Uses a sparse table: level j contains, for each index, the maximum of the 2^j values from there on. Any range is the
-    union of two such ranges, which may overlap.
+    The method is a sparse table: level j contains the maximum of the 2^j values from each index on.
     """
     widths = last - first + 1
     found = np.full(len(first), -np.inf)

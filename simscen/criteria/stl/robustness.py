@@ -1,10 +1,6 @@
-"""Robustness of a condition at each sample of a run: the margin by which it is true, negative if it is false.
+"""Robustness of a condition at each sample of a run: the margin by which it is true; negative if it is false.
 
-The robustness of a comparison is the distance of its signal from the limit, positive if the comparison is true. If
-signal and limit are equal, it is the smallest number with the correct sign: thus `>=` and `>` differ, and the sign
-alone decides the verdict. The robustness of a yes-or-no signal is infinite, so that other signals determine the margin.
-
-A witness states which comparison decides the robustness, and at which sample.
+The robustness of a comparison is the distance of its signal from the limit; infinite for a yes-or-no signal.
 """
 
 from __future__ import annotations
@@ -31,21 +27,21 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 TIE_MARGIN = sys.float_info.min
-"""Magnitude of the robustness if a signal equals its limit."""
+"""Magnitude of the robustness if a signal equals its limit. The sign is positive for `>=` and `<=`."""
 
 HOLD_VIOLATED, RESPONSE_DUE = "`hold` was false", "the response was due"
-"""Texts of the notes of a witness."""
+"""Texts of `Witness.notes`."""
 
 Bound = Literal["low", "high"]
-"""End of the interval in which the robustness lies (see Robustness)."""
+"""Lower or upper bound of the robustness."""
 
 
 @dataclass(frozen=True)
 class Witness:
     """Comparison that decides the robustness of a condition.
 
-    `sample` is the index of the decisive sample, and `value` the value of the signal there. `negated` is True if the
-    comparison is below a `not`. `notes` are other samples that explain the verdict: a text and an index each.
+    `sample` is the index of the decisive sample. `value` is the value of the signal at this sample. `negated` is True
+    if the comparison is below a `not`. `notes` contains texts about other samples, with their indices.
     """
 
     comparison: Condition
@@ -55,16 +51,16 @@ class Witness:
     notes: tuple[tuple[str, int], ...] = ()
 
     def with_note(self, what: str, sample: int) -> Witness:
-        """Return a copy with one more note in front."""
+        """Return a copy with the note `what` about a sample in front of the other notes."""
         return replace(self, notes=((what, sample), *self.notes))
 
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """Interval in which the robustness of a condition lies, at each sample (n,).
+    """Lower and upper bound (n,) of the robustness of a condition at each sample.
 
-    `low` assumes the worst for everything that is unknown, such as the time after the last sample; `high` assumes the
-    best. The condition is decided at a sample if both have the same sign. Subclasses correspond to the operators.
+    The bounds differ where something is unknown, such as the time after the last sample. A condition is decided at a
+    sample if both bounds have the same sign. There is a subclass for each operator.
     """
 
     low: Array
@@ -75,21 +71,23 @@ class Robustness:
         return self.low if bound == "low" else self.high
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness that decides this bound at a sample. The condition must be decided there."""
+        """Return the comparison that decides a bound at a sample. The condition must be decided there."""
         raise NotImplementedError
 
     def parts(self) -> Sequence[Robustness]:
         """Return the robustness of each operand."""
         return ()
 
-    def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield the robustness of each `whenever` in the condition whose premise was never certainly true."""
+    def untested_responses(self) -> Iterator[ResponseRobustness]:
+        """Yield each `whenever` in the condition whose required premise was never certainly true."""
         for part in self.parts():
-            yield from part.untested()
+            yield from part.untested_responses()
 
 
 @dataclass(frozen=True, eq=False)
 class _ComparisonRobustness(Robustness):
+    """Robustness of a comparison. `values` (n,) are the values of its signal."""
+
     comparison: Condition
     values: Array
 
@@ -99,6 +97,8 @@ class _ComparisonRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class _NegationRobustness(Robustness):
+    """Robustness of `not`."""
+
     part: Robustness
 
     def witness(self, sample: int, bound: Bound) -> Witness:
@@ -111,6 +111,8 @@ class _NegationRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class _BooleanRobustness(Robustness):
+    """Robustness of `all` or `any`."""
+
     operands: Sequence[Robustness]
 
     def witness(self, sample: int, bound: Bound) -> Witness:
@@ -123,7 +125,7 @@ class _BooleanRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class _WindowRobustness(Robustness):
-    """Robustness of `always` or `eventually`; the first sample of the window that has the same value decides."""
+    """Robustness of `always` or `eventually`."""
 
     part: Robustness
     windows: SampleWindows
@@ -138,12 +140,14 @@ class _WindowRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class _UntilRobustness(Robustness):
+    """Robustness of `until`."""
+
     hold: Robustness
     release: Robustness
     windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of `release` at its best sample, or of the lowest `hold` before it if that is lower."""
+        """Return the witness of `release` at its best sample, or of `hold` if a sample before has lower robustness."""
         end = int(self.windows.last[sample]) + 1
         first = int(self.windows.first[sample]) - sample
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
@@ -169,52 +173,48 @@ class _UntilRobustness(Robustness):
 class ResponseRobustness(Robustness):
     """Robustness of `whenever … then`: at all samples of a window, the premise is false or the response is true.
 
-    `premise` and `response` are the robustness of both parts, `implied` that of "the premise is false or the response
-    is true". `reach` is the slice of samples at which the premise counts. If `required` and the premise was never
-    certainly true there, nothing was tested, and the condition cannot pass. A deadline is a part of the response:
-    `then: {eventually: {…, within: 2 s}}`.
+    `implication` is the robustness of "the premise is false or the response is true". `premise_samples` are the samples
+    at which the premise is checked. If `required`, the condition cannot pass unless the premise was certainly true at
+    one of these samples.
     """
 
     premise: Robustness
     response: Robustness
-    implied: Robustness
+    implication: Robustness
     windows: SampleWindows
     premise_condition: Condition
-    reach: slice
+    premise_samples: slice
     required: bool
 
     @property
     def was_tested(self) -> bool:
         """Whether the premise was certainly true at a sample."""
-        return bool((self.premise.low[self.reach] > 0).any())
+        return bool((self.premise.low[self.premise_samples] > 0).any())
 
     @property
-    def may_have_held(self) -> bool:
-        """Whether the premise may have been true at a sample, depending on what happened after the last sample."""
-        return bool((self.premise.high[self.reach] > 0).any())
+    def may_be_tested(self) -> bool:
+        """Whether the premise was true at a sample, or may become true after the last sample."""
+        return bool((self.premise.high[self.premise_samples] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of the worst response, with a note on the sample at which the premise called for it."""
-        at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.windows)
-        return self.implied.witness(at, bound).with_note(RESPONSE_DUE, at)
+        """Return the witness of the worst response, with a note on the sample at which its premise was true."""
+        at = _first_equal(self.implication.bound(bound), self.bound(bound)[sample], sample, self.windows)
+        return self.implication.witness(at, bound).with_note(RESPONSE_DUE, at)
 
     def parts(self) -> Sequence[Robustness]:
         """Return the robustness of premise and response."""
         return (self.premise, self.response)
 
-    def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield this robustness, and that of each nested `whenever`, if its premise was never certainly true."""
+    def untested_responses(self) -> Iterator[ResponseRobustness]:
+        """Yield this `whenever` and each nested one whose required premise was never certainly true."""
         if self.required and not self.was_tested:
             yield self
-        yield from super().untested()
+        yield from super().untested_responses()
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """Run on which conditions are evaluated, at each sample of the truth.
-
-    `run_ended` is False for a truncated log, after which the run may have gone on.
-    """
+    """Run on which conditions are evaluated, at each sample of the truth. `run_ended` is False for a truncated log."""
 
     trace: Trace
     case: Case
@@ -222,7 +222,7 @@ class EvaluationContext:
 
     @cached_property
     def period(self) -> int:
-        """The usual spacing of samples in ticks: the median."""
+        """Median spacing of samples in ticks."""
         return usual_period(self.trace.truth.ticks)
 
     def sample_windows(self, window: Window) -> SampleWindows:
@@ -241,15 +241,15 @@ class EvaluationContext:
 
     @cached_property
     def rest_of_run(self) -> SampleWindows:
-        """The windows from each sample to the end of the run."""
+        """Windows from each sample to the end of the run."""
         return SampleWindows.of_samples(self.trace.truth.ticks, self.period, 0, None)
 
 
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
     """Return the robustness of a condition at each sample.
 
-    `begin` is the first sample at which the condition counts; it determines at which samples the premise of a
-    `whenever` counts. Raises SignalUnavailable if the trace lacks a signal, and InvalidTrace if a signal is not finite.
+    The premise of a `whenever` is checked from sample `begin` on. Raises SignalUnavailable if the trace lacks a signal,
+    and InvalidTrace if a signal is not finite.
     """
     if condition.signal is not None:
         return _compare(condition, context)
@@ -278,15 +278,15 @@ def windowed_robustness(
     context: EvaluationContext,
     begin: int = 0,
 ) -> Robustness:
-    """Return the robustness of: `condition` is always or eventually true in a window; `begin`: see `robustness`."""
+    """Return the robustness of "`condition` is always (or eventually) true in a window". For `begin`, see `robustness`."""
     windows = context.sample_windows(window)
-    return _windowed(operator, robustness(condition, context, _start(windows, begin)), windows, context)
+    return _apply_windows(operator, robustness(condition, context, _start(windows, begin)), windows, context)
 
 
 def until_robustness(
     hold: Condition, release: Condition, window: Window, context: EvaluationContext, begin: int = 0
 ) -> Robustness:
-    """Return the robustness of: `hold` is true until `release` becomes true in a window; `begin`: see `robustness`."""
+    """Return the robustness of "`hold` until `release`", with a release in a window. For `begin`, see `robustness`."""
     windows = context.sample_windows(window)
     holds, releases = robustness(hold, context, begin), robustness(release, context, _start(windows, begin))
     low, high = (
@@ -304,44 +304,44 @@ def response_robustness(
     begin: int = 0,
     required: bool = True,
 ) -> ResponseRobustness:
-    """Return the robustness of: at each sample of `window` at which `premise` is true, `response` is true too.
+    """Return the robustness of "whenever `premise`, then `response`" in a window. For `begin`, see `robustness`.
 
-    A window of None is the rest of the run; `begin`: see `robustness`. If the premise is `required` to be true at least
-    once, but was never certainly true, `low` is -inf, because nothing was tested.
+    A window of None is the rest of the run. If `required` and the premise was never certainly true, `low` is -inf.
     """
     windows = context.rest_of_run if window is None else context.sample_windows(window)
     start = _start(windows, begin)
     premise_part, response_part = robustness(premise, context, start), robustness(response, context, start)
     negated = _NegationRobustness(-premise_part.high, -premise_part.low, premise_part)
-    implied = _combine([negated, response_part], "any")
-    always = _windowed("always", implied, windows, context)
+    implication = _combine([negated, response_part], "any")
+    always = _apply_windows("always", implication, windows, context)
     end = int(windows.last[begin]) + 1 if begin < len(windows.last) else None
     found = ResponseRobustness(
-        always.low, always.high, premise_part, response_part, implied, windows, premise, slice(start, end), required
+        always.low, always.high, premise_part, response_part, implication, windows, premise, slice(start, end), required
     )
     return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.was_tested else found
 
 
-def _windowed(
+def _apply_windows(
     operator: Literal["always", "eventually"], part: Robustness, windows: SampleWindows, context: EvaluationContext
 ) -> Robustness:
+    """Return the robustness of `always` or `eventually` with the robustness of its operand."""
     evaluate = operators.always if operator == "always" else operators.eventually
     low, high = (evaluate(part.bound(bound), windows, continuation) for bound, continuation in _continuations(context))
     return _WindowRobustness(low, high, part, windows)
 
 
 def _start(windows: SampleWindows, begin: int) -> int:
-    """Return the first sample of the window of sample `begin`; the number of samples if there is none."""
+    """Return the index of the first sample in the window of sample `begin`; the number of samples if there is none."""
     return int(windows.first[begin]) if begin < len(windows.first) else len(windows.first)
 
 
 def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
-    """Return the assumption about the time after the last sample for each bound."""
+    """Return for each bound the assumption about the time after the last sample."""
     return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
 
 
-def _combine(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustness:
-    extremum = np.minimum if how == "all" else np.maximum
+def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Robustness:
+    extremum = np.minimum if operator == "all" else np.maximum
     low, high = reduce(extremum, [part.low for part in parts]), reduce(extremum, [part.high for part in parts])
     return _BooleanRobustness(low, high, parts)
 
@@ -366,7 +366,7 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """Return the distances of a signal from its limit, divided by `condition.scale`; negative if it is violated."""
+    """Return the signed distances of a signal from its limit, divided by `condition.scale`."""
     assert condition.value is not None
     above = condition.op in (">=", ">")
     distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)

@@ -1,1 +1,1 @@
-"""Signals that criteria compare: their catalog, the functions that read them from a trace, and their sampling."""
+"""Signals (quantities over time) of a recorded run: catalog, functions that compute them, and sampling."""

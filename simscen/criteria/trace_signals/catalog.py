@@ -1,4 +1,4 @@
-"""Catalog of all signals by name. Temporal criteria compare them, and `simscen explain signals` lists them."""
+"""Catalog of all signals (quantities over time) that temporal criteria can compare."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ SignalName = Literal[
 YES_OR_NO = "yes or no"
 """Dimension of a signal with the values 0 and 1."""
 NUMBER = "number"
-"""Dimension of a signal without unit."""
+"""Dimension of a signal without a unit."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Definition of a signal: a quantity that has a value at each sample of the truth.
+    """Definition of a signal: a quantity with a value at each sample of the truth.
 
     Attributes:
         text: Description for the reference page.
         dimension: A key of spec.quantities.UNITS, NUMBER, or YES_OR_NO.
         read: Function that returns the values (n,) of a run in SI units.
-        evidence: What a log must contain for this signal, besides the truth.
+        evidence: Kinds of information that a log must contain for this signal, besides the truth.
         minimum: Smallest possible value.
         maximum: Greatest possible value.
-        required_arguments: Keys of arguments of which exactly one must be given.
+        required_arguments: Keys of arguments. Exactly one of them must be given.
         optional_arguments: Keys of arguments that may be given.
     """
 
@@ -278,7 +278,7 @@ SIGNALS: dict[SignalName, Signal] = {
 
 
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:
-    """Return the evidence that a log must contain for a signal, including the truth, which all signals need."""
+    """Return the kinds of information that a log must contain for a signal, including the truth."""
     return frozenset({*SIGNALS[name].evidence, Evidence.TRUTH})
 
 

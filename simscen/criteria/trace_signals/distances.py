@@ -1,6 +1,6 @@
-"""Readers of the signals that are distances from the robot to objects, points, goals, pedestrians, and its plan.
+"""Readers of signals: distances from the robot to objects, points, goals, pedestrians, and its plan.
 
-Distances are in m, one value per sample of the truth (n,), unless stated otherwise.
+Unless stated otherwise, functions return one distance in m per sample of the truth (n,).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Ticks, Trace
 
-_TINY = sys.float_info.min
-"""Replacement in m² for the squared length of segments without length, to avoid a division by zero."""
+_MIN_SQUARED_LENGTH_M2 = sys.float_info.min
+"""Lower limit for squared lengths of segments, to avoid a division by zero."""
 
 
 def distance_to(query: SignalQuery) -> Array:
-    """Return the distance from the robot's center to the point, the goal, or the object that the query names."""
+    """Return the distance from the robot's center to the point, the goal, or the object in the query."""
     poses, point, goal = true_poses(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
@@ -49,7 +49,7 @@ def _distance_to_object(trace: Trace, name: str, poses: Array) -> Array:
 
 
 def object_positions(trace: Trace, name: str) -> Array:
-    """Return the poses (n, 3) of an object at the samples of the truth, or its position (1, 2) if it never moves.
+    """Return the poses (n, 3) of an object at the samples of the truth, or the position (1, 2) of a static object.
 
     Raises SignalUnavailable if the trace does not contain the object.
     """
@@ -68,7 +68,7 @@ def _static_position(trace: Trace, name: str) -> Array:
 
 
 def is_present(trace: Trace, name: str) -> Array:
-    """Return, for each sample of the truth, whether an object exists. Objects that were not spawned always exist."""
+    """Return a mask (n,) of the samples of the truth at which an object exists."""
     clock = trace.truth.ticks
     changes = [
         event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
@@ -82,7 +82,7 @@ def is_present(trace: Trace, name: str) -> Array:
 
 
 def distance_remaining(query: SignalQuery) -> Array:
-    """Return the length of the newest plan from the estimated position on; before the first plan, `goal_distance`."""
+    """Return the length of the rest of the newest plan; before the first plan, the distance to the goal."""
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")
@@ -109,7 +109,10 @@ def plan_deviation(query: SignalQuery) -> Array:
 
 
 def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
-    """Return each plan that was the newest one at a sample: first sample, sample after the last, and points (m, 2)."""
+    """Return the plans, each with the range of samples at which it was the newest plan.
+
+    A tuple contains the first sample, the sample after the last one, and the points (m, 2) of the plan.
+    """
     plans = [plan for plan in trace.plans if len(plan.points)]
     begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(clock)][1:]
@@ -118,26 +121,26 @@ def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
 
 
 def _project_on_path(points: Array, path: Array) -> tuple[Array, Array]:
-    """Return, for points (n, 2), the distance (n,) to a path (m, 2), and the length (n,) of the path from there on."""
+    """Return the distance (n,) of points (n, 2) from a path (m, 2), and the length (n,) of the rest of the path."""
     if len(path) == 1:
         path = np.vstack((path, path))
     steps = np.diff(path, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     nearest = _nearest_step(points, path[:-1], steps)
     offsets, step = points - path[nearest], steps[nearest]
-    share = np.clip((offsets * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _TINY), 0.0, 1.0)
+    share = np.clip((offsets * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _MIN_SQUARED_LENGTH_M2), 0.0, 1.0)
     distances = np.hypot(*(offsets - share[:, np.newaxis] * step).T)
     after = np.concatenate((np.cumsum(lengths[::-1])[::-1][1:], [0.0]))
     return distances, after[nearest] + (1.0 - share) * lengths[nearest]
 
 
 def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
-    """Return the index of the segment nearest to each point (n, 2), computed with matrix products for speed.
+    """Return the index (n,) of the segment nearest to each point (n, 2).
 
     Segment k begins at `begins[k]` and ends at `begins[k] + steps[k]`; both arrays are (m, 2).
     """
     along = points @ steps.T - (begins * steps).sum(axis=1)
-    squared = np.maximum((steps**2).sum(axis=1), _TINY)
+    squared = np.maximum((steps**2).sum(axis=1), _MIN_SQUARED_LENGTH_M2)
     share = np.clip(along / squared, 0.0, 1.0)
     squared_offset = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
     nearest: Array = (squared_offset + share * (share * squared - 2.0 * along)).argmin(axis=1)
@@ -145,7 +148,7 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
 
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
-"""Gap below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
+"""Distances below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 
 
 def pedestrian_radii(trace: Trace) -> dict[str, float]:
@@ -159,9 +162,9 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Return the gap between the robot's footprint and the body of the nearest pedestrian; inf while there is none.
+    """Return the distance between the robot's footprint and the nearest pedestrian's body; inf while there is none.
 
-    The inscribed circle replaces an unknown footprint. Raises SignalUnavailable if the run has no pedestrians.
+    Raises SignalUnavailable if the run has no pedestrians.
     """
     radii = pedestrian_radii(trace)
     if not radii:
@@ -176,12 +179,15 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
 
 
 def person_distance(query: SignalQuery) -> Array:
-    """Return `pedestrian_gap` for the run of the query."""
+    """Return `pedestrian_gap` for the run in the query."""
     return pedestrian_gap(query.trace, query.case)
 
 
 def _footprint_distance(poses: Array, points: Array, case: Case) -> Array:
-    """Return the signed distances (n,) from the footprint of a robot at `poses` (n, 3) to points (n, 2)."""
+    """Return the signed distances (n,) between the footprint at `poses` (n, 3) and points (n, 2), pair by pair.
+
+    The inscribed circle replaces an unknown footprint.
+    """
     offsets = points - poses[:, :2]
     if len(case.footprint) < 3:
         circle: Array = np.hypot(offsets[:, 0], offsets[:, 1]) - case.inscribed_radius

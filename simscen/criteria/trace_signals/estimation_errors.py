@@ -1,6 +1,6 @@
-"""Errors of the estimated pose: its distance from the true pose, its heading error, and NEES.
+"""Errors of the estimated pose: position error, heading error, and NEES (normalized estimation error squared).
 
-Poses are not aligned before they are compared, because an offset in the map frame is an error.
+A belief is an estimated pose with its covariance. Estimated and true poses are compared without alignment.
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Ticks, Trace
 
 BELIEF_TIMEOUT_S = 1.0
-"""Age up to which a belief is valid: transform_tolerance of nav2_amcl."""
+"""Age up to which a belief is valid, as transform_tolerance of nav2_amcl."""
 
 
 def pose_error(trace: Trace) -> Samples:
-    """Return the localization error (n, 2): distance in m, and absolute heading error in rad.
+    """Return the localization error (n, 2): position error in m, and absolute heading error in rad.
 
     There is a sample for each published belief, and for each sample of the truth at which the newest belief is older
-    than BELIEF_TIMEOUT_S. The result is empty if the trace has no belief or no truth. It equals the APE of evo without
-    --align.
+    than BELIEF_TIMEOUT_S. The result is empty if the trace has no belief or no truth.
     """
     from simscen.core.records.trace import Samples
 
@@ -33,19 +32,19 @@ def pose_error(trace: Trace) -> Samples:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
     ticks = np.union1d(belief.ticks, _ticks_with_stale_belief(trace))
     believed = belief.at(ticks)
-    x, y, yaw = _interpolated(poses, ticks)
+    x, y, yaw = _interpolate_poses(poses, ticks)
     distances = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
     return Samples(ticks, np.column_stack((distances, np.abs(wrap_array(believed[:, 2] - yaw)))))
 
 
-def _interpolated(poses: Samples, ticks: Ticks) -> tuple[Array, Array, Array]:
+def _interpolate_poses(poses: Samples, ticks: Ticks) -> tuple[Array, Array, Array]:
     """Return x, y, and yaw, each (n,), at the given ticks by linear interpolation; yaw is not wrapped."""
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     return x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
 
 
 def _ticks_with_stale_belief(trace: Trace) -> Ticks:
-    """Return the ticks of the truth at which the newest belief is older than BELIEF_TIMEOUT_S."""
+    """Return the ticks of samples of the truth at which the newest belief is older than BELIEF_TIMEOUT_S."""
     ticks, published = trace.truth.ticks, trace.belief.ticks
     newest = published[np.maximum(np.searchsorted(published, ticks) - 1, 0)]  # strictly before each tick
     old: Ticks = ticks[ticks - newest > BELIEF_TIMEOUT_S * trace.tick_rate]
@@ -53,15 +52,14 @@ def _ticks_with_stale_belief(trace: Trace) -> Ticks:
 
 
 DIMENSIONS = 3
-"""Number of components of a pose (x, y, yaw), and thus the mean NEES if the covariance is correct."""
+"""Number of components of a pose (x, y, yaw), which is the mean NEES if the covariance is correct."""
 
 
 def nees(error: Array, covariance: Array) -> Array:
-    """Return the NEES (n,), e' P^-1 e, of errors e (n, 3) in m, m, rad and their covariances P (n, 6).
+    """Return the NEES e' P^-1 e (n,) of errors e (n, 3) in m, m, rad with covariances P (n, 6).
 
-    `covariance` contains the upper triangles: xx, xy, xa, yy, ya, aa, where a is the yaw. The result is inf if P is not
-    positive definite, for example for a depleted particle set. Computed by Cholesky decomposition. (filterpy's
-    stats.NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4.)
+    P contains the upper triangles xx, xy, xa, yy, ya, aa, where a is the yaw. The result is inf if P is not positive
+    definite. The method is Cholesky decomposition. Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4.
     """
     xx, xy, xa, yy, ya, aa = covariance.T
     x, y, yaw = error.T
@@ -84,6 +82,6 @@ def nees_samples(trace: Trace) -> Samples:
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses) or belief.values.shape[1] < 9:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 1)))
-    x, y, yaw = _interpolated(poses, belief.ticks)
+    x, y, yaw = _interpolate_poses(poses, belief.ticks)
     error = np.column_stack((belief.values[:, 0] - x, belief.values[:, 1] - y, wrap_array(belief.values[:, 2] - yaw)))
     return Samples(belief.ticks, nees(error, belief.values[:, 3:])[:, np.newaxis])

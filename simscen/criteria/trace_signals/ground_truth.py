@@ -1,6 +1,6 @@
-"""True motion of the robot: pose, speed, clearance, and driven path.
+"""True motion of the robot in a trace: pose, speed, clearance, and driven path.
 
-All values are checked to be finite, because comparisons with nan would hide failures.
+Functions raise InvalidTrace if a value of the trace is not finite.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ else:
     Flags = object  # annotations are not evaluated, and numpy's types take long to import
 
 MIN_MOVE_M = 0.01
-"""Length from which a move counts as driven. Shorter moves are the jitter of a body at rest."""
+"""Minimum length of a move that counts as driven. Shorter moves are jitter."""
 
 
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
-    """Return `samples` unchanged. Raises InvalidTrace if a value is not finite; `name` is the signal in the message."""
+    """Return `samples`. Raises InvalidTrace if a value is not finite. `name` is the signal in the message."""
     bad = ~np.isfinite(samples.values).all(axis=1)
     if bad.any():
         at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
@@ -51,7 +51,7 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Return the distance (n, 1) in m from the hull to the nearest surface; inf if there is no surface.
+    """Return the distance (n, 1) in m from the robot to the nearest surface; inf if there is no surface.
 
     Raises InvalidTrace if a value is nan or -inf.
     """
@@ -76,7 +76,7 @@ def turn_rate(trace: Trace) -> Samples:
 
 @dataclass(frozen=True, eq=False)
 class DrivenPath:
-    """Path of the robot as a sequence of moves: at `ticks[k]`, the robot had driven `travelled[k]` m."""
+    """Length of the driven path over time: at `ticks[k]`, the robot had driven `travelled[k]` m."""
 
     ticks: Ticks
     travelled: Array
@@ -87,16 +87,13 @@ class DrivenPath:
         return float(self.travelled[-1]) if len(self.travelled) else 0.0
 
     def until(self, tick: int) -> float:
-        """Return the length in m that was driven up to `tick`."""
+        """Return the length in m of the path up to `tick`."""
         driven = self.travelled[self.ticks <= tick]
         return float(driven[-1]) if len(driven) else 0.0
 
 
 def drive(trace: Trace) -> DrivenPath:
-    """Return the driven path in the plane, in moves of at least MIN_MOVE_M, without teleportation.
-
-    Yaw is not part of the distance, unlike in Arena's get_metrics.py, which adds radians to meters.
-    """
+    """Return the driven path in the plane, in moves of at least MIN_MOVE_M. Teleportation does not count."""
     poses, teleported = truth(trace), set(teleport_samples(trace))
     indices, lengths = [0], [0.0]
     points = poses.values[:, :2].tolist()
@@ -118,8 +115,8 @@ def drive(trace: Trace) -> DrivenPath:
 def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
     """Return the index of the first sample after each teleportation of the robot, sorted.
 
-    The difference between this sample and the one before is no motion. `ticks` are the ticks of the samples, by default
-    those of the truth. An index can be the number of samples, if there is no later sample.
+    `ticks` are the ticks of the samples; None for the samples of the truth. The index is the number of samples if there
+    is no later sample.
     """
     placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
     samples: list[int] = np.searchsorted(trace.truth.ticks if ticks is None else ticks, placed, side="right").tolist()

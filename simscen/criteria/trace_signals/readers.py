@@ -1,7 +1,7 @@
-"""Readers of the named signals: functions that compute the values (n,) of a signal at the n samples of the truth.
+"""Readers of signals: functions that compute the values (n,) of a signal at the n samples of the truth.
 
-Signals that are distances to something have their readers in `distances`. A yes-or-no signal has the values 0 and 1.
-All readers raise SignalUnavailable if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
+The value of a yes-or-no signal is 0 or 1. Readers raise SignalUnavailable if the trace lacks the data of the signal,
+and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from simscen.criteria.trace_signals.sampling import (
     SignalQuery,
     SignalUnavailable,
     evenly_spaced,
-    hold,
+    sample_and_hold,
     sample_ticks,
 )
 from simscen.criteria.trace_signals.sparc_ldlj import CUTOFF_HZ, MIN_RATE_HZ
@@ -36,17 +36,17 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 LOCALIZED_STD_M = 0.5
-"""Largest standard deviation of the position with which a robot counts as localized; AMCL's initial one."""
+"""Maximum standard deviation of the estimated position of a localized robot."""
 
 
 def clearance(query: SignalQuery) -> Array:
-    """Return the distance in m from the hull to the nearest surface; inf while no surface is near."""
-    return hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
+    """Return the true distance in m from the robot to the nearest surface; inf while no surface is near."""
+    return sample_and_hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
 
 
 def ground_speed(query: SignalQuery) -> Array:
     """Return the true speed over ground in m/s."""
-    return hold(query.trace, speed(query.trace), "velocity")[:, 0]
+    return sample_and_hold(query.trace, speed(query.trace), "velocity")[:, 0]
 
 
 def forward_speed(query: SignalQuery) -> Array:
@@ -56,7 +56,7 @@ def forward_speed(query: SignalQuery) -> Array:
 
 def turn_rate(query: SignalQuery) -> Array:
     """Return the magnitude of the true turn rate in rad/s."""
-    return hold(query.trace, unsigned_turn_rate(query.trace), "velocity")[:, 0]
+    return sample_and_hold(query.trace, unsigned_turn_rate(query.trace), "velocity")[:, 0]
 
 
 def yaw_rate(query: SignalQuery) -> Array:
@@ -94,20 +94,17 @@ def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
 
 
 def localization_error(query: SignalQuery) -> Array:
-    """Return the distance in m between the estimated and the true position, see `pose_error`."""
-    return hold(query.trace, pose_error(query.trace), "belief")[:, 0]
+    """Return the distance in m between the estimated and the true position."""
+    return sample_and_hold(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
 def localization_yaw_error(query: SignalQuery) -> Array:
-    """Return the angle in rad between the estimated and the true heading, see `pose_error`."""
-    return hold(query.trace, pose_error(query.trace), "belief")[:, 1]
+    """Return the angle in rad between the estimated and the true heading."""
+    return sample_and_hold(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
 def position_std(query: SignalQuery) -> Array:
-    """Return the standard deviation in m of the estimated position in its worst direction.
-
-    It is the square root of the larger eigenvalue of the covariance of x and y.
-    """
+    """Return the standard deviation in m of the estimated position in the direction with the largest variance."""
     xx, xy, _, yy, _, _ = _covariance(query.trace).T
     spread = np.hypot((xx - yy) / 2, xy)
     std: Array = np.sqrt(np.maximum((xx + yy) / 2 + spread, 0.0))
@@ -120,8 +117,8 @@ def yaw_std(query: SignalQuery) -> Array:
 
 
 def nees(query: SignalQuery) -> Array:
-    """Return the NEES of the newest belief; inf if its covariance is singular."""
-    return hold(query.trace, nees_samples(query.trace), "covariance")[:, 0]
+    """Return the NEES (normalized estimation error squared) of the newest belief; inf if the covariance is singular."""
+    return sample_and_hold(query.trace, nees_samples(query.trace), "covariance")[:, 0]
 
 
 def belief_age(query: SignalQuery) -> Array:
@@ -144,18 +141,18 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance in m to the goal accepted last; to the first goal before any is accepted."""
+    """Return the true distance in m to the newest accepted goal, or to the first goal if none was accepted."""
     goals, poses = _current_goals(query.trace, query.case), true_poses(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
 
 def goal_heading_error(query: SignalQuery) -> Array:
-    """Return the angle in rad between the true heading and that of the goal of `goal_distance`."""
+    """Return the angle in rad between the true heading and the heading of the goal of `goal_distance`."""
     return np.abs(wrap_array(true_poses(query.trace)[:, 2] - _current_goals(query.trace, query.case)[:, 2]))
 
 
 def travelled(query: SignalQuery) -> Array:
-    """Return the distance in m driven so far, as the criterion path_length measures it."""
+    """Return the distance in m driven so far."""
     path, clock = drive(query.trace), sample_ticks(query.trace)
     return path.travelled[np.searchsorted(path.ticks, clock, side="right") - 1]
 
@@ -177,7 +174,7 @@ def command_turn_rate(query: SignalQuery) -> Array:
 
 
 def in_region(query: SignalQuery) -> Array:
-    """Return whether the robot's center is truly in the region of the query."""
+    """Return whether the robot's true position is in the region of the query."""
     name = str(query.arguments["region"])
     if name not in query.case.regions:
         raise SignalUnavailable(f"the world has no region `{name}`")
@@ -192,7 +189,7 @@ def in_collision(query: SignalQuery) -> Array:
 
 
 def goal_active(query: SignalQuery) -> Array:
-    """Return whether a goal, or that of the query, is active: from its acceptance to the report that ends it."""
+    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended."""
     ends = (
         EventKind.GOAL_REACHED,
         EventKind.GOAL_PASSED,
@@ -205,7 +202,7 @@ def goal_active(query: SignalQuery) -> Array:
 
 
 def recovery_active(query: SignalQuery) -> Array:
-    """Return whether a recovery, or that of the query, is active."""
+    """Return whether the recovery behavior of the query, or any recovery behavior, is active."""
     return _as_numbers(
         _between(query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery"))
     )
@@ -220,7 +217,7 @@ def is_active(query: SignalQuery) -> Array:
 
 
 def has_just_started(query: SignalQuery) -> Array:
-    """Return whether a sample is the first one after a start of the fault or event of the query."""
+    """Return whether the fault or event of the query has started since the previous sample."""
     starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
     return _as_numbers(_flags(query.trace, starts))
 
@@ -248,20 +245,20 @@ def true_poses(trace: Trace) -> Array:
 
 
 def _velocity(trace: Trace) -> Array:
-    """Return the true vx, vy (m/s) and wz (rad/s) in the base frame, (n, 3)."""
-    return hold(trace, check_samples(trace.velocity, "the true velocity", trace), "velocity")
+    """Return the true velocity (n, 3) in the base frame: vx, vy (m/s) and wz (rad/s)."""
+    return sample_and_hold(trace, check_samples(trace.velocity, "the true velocity", trace), "velocity")
 
 
 def _covariance(trace: Trace) -> Array:
-    """Return the upper triangle of the covariance of the newest belief: xx, xy, xyaw, yy, yyaw, yawyaw, (n, 6)."""
+    """Return the upper triangle (n, 6) of the covariance of the newest belief: xx, xy, xyaw, yy, yyaw, yawyaw."""
     belief = check_samples(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
         raise SignalUnavailable("no covariance of the belief was recorded")
-    return hold(trace, belief, "belief")[:, 3:]
+    return sample_and_hold(trace, belief, "belief")[:, 3:]
 
 
 def _commanded(trace: Trace) -> Array:
-    """Return the newest command: vx, vy (m/s) and wz (rad/s), (n, 3); zeros before the first command."""
+    """Return the newest command (n, 3): vx, vy (m/s) and wz (rad/s); zeros before the first command."""
     clock, command = sample_ticks(trace), check_samples(trace.command, "the command", trace)
     if not len(command):
         raise SignalUnavailable("no command was recorded")
@@ -269,11 +266,9 @@ def _commanded(trace: Trace) -> Array:
 
 
 def _differences(trace: Trace, values: Array, order: int) -> Array:
-    """Return the first or second differences (n,) of `values` (n,), divided by the time step or its square.
+    """Return the first or second time derivative (n,) of `values` (n,), computed by finite differences.
 
-    `order` is 1 or 2. The first difference at a sample is that to the sample before. Samples at the ends that have no
-    difference get that of their neighbor. Uneven samples are resampled before, and the differences are sampled and held
-    at the samples of the truth. Teleportation does not count as a change.
+    `order` is 1 or 2. Unevenly spaced values are resampled. Teleportation does not count as a change.
     """
     ticks = sample_ticks(trace)
     even = evenly_spaced(Samples(ticks, values[:, np.newaxis]), trace.tick_rate)
@@ -304,7 +299,7 @@ def _age(trace: Trace, received: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw of the goal accepted last, (n, 3), or of the first goal, (1, 3), if none was ever accepted."""
+    """Return x, y, yaw (n, 3) of the newest accepted goal, or (1, 3) of the first goal if none was ever accepted."""
     clock = sample_ticks(trace)
     pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
@@ -327,9 +322,9 @@ def _label(arguments: SignalArguments) -> str:
 
 
 def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
-    """Return flags that are True between each event of the kind `start` and the next event that ends it.
+    """Return a mask (n,) of the samples between each event of the kind `start` and the next event that ends it.
 
-    `ends` are the kinds of events that can end it. If `name` is not None, only starts with this name count.
+    `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
     """
     intervals: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
@@ -344,17 +339,14 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
 
 
 def _is_end(kind: EventKind, name: str, started: str) -> bool:
-    """Return whether an event ends the goal, contact, or recovery `started`.
-
-    The end of navigation and the acceptance of another goal end any goal.
-    """
+    """Return whether an event of this kind and name ends the goal, contact, or recovery with the name `started`."""
     return name == started or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
 def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
-    """Return flags that are True at the samples in the intervals (start, end), given in ticks, without the end.
+    """Return a mask (n,) of the samples in intervals from `start` to before `end`, both in ticks.
 
-    An interval without a sample sets the flag of the next sample.
+    An interval without a sample selects the next sample.
     """
     clock = sample_ticks(trace)
     flags = np.zeros(len(clock), dtype=bool)
@@ -365,12 +357,12 @@ def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
 
 
 def _as_numbers(flags: Flags) -> Array:
-    """Return 1 for True and 0 for False."""
+    """Convert True to 1 and False to 0."""
     return flags.astype(np.float64)
 
 
 def _count(trace: Trace, ticks: list[int]) -> Array:
-    """Return how many of the `ticks` have passed at each sample."""
+    """Return the number (n,) of `ticks` up to each sample."""
     return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), sample_ticks(trace), side="right").astype(
         np.float64
     )

@@ -1,11 +1,4 @@
-"""Sampling of signals: each signal has one value for each sample of the truth.
-
-- Signals that are published more rarely (belief, command, scans) keep their newest value until the next one. Before the
-  first value, the first value counts.
-- An event between two samples counts at the sample that follows.
-- Differences over time (acceleration, jerk, SPARC, LDLJ) need evenly spaced samples. Uneven samples of the truth are
-  resampled to their median spacing by linear interpolation.
-"""
+"""Sampling of signals: each signal has one value for each sample of the truth (the true state of the robot)."""
 
 from __future__ import annotations
 
@@ -24,19 +17,19 @@ if TYPE_CHECKING:
 
 
 MAX_INTERPOLATED_GAP_S = 0.25
-"""Longest gap between samples that is interpolated. With a longer gap, differences over time are unavailable."""
+"""Longest gap between samples that `evenly_spaced` interpolates."""
 
 SignalArguments = Mapping[str, object]
 """Arguments of a signal by YAML key: object, point, goal, region, fault, event, recovery, or with."""
 
 
 class SignalUnavailable(ValueError):
-    """The trace lacks the data of a signal, so that a criterion is inconclusive. The message says what is missing."""
+    """The trace lacks the data of a signal. Criteria that need the signal are inconclusive."""
 
 
 @dataclass(frozen=True, eq=False)
 class SignalQuery:
-    """Input of a reader: the trace and the case of a run, and the arguments of the signal."""
+    """Input of a function that computes a signal: the trace and the case of a run, and the arguments of the signal."""
 
     trace: Trace
     case: Case
@@ -44,14 +37,14 @@ class SignalQuery:
 
 
 def sample_ticks(trace: Trace) -> Ticks:
-    """Return the ticks at which signals have values: those of the truth. Raises SignalUnavailable if there are none."""
+    """Return the ticks of the samples of the truth. Raises SignalUnavailable if there are none."""
     if not len(trace.truth):
         raise SignalUnavailable("the true pose was not recorded")
     return trace.truth.ticks
 
 
-def hold(trace: Trace, samples: Samples, what: str) -> Array:
-    """Return the newest values (n, k) of `samples` at each sample of the truth (sample and hold).
+def sample_and_hold(trace: Trace, samples: Samples, what: str) -> Array:
+    """Return the newest values (n, k) of `samples` at each sample of the truth.
 
     Raises SignalUnavailable if `samples` are empty; `what` is the name of the signal in the message.
     """
@@ -67,13 +60,13 @@ def usual_period(ticks: Ticks) -> int:
 
 
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
-    """Return the samples themselves if they are evenly spaced, else resampled to their median spacing.
+    """Return the samples, resampled to their median spacing by linear interpolation unless they are evenly spaced.
 
     Raises SignalUnavailable if there are fewer than two samples, if their ticks do not increase, or if a gap is longer
     than MAX_INTERPOLATED_GAP_S.
     """
     if len(samples) < 2:
-        raise SignalUnavailable(f"the run is too short: {_samples(len(samples))} of the truth")
+        raise SignalUnavailable(f"the run is too short: {_sample_count_text(len(samples))} of the truth")
     ticks, steps = samples.ticks, np.diff(samples.ticks)
     if (steps <= 0).any():
         raise SignalUnavailable("the samples of the truth are not in chronological order")
@@ -90,6 +83,6 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     return Samples(grid, np.column_stack([np.interp(grid, ticks, column) for column in samples.values.T]))
 
 
-def _samples(count: int) -> str:
+def _sample_count_text(count: int) -> str:
     """Return "1 sample", "2 samples", and so on."""
     return "1 sample" if count == 1 else f"{count} samples"

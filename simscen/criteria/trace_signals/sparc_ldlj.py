@@ -1,8 +1,7 @@
 """Smoothness of a speed profile: spectral arc length (SPARC) and log dimensionless jerk (LDLJ).
 
-SPARC is insensitive to stops, and LDLJ to slow oscillation. Both depend on the duration, so that only drives along the
-same path can be compared. Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of
-movement smoothness", and the authors' own code (siva82kb/SPARC).
+Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of movement smoothness", and the
+authors' own code (siva82kb/SPARC).
 """
 
 from __future__ import annotations
@@ -13,17 +12,17 @@ import numpy as np
 
 from simscen.core.geometry import Array
 
-MOVED_SPEED_M_S = 0.01
-"""Speed below which a robot counts as standing; it is noise."""
+MIN_MOVING_SPEED_M_S = 0.01
+"""Minimum speed of a moving robot. Lower speeds are noise."""
 
 CUTOFF_HZ = 10.0
-"""Frequency above which SPARC ignores changes of the speed, because they are noise."""
+"""Maximum frequency of the spectrum that SPARC uses. Higher frequencies are noise."""
 MIN_RATE_HZ = 18.0
-"""Minimum sample rate: twice the cutoff, with a tolerance of 10 % for logs with jitter."""
+"""Minimum sample rate: twice the cutoff, with a tolerance of 10 % for jitter."""
 MIN_RELATIVE_AMPLITUDE = 0.05
-"""Amplitude, relative to the largest one, below which the two ends of the spectrum are cut off."""
+"""Minimum amplitude, relative to the largest one, at both ends of the spectrum that SPARC uses."""
 PADDING_LEVEL = 4
-"""The profile is padded with zeros to at least 2^PADDING_LEVEL times its length, for a finer spectrum."""
+"""Exponent of the factor 2^PADDING_LEVEL by which SPARC lengthens a speed profile with zeros, for a finer spectrum."""
 
 
 def sparc(speeds: Array, rate: float) -> float | None:
@@ -49,7 +48,7 @@ def sparc(speeds: Array, rate: float) -> float | None:
 def ldlj(speeds: Array, rate: float) -> float | None:
     """Return the log dimensionless jerk of `speeds` (n,) in m/s, sampled at `rate` Hz; larger is smoother.
 
-    It is -ln(T^3 / v_max^2 * sum(jerk^2) dt) for a drive of duration T with the top speed v_max. Return None for a
+    The formula is -ln(T^3 / v_max^2 * sum(jerk^2) dt), with the duration T and the top speed v_max. Return None for a
     robot that never moved, or whose acceleration never changed.
     """
     if not np.any(speeds):

@@ -1,4 +1,4 @@
-"""Checks of a whole trace: that its samples have no long gaps, are in chronological order, and are finite."""
+"""Checks of the samples of a whole trace for long gaps, chronological order, and values that are not finite."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Ticks, Trace
 
 MAX_GAP_S = 1.0
-"""Longest gap between samples. With a longer one, no criterion that needs the signal can pass."""
+"""Longest gap between samples that `time_gaps` tolerates."""
 
 
 def time_gaps(trace: Trace) -> dict[Evidence, str]:
-    """Return the kinds of evidence that have a gap in time, each with a text that describes its first gap.
+    """Return a description of the first gap, by kind of evidence. Evidence without gaps is left out.
 
-    The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
+    A gap is a time longer than MAX_GAP_S without a sample of the truth or of the clearance.
     """
     gaps: dict[Evidence, str] = {}
     if gap := _first_gap(trace, trace.truth.ticks):
@@ -31,10 +31,9 @@ def time_gaps(trace: Trace) -> dict[Evidence, str]:
 
 
 def check_recorded_signals(trace: Trace) -> None:
-    """Raise InvalidTrace if a signal is not finite, or if its ticks do not increase; for logs that simscen recorded.
+    """Raise InvalidTrace if a signal in a log of simscen is not finite, or if its ticks do not increase.
 
-    All signals are checked, whether a criterion uses them or not. Only odometry is left out: it is a reading, which a
-    fault may have corrupted.
+    Odometry is not checked, because a fault can corrupt it.
     """
     truth(trace), speed(trace), clearance(trace)
     check_samples(trace.belief, "the belief", trace)
@@ -49,7 +48,7 @@ def check_recorded_signals(trace: Trace) -> None:
 
 
 def _first_gap(trace: Trace, ticks: Ticks) -> str:
-    """Return the first gap longer than MAX_GAP_S, as text; "" if there is none, or if there are no samples."""
+    """Return the first gap longer than MAX_GAP_S as text; "" if there is none, or if there are no samples."""
     if not len(ticks):
         return ""
     edges = np.concatenate(([0], ticks, [trace.end]))

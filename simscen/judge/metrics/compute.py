@@ -23,7 +23,7 @@ from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
 from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
+from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, ldlj, sparc
 from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
@@ -177,7 +177,7 @@ def _jerk(trace: Trace, case: Case) -> Values:
 
 
 def _smoothness(trace: Trace, speeds: Array) -> Values:
-    if speeds.max() < MOVED_SPEED_M_S:
+    if speeds.max() < MIN_MOVING_SPEED_M_S:
         return dict.fromkeys(_SMOOTHNESS, "the robot never moved")
     even_speeds, rate = evenly_sampled_speed(trace)
     spectral, jerk = sparc(even_speeds, rate), ldlj(even_speeds, rate)

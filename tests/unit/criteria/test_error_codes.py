@@ -3,7 +3,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from simscen.core.messages.navigation import ErrorCode
 from simscen.core.records.events import Event
-from simscen.criteria.error_codes import ErrorCodeValue, code_of
+from simscen.criteria.error_codes import ErrorCodeValue, error_code_name
 
 ADAPTER = TypeAdapter(ErrorCodeValue)
 
@@ -39,4 +39,4 @@ def test_schema_of_error_codes_lists_names_and_numbers():
     ],
 )
 def test_an_event_tells_its_code_by_name(data, name):
-    assert code_of(Event(1, "goal.failed", "a", data)) == name
+    assert error_code_name(Event(1, "goal.failed", "a", data)) == name
