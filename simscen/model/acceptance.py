@@ -1,4 +1,4 @@
-"""Specification of acceptance claims (`acceptance:`)."""
+"""Specification of claims about the pass rate of a scenario (`acceptance:`)."""
 
 import math
 from typing import Annotated, Literal
@@ -9,8 +9,9 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 
 MAX_RUNS = 1_000_000
+"""Maximum number of runs of a study."""
 DEFAULT_SEQUENTIAL_FACTOR = 20
-"""Default limit of a sequential test, as a multiple of the fewest runs that can show the claim."""
+"""Default maximum number of runs of a sequential test, as a multiple of `fewest_runs`."""
 
 Rate = Annotated[float, Field(gt=0, lt=1), Quantity("ratio")]
 Confidence = Annotated[float, Field(ge=0.5, le=0.999999), Quantity("ratio")]
@@ -27,12 +28,12 @@ class PassRate(Spec):
     confidence: Confidence = 0.95
     """Minimum probability that a robot with a pass rate below `min` is not accepted."""
     method: Literal["fixed", "sprt", "anytime"] = "fixed"
-    """`fixed`: all `runs`, then the exact Clopper-Pearson limits. `sprt`: the sequential probability ratio test between
-    `min` and `target`, which stops as soon as it is decided. `anytime`: a confidence sequence, which may be evaluated
-    after each run and stops as soon as it is decided."""
+    """`fixed`: the exact Clopper-Pearson limits after all `runs`. `sprt`: the sequential probability ratio test between
+    `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run, and stop as
+    soon as the claim is decided."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
-    """Number of runs of `fixed`; for the other methods, the number after which the test ends undecided. Default: the
-    fewest runs that show the claim if all pass; for the other methods, 20 times as many."""
+    """Number of runs of `fixed`, and maximum number of runs of the other methods. Default for `fixed`: the fewest runs
+    that show the claim if all pass; for the other methods, 20 times as many."""
     target: Rate | None = None
     """Pass rate of a robot that should be accepted; only for `sprt`."""
     power: Confidence = 0.9
@@ -40,7 +41,7 @@ class PassRate(Spec):
 
     @property
     def max_runs(self) -> int:
-        """Number of runs after which the test ends in any case."""
+        """Maximum number of runs."""
         if self.runs is not None:
             return self.runs
         fewest = fewest_runs(self.min, self.confidence)
@@ -62,7 +63,7 @@ class PassRate(Spec):
 
 
 def fewest_runs(rate: float, confidence: float) -> int:
-    """Return the smallest number n of runs that show the pass rate if all pass: 1 - `rate`^n >= `confidence`."""
+    """Return the smallest number n of runs that show the pass rate `rate` if all pass: 1 - rate^n >= confidence."""
     runs = math.ceil(math.log1p(-confidence) / math.log(rate) - 1e-9)
     return max(1, runs)
 

@@ -1,4 +1,7 @@
-"""Specifications of controllers, goal checkers, and the progress checker; defaults are Nav2's unless noted."""
+"""Specifications of controllers, goal checkers, and the progress checker.
+
+Names and default values are those of Nav2 unless noted.
+"""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -38,13 +41,13 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     desired_linear_vel: PositiveSpeed | None = None
     """Maximum speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     lookahead_dist: PositiveLength = 0.6
-    """Lookahead distance, i.e. the distance to the carrot on the plan, if it does not scale with speed."""
+    """Lookahead distance: the distance to the point on the plan (the carrot) that the robot steers to."""
     min_lookahead_dist: PositiveLength = 0.3
-    """Minimum lookahead distance if it scales with speed."""
+    """Minimum lookahead distance if the lookahead distance scales with speed."""
     max_lookahead_dist: PositiveLength = 0.9
-    """Maximum lookahead distance if it scales with speed."""
+    """Maximum lookahead distance if the lookahead distance scales with speed."""
     lookahead_time: PositiveDuration = 1.5
-    """Time by which the current speed is multiplied to get the lookahead distance."""
+    """Lookahead distance divided by the current speed, if the lookahead distance scales with speed."""
     use_velocity_scaled_lookahead_dist: bool = True
     """Whether the lookahead distance scales with speed."""
     use_fixed_curvature_lookahead: bool = False
@@ -52,14 +55,13 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     curvature_lookahead_dist: PositiveLength = 0.6
     """Distance to the point that defines the curvature."""
     interpolate_curvature_after_goal: bool = False
-    """Whether the point for the curvature may lie beyond the end of the plan, so that the robot approaches the end
-    straight."""
+    """Whether the point for the curvature may lie beyond the end of the plan."""
     rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
     """Turn rate when turning in place."""
     rotate_to_heading_min_angle: PositiveAngle = 0.785
     """Angle to the plan beyond which the robot turns in place."""
     use_rotate_to_heading: bool = True
-    """Whether to turn in place: towards the plan, and at the goal to its heading."""
+    """Whether to turn in place towards the plan, and at the goal to its heading."""
     min_approach_linear_velocity: PositiveSpeed = 0.05
     """Minimum speed when approaching the goal."""
     approach_velocity_scaling_dist: PositiveLength = 0.6
@@ -69,8 +71,8 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
     """Time for which commands are checked for collisions, at most up to the carrot."""
     min_slowed_speed: PositiveSpeed = 0.1
-    """Speed to which a command that would lead to a collision is slowed down before the controller fails with
-    NO_VALID_CONTROL. Nav2 fails at once."""
+    """Minimum speed to which the controller slows down a command that would lead to a collision. If the slow command
+    collides as well, the controller fails with NO_VALID_CONTROL. Nav2 fails at once."""
     use_regulated_linear_velocity_scaling: bool = True
     """Whether to slow down in tight curves."""
     regulated_linear_scaling_min_radius: PositiveLength = 0.9
@@ -84,8 +86,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """Factor of the reduced speed: speed · this value · distance / `cost_scaling_dist`."""
     slow_down_ahead: bool = True
-    """Whether to slow down ahead of curves and obstacles early enough for the brakes, and in narrow gaps according to
-    the clearance. Nav2 considers only the current position."""
+    """Whether to slow down before curves, obstacles, and narrow gaps. Nav2 considers only the current position."""
     max_angular_accel: PositiveAngularAcceleration = 3.2
     """Maximum angular acceleration when turning in place."""
     allow_reversing: bool = False
@@ -152,7 +153,7 @@ class DynamicWindow(PathFollowerSpec):
     trans_stopped_velocity: NonNegativeSpeed = 0.25
     """Speed at the goal below which the robot begins to turn to the goal's heading."""
     prune_distance: PositiveLength = 1.5
-    """Minimum length of the plan ahead that is considered (Nav2: 2 m, of which its costmap shows 1.5 m)."""
+    """Minimum length of the plan ahead that is considered (Nav2: 2 m)."""
     base_obstacle_scale: Weight = 0.02
     """Weight of the costs at the end of a trajectory."""
     path_align_scale: Weight = 32.0
@@ -168,9 +169,10 @@ class DynamicWindow(PathFollowerSpec):
     slowing_factor: Weight = 5.0
     """Weight of the speed while the robot stops at the goal before it turns."""
     twirling_scale: Weight = 0.0
-    """Weight of the turn rate, which keeps an omnidirectional base from spinning while it drives."""
+    """Weight of the turn rate. It keeps an omnidirectional base from spinning while it drives."""
     preferred_clearance: NonNegativeLength = 0.05
-    """Clearance of the footprint that a trajectory must have if any trajectory has it. Nav2 has no such preference."""
+    """Minimum clearance of the footprint. If no trajectory has this clearance, it does not apply. Nav2 has no such
+    parameter."""
     forward_point_distance: NonNegativeLength = 0.1
     """Distance from the center of the robot to its front, for the two alignment weights."""
     oscillation_reset_dist: NonNegativeLength = 0.05
@@ -178,7 +180,7 @@ class DynamicWindow(PathFollowerSpec):
     oscillation_reset_angle: Annotated[Angle, Field(ge=0)] = 0.2
     """Angle after which an oscillating motion may change its direction again."""
     x_only_threshold: NonNegativeSpeed = 0.05
-    """Speed below which oscillating turns count, too."""
+    """Forward speed below which oscillating turns count as oscillation as well."""
 
     @property
     def lookahead_s(self) -> float:
@@ -202,7 +204,7 @@ CONTROLLERS = {
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
-    """Base class of goal checker specifications. A goal without its own tolerances has those of the goal checker."""
+    """Base class of goal checker specifications. The tolerances apply to goals without tolerances."""
 
 
 class SimpleGoalChecker(GoalCheckerSpec):
@@ -211,10 +213,9 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
-    """Whether only the heading counts once the position has been reached."""
+    """Whether only the heading is checked after the position was reached."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """Fraction of the tolerances within which a moving robot has reached the goal. For a robot at rest, the full
-    tolerances apply. Nav2: 1."""
+    """Factor of the tolerances for a moving robot. For a robot at rest, the full tolerances apply. Nav2: 1."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]
@@ -226,7 +227,7 @@ class ProgressChecker(Spec):
     required_movement_radius: PositiveLength = 0.5
     """Distance that the robot must move within the time allowance."""
     required_movement_angle: PositiveAngle | None = None
-    """Angle of a turn that also counts as progress within the time allowance (PoseProgressChecker); default: none."""
+    """Angle of a turn that counts as progress as well (PoseProgressChecker); default: turns are no progress."""
     movement_time_allowance: PositiveDuration = 10.0
     """Time without progress after which driving fails with FAILED_TO_MAKE_PROGRESS."""
 

@@ -25,19 +25,19 @@ class Costmap(Ranged):
     """Global costmap in the map frame, for planning (nav2_costmap_2d: static, obstacle, and inflation layers)."""
 
     resolution: PositiveLength = 0.05
-    """Maximum edge length of a cell: cells of a coarser map are split, those of a finer map are kept."""
+    """Maximum edge length of a cell. The cells of a coarser map are split. The cells of a finer map are kept."""
     inflation_radius: NonNegativeLength = 0.70
     """Distance from obstacles within which cells have a cost."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
-    """Exponential decay of the cost with the distance from an obstacle, per meter."""
+    """Rate of the exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency = 5.0
     """Rate of the updates with sensor data."""
     publish_frequency: PublishFrequency = 0.5
     """Maximum rate at which a changed costmap is written to the log. Large costmaps are written less often. 0 = never
     (Nav2: 1 Hz)."""
     lethal_cost_threshold: Annotated[int, Field(ge=1, le=100)] = 65
-    """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). Only matters for maps of the modes
-    `scale` and `raw`, since the cells of the mode `trinary` are either free or occupied."""
+    """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). It has no effect on maps of the mode
+    `trinary`, whose cells are either free or occupied."""
     obstacle_max_range: PositiveLength = 2.5
     """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength = 0.0
@@ -49,8 +49,8 @@ class Costmap(Ranged):
     min_obstacle_height: NonNegativeLength = 0.05
     """Minimum height of obstacles in camera data; lower points are ground. Lidar data is not filtered."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
-    """Maximum slope, seen from the robot's base, of camera points that are ground. 0: heights are measured from the
-    plane below the robot, so that a ramp is an obstacle, as in Nav2."""
+    """Maximum slope of camera points that are ground, seen from the robot's base. With 0, as in Nav2, a ramp is an
+    obstacle."""
     max_obstacle_height: NonNegativeLength = 2.0
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
@@ -58,27 +58,28 @@ class Costmap(Ranged):
     denoise_layer: DenoiseLayer = by_default()
     """Removal of small obstacles."""
     track_unknown_space: bool = True
-    """Whether cells that neither the map nor a beam shows are unknown; otherwise such cells are free."""
+    """Whether cells without information from the map or a sensor are unknown; otherwise such cells are free."""
     rolling_size: PositiveLength = 24.0
     """Edge length of the rolling window if the robot has no map."""
 
 
 class LocalCostmap(Spec):
-    """Local costmap in the odom frame, which rolls with the robot, for controllers and recovery behaviors.
+    """Local costmap for controllers and recovery behaviors: a rolling window in the odom frame.
 
-    It contains sensor data and keepout zones, but not the map. Parameters without a value have the value of `costmap`.
+    The local costmap contains sensor data and keepout zones, but not the map. Parameters without a value have the value
+    of the global costmap (`costmap`).
     """
 
     width: PositiveLength | None = None
     """Size along x of the odom frame; default: 3 m, or more if the controller looks farther ahead at full speed."""
     height: PositiveLength | None = None
-    """Size along y of the odom frame; the default is that of `width`."""
+    """Size along y of the odom frame; the default is the same as for `width`."""
     resolution: PositiveLength | None = None
     """Edge length of a cell."""
     inflation_radius: NonNegativeLength | None = None
     """Distance from obstacles within which cells have a cost."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] | None = None
-    """Exponential decay of the cost with the distance from an obstacle, per meter."""
+    """Rate of the exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency | None = None
     """Rate of the updates with sensor data."""
     publish_frequency: PublishFrequency = 1.0
@@ -94,7 +95,7 @@ class LocalCostmap(Spec):
     min_obstacle_height: NonNegativeLength | None = None
     """Minimum height of obstacles in camera data; lower points are ground."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
-    """Maximum slope, seen from the robot's base, of camera points that are ground."""
+    """Maximum slope of camera points that are ground, seen from the robot's base."""
     max_obstacle_height: NonNegativeLength | None = None
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool | None = None
@@ -105,6 +106,6 @@ class LocalCostmap(Spec):
     """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
     def with_defaults_from(self, shared: Costmap) -> Costmap:
-        """Return the complete parameters; parameters without a value are taken from `shared`."""
+        """Return the complete parameters. Parameters without a value are taken from `shared`."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)

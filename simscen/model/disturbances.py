@@ -1,4 +1,4 @@
-"""Specifications of the events of a scenario, with the steps they consist of, and of its faults."""
+"""Specifications of the events and faults of a scenario."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,8 +28,8 @@ Actions = Annotated[
 class StepEntry(Spec):
     """Step of the sequence (`then`) of an event. It becomes active when the previous step has happened.
 
-    The trigger of a step ignores what happened earlier: `time` and `for` are seconds since the previous step,
-    `travelled` is the distance since then, and only later goals, replans, recoveries, collisions, and events count.
+    In the trigger of a step, `time`, `for`, and `travelled` are relative to the previous step. Earlier goals, replans,
+    recoveries, collisions, and events do not count.
     """
 
     name: Name | None = None
@@ -37,7 +37,7 @@ class StepEntry(Spec):
     when: Trigger | None = None
     """Trigger; default: the step happens immediately."""
     do: Actions | None = None
-    """Action, or list of actions in order; default: none, so that the step only waits for its trigger."""
+    """Action, or list of actions in order. Without actions, the step only waits for its trigger."""
     required: bool | None = None
     """Whether the run fails if this step never happens; default: as for the previous step."""
 
@@ -51,7 +51,7 @@ class StepEntry(Spec):
 
 
 class EventEntry(Spec):
-    """Change in the world: when the trigger (`when`) fires, the actions (`do`) happen, and then the steps of `then`."""
+    """Event: when the trigger (`when`) fires, the actions (`do`) happen, followed by the steps of `then`."""
 
     name: Name | None = None
     """Name in reports and other triggers; default: event-1, event-2, …"""
@@ -76,10 +76,10 @@ class EventEntry(Spec):
 
 @dataclass(frozen=True)
 class SequenceStep:
-    """Step that a run processes: an event, or a step of the sequence (`then`) of an event.
+    """Event, or step of the sequence (`then`) of an event.
 
-    `keys` is the path of the step in the scenario, such as ("events", 0, "then", 1). `after` is the index of the step
-    that must happen first, in the list of `steps_of`; None for an event.
+    `keys` is the path of the step in the scenario, such as ("events", 0, "then", 1). `after` is the index, in the list
+    of `steps_of`, of the step that must happen before; None for an event.
     """
 
     name: str
@@ -99,7 +99,7 @@ class SequenceStep:
         return [action for _, action in self.located_actions()]
 
     def located_actions(self) -> Iterator[tuple[tuple[str | int, ...], AnyAction]]:
-        """Yield (path in the scenario, action) for each action in order."""
+        """Yield for each action its path in the scenario and the action."""
         if isinstance(self.entry.do, list):
             yield from (((*self.keys, "do", number), action) for number, action in enumerate(self.entry.do))
         elif self.entry.do is not None:
@@ -107,7 +107,7 @@ class SequenceStep:
 
 
 def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:
-    """Return all steps of a scenario in order: each event, followed by the steps of its sequence."""
+    """Return the events of a scenario in order, each followed by the steps of its sequence."""
     steps: list[SequenceStep] = []
     for index, event in enumerate(events):
         name = event.name or f"event-{index + 1}"
@@ -139,5 +139,5 @@ class FaultEntry(AnyFault):
 
     @property
     def label(self) -> str:
-        """Name in events and criteria: the given or the default name."""
+        """Name of the fault in events and criteria."""
         return self.name or f"{self.sensor}.{self.kind}"

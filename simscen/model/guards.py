@@ -33,7 +33,7 @@ class VelocitySmoother(Spec):
     max_angular_velocity: PositiveAngularSpeed | None = None
     """Maximum turn rate; default: unlimited."""
     counter_turn_slip: bool = False
-    """Whether to correct commands for the turn caused by wheels that slip on one side, as measured by the gyroscope;
+    """Whether to correct turns caused by wheels that slip on one side, which the gyroscope measures. It has an effect
     only with the localizers `ekf` and `slip_ekf`. Nav2 has no such correction."""
 
 
@@ -45,22 +45,21 @@ class CollisionMonitor(Spec):
     source_timeout: PositiveDuration = 0.3
     """Time without lidar data after which the robot stops (Nav2's default is 1 s)."""
     time_before_collision: PositiveDuration = 0.5
-    """Action APPROACH (slow down): minimum time before a collision; the robot slows down to keep it."""
+    """Action APPROACH: minimum time before a collision. The robot slows down to keep this time."""
     simulation_time_step: PositiveDuration | None = None
-    """Action APPROACH: maximum time step of the simulated motion that is checked against the scan; default: an eighth
-    of `time_before_collision` (Nav2: 0.1 s)."""
+    """Action APPROACH: maximum time step of the simulated motion; default: an eighth of `time_before_collision` (Nav2:
+    0.1 s)."""
     stop_margin: NonNegativeLength = 0.02
     """Action STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such
     margin."""
     min_points: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Minimum number of scan points of an obstacle. Nav2's default is 4, but the leg of a chair may have fewer."""
+    """Minimum number of scan points of an obstacle (Nav2: 4)."""
     hold_timeout: Duration = 1.0
-    """Time that the monitor may hold the robot before navigation fails, since the controller may not see the obstacle.
-    0: unlimited, as in Nav2, where the progress checker fails eventually."""
+    """Time for which the monitor may hold the robot before navigation fails. 0: unlimited, as in Nav2."""
 
 
 class Prediction(Ranged):
-    """Motion prediction: tracks moving objects in the lidar scans and plans for their future positions."""
+    """Motion prediction: tracks moving objects in the lidar scans, so that the robot avoids their future positions."""
 
     enabled: bool = False
     """Whether to predict motion."""

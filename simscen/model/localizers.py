@@ -26,9 +26,9 @@ class LocalizerSpec(Typed):
     """Base class of localizer specifications."""
 
     fuses_odometry: ClassVar[bool] = False
-    """Whether the localizer fuses odometry and IMU. Its pose never jumps, so it also defines the odom frame."""
+    """Whether the localizer fuses odometry and IMU. The localizer then also defines the odom frame."""
     needs_map: ClassVar[bool] = False
-    """Whether the localizer needs a map for more than dead reckoning."""
+    """Whether the localizer compares sensor data with a map."""
     precomputation: ClassVar[str] = ""
     """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; "" = none."""
 
@@ -36,13 +36,13 @@ class LocalizerSpec(Typed):
 class AmclParameters(Ranged, LocalizerSpec):
     """Base class of particle filters, with the parameters of nav2_amcl.
 
-    All default values except that of `laser_model_type` are those of nav2_amcl.
+    Only the default of `laser_model_type` differs from nav2_amcl.
     """
 
     needs_map: ClassVar[bool] = True
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ("laser_max_range",)
     robot_model: Literal["differential", "omni"] | None = None
-    """Motion model; default: the one of the robot's drive."""
+    """Motion model; default: the model of the robot's drive."""
     alpha1: Noise = 0.2
     """Rotation noise from rotation."""
     alpha2: Noise = 0.2
@@ -54,13 +54,13 @@ class AmclParameters(Ranged, LocalizerSpec):
     alpha5: Noise = 0.2
     """Strafing noise of the omni model."""
     min_particles: Annotated[int, Field(ge=10, le=50_000)] = 500
-    """Minimum number of particles; KLD sampling chooses between this and the maximum."""
+    """Minimum number of particles. KLD sampling adapts the number between minimum and maximum."""
     max_particles: Annotated[int, Field(ge=10, le=50_000)] = 2000
     """Maximum number of particles, and the number at the start."""
     pf_err: Annotated[float, Field(gt=0, lt=1), Quantity("ratio")] = 0.05
     """KLD sampling: maximum distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
-    """KLD sampling: upper quantile z of the standard normal distribution; not a probability, as in Nav2."""
+    """KLD sampling: upper quantile z of the standard normal distribution. As in Nav2, this is not a probability."""
     update_min_d: NonNegativeLength = 0.25
     """Distance that the robot must move before the next filter update."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
@@ -70,8 +70,8 @@ class AmclParameters(Ranged, LocalizerSpec):
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
     """Maximum number of beams of a scan that are compared with the map."""
     laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
-    """Sensor model. `likelihood_field`, the default of nav2_amcl, tolerates more obstacles that are not on the map, but
-    is less accurate, and loses the robot if scans are far apart."""
+    """Sensor model. `likelihood_field`, the default of nav2_amcl, tolerates more obstacles that are not on the map. It
+    is less accurate, and fails if scans are far apart."""
     z_hit: Probability = 0.5
     """Weight of beams that end at an obstacle of the map."""
     z_short: Probability = 0.05
@@ -85,34 +85,34 @@ class AmclParameters(Ranged, LocalizerSpec):
     lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
     """Exponential decay of short measurements, per meter; `beam` model only."""
     laser_likelihood_max_dist: PositiveLength = 2.0
-    """Distances from obstacles are capped at this value in the likelihood field."""
+    """Maximum distance from obstacles in the likelihood field."""
     laser_min_range: Length = -1.0
-    """Minimum range that is used, at least the lidar's own; 0 or less = the lidar's own."""
+    """Minimum range of used beams, if it is above the minimum of the lidar; 0 or less = the minimum of the lidar."""
     laser_max_range: Length = 100.0
-    """Maximum range that is used, at most the lidar's own; 0 or less = the lidar's own."""
+    """Maximum range of used beams, if it is below the maximum of the lidar; 0 or less = the maximum of the lidar."""
     recovery_alpha_slow: Probability = 0.0
-    """Decay rate of the slow average of weights, which decides when to add random particles; 0 = never."""
+    """Decay rate of the slow average of the weights; 0 = no random particles are added."""
     recovery_alpha_fast: Probability = 0.0
-    """Decay rate of the fast average of weights, which decides when to add random particles; 0 = never."""
+    """Decay rate of the fast average of the weights; 0 = no random particles are added."""
     selective_resampling: bool = False
     """Whether to resample only if the effective number of particles is below half of their number."""
     do_beamskip: bool = False
     """Whether to skip beams that fit few particles once the filter has converged; `likelihood_field_prob` only."""
     beam_skip_distance: PositiveLength = 0.5
-    """A beam fits a particle if it ends this near to an obstacle of the map."""
+    """Maximum distance from an obstacle of the map to the end of a beam that fits a particle."""
     beam_skip_threshold: Probability = 0.3
-    """Beams that fit a smaller fraction of the particles are skipped."""
+    """Fraction of the particles below which a beam is skipped, because it fits too few particles."""
     beam_skip_error_threshold: Probability = 0.9
-    """If at least this fraction of the beams would be skipped, none is skipped, because the pose must be wrong."""
+    """Fraction of skipped beams from which no beam is skipped, because the pose must be wrong."""
 
     @property
     def max_used_range(self) -> float:
-        """`laser_max_range` in m, or infinity if only the lidar's own maximum applies."""
+        """`laser_max_range` in m, or infinity if only the maximum range of the lidar applies."""
         return self.laser_max_range if self.laser_max_range > 0.0 else math.inf
 
 
 class Amcl(AmclParameters):
-    """Particle-filter localization as in nav2_amcl (Thrun et al., Probabilistic Robotics, ch. 8)."""
+    """Particle filter as in nav2_amcl (Thrun et al., Probabilistic Robotics, ch. 8)."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
     precomputation: ClassVar[str] = "simscen.stack.localizers.build:precompute"
@@ -123,14 +123,14 @@ class Amcl(AmclParameters):
     @model_validator(mode="before")
     @classmethod
     def _apply_nav2_values(cls, values: Any) -> Any:
-        """Apply the deprecated `parameters: nav2`; values that are given win."""
+        """Apply the deprecated `parameters: nav2`, except to given values."""
         if isinstance(values, Mapping) and values.get("parameters") == "nav2":
             return {"laser_model_type": "likelihood_field", **values}
         return values
 
 
 class EkfParameters(LocalizerSpec):
-    """Base class of Kalman filters that fuse wheel odometry and gyroscope, with the noise of both."""
+    """Base class of Kalman filters that fuse wheel odometry and gyroscope."""
 
     fuses_odometry: ClassVar[bool] = True
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
@@ -146,14 +146,14 @@ class EkfParameters(LocalizerSpec):
 
 
 class Ekf(EkfParameters):
-    """Extended Kalman filter of odometry and gyroscope, as in robot_localization. Uses no map, so it drifts."""
+    """Extended Kalman filter of odometry and gyroscope, as in robot_localization. It drifts, because it uses no map."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
     type: Literal["ekf"]
 
 
 class GroundTruth(LocalizerSpec):
-    """The true pose as the belief, to separate faults of localization from faults of navigation."""
+    """Localizer that returns the true pose, to separate faults of localization from faults of navigation."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]
@@ -200,22 +200,21 @@ Variance = Annotated[float, Field(ge=0, le=1e6)]
 class OdometryFilter(Spec):
     """Source of the transform from odom to base. The default is an EKF, like robot_localization's ekf_node in Nav2.
 
-    The EKF is not used on robots without an IMU, whose wheel odometry is used as it is, nor with the localizers `ekf`
-    and `slip_ekf`, which fuse wheel odometry and IMU themselves.
+    The EKF is not used on robots without an IMU, and not with the localizers `ekf` and `slip_ekf`, which fuse wheel
+    odometry and IMU themselves.
     """
 
     type: Literal["ekf", "wheel"] = "ekf"
     """`ekf`: an extended Kalman filter of wheel odometry and the yaw rate of the IMU. `wheel`: wheel odometry alone."""
     frequency: Frequency = 30.0
-    """Maximum rate of the updates. An update uses all motion since the previous update, so nothing is lost. With wheel
-    odometry at 40 Hz, every second reading causes an update."""
+    """Maximum rate of the updates. An update uses all motion since the previous update."""
     process_noise_covariance: Annotated[list[Variance], Field(min_length=3, max_length=3)] = [10.0, 10.0, 10.0]
-    """Variances by which vx, vy (m²/s²) and the yaw rate (rad²/s²) may change within one second. The diagonal of
-    robot_localization's matrix; its other entries do not apply."""
+    """Variances of the change of vx, vy (m²/s²) and the yaw rate (rad²/s²) within one second: the diagonal of
+    robot_localization's matrix."""
     odom0_twist_rejection_threshold: Annotated[float, Field(gt=0, le=1e6)] = 5.0
-    """The yaw rate of the wheels is not used while it differs from that of the gyroscope by more than this number of
-    standard deviations, because wheels slip in turns."""
+    """Maximum difference between the yaw rates of the wheels and of the gyroscope, in standard deviations. While the
+    difference is larger, the yaw rate of the wheels is not used."""
     gyro_bias: NonNegativeAngularSpeed = 0.0005
-    """Standard deviation of the bias of the gyroscope, which is estimated; 0 = no bias, as in robot_localization."""
+    """Standard deviation of the estimated bias of the gyroscope; 0 = no bias, as in robot_localization."""
     gyro_bias_walk: NonNegativeAngularSpeed = 0.00001
     """Standard deviation of the change of the bias within one second."""

@@ -1,5 +1,4 @@
-"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2's
-nav2_params.yaml."""
+"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -120,32 +119,35 @@ class MppiPathAlignCritic(MppiCritic):
     cost_weight: Weight = 14.0
     """Weight of the mean distance in meters."""
     max_path_occupancy_ratio: Annotated[float, Field(ge=0, le=1), Quantity("ratio")] = 0.05
-    """Fraction of the plan that may be blocked; the critic is inactive if more is."""
+    """Maximum fraction of the plan that is blocked. The critic is inactive above this fraction."""
     trajectory_point_step: PoseStep = 4
     """Step between the poses of a trajectory that are checked."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
     offset_from_furthest: PointCount = 20
-    """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active, so that a robot can
-    turn toward the plan first."""
+    """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active."""
     use_path_orientations: bool = False
-    """Whether headings count, too."""
+    """Whether to penalize differences from the headings of the plan as well."""
 
 
 class MppiPathFollowCritic(MppiCritic):
-    """Penalizes the distance from the end of a trajectory to a plan point beyond the furthest point that any trajectory
-    reaches."""
+    """Penalizes the distance of the end of a trajectory from the target point on the plan.
+
+    The target point is beyond the furthest plan point that any trajectory reaches.
+    """
 
     cost_weight: Weight = 5.0
     """Weight of the distance in meters."""
     offset_from_furthest: PointCount = 5
-    """Number of plan points, 5 cm apart, beyond the furthest point reached; blocked points are skipped."""
+    """Number of plan points, 5 cm apart, from the furthest reached point to the target point. Blocked points are
+    skipped."""
     threshold_to_consider: NonNegativeLength = 1.4
     """Distance from the end of the plan within which the critic is inactive."""
 
 
 class MppiPathAngleCritic(MppiCritic):
-    """Penalizes a heading at the end of a trajectory that does not point to the target point, which is on the plan."""
+    """Penalizes the angle between the heading at the end of a trajectory and the direction to a target point on the
+    plan."""
 
     cost_weight: Weight = 2.0
     """Weight of the angle in rad."""
@@ -202,9 +204,9 @@ class Mppi(PathFollowerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.mppi.controller:MppiController"
     type: Literal["mppi"]
     motion_model: Literal["DiffDrive", "Omni", "Ackermann"] | None = None
-    """Motion model; default: that of the robot's drive."""
+    """Motion model; default: the model of the robot's drive."""
     min_turning_r: PositiveLength | None = None
-    """Minimum turning radius of the Ackermann model; default: that of the robot (Nav2: 0.2 m)."""
+    """Minimum turning radius of the Ackermann model; default: the minimum of the robot (Nav2: 0.2 m)."""
     time_steps: Annotated[int, Field(ge=5, le=200)] = 56
     """Number of time steps per sample."""
     model_dt: Annotated[PositiveDuration, Field(le=1)] = 0.05
@@ -232,7 +234,8 @@ class Mppi(PathFollowerSpec):
     az_max: PositiveAngularAcceleration | None = None
     """Maximum angular acceleration; default: the limit of the robot."""
     model_delay_vx: Annotated[Duration, Field(le=2)] = 0.0
-    """Delay of the base after a forward command; each sample starts with the commands that are still delayed."""
+    """Delay of the base after a forward command. Each sample starts with the commands that the base has not executed
+    yet."""
     model_delay_vy: Annotated[Duration, Field(le=2)] = 0.0
     """Delay of the base after a sideways command."""
     model_delay_wz: Annotated[Duration, Field(le=2)] = 0.0
@@ -248,13 +251,13 @@ class Mppi(PathFollowerSpec):
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
     """Weight of the control effort relative to the cost of a sample."""
     prune_distance: PositiveLength = 2.0
-    """Minimum length of the plan ahead that is considered; more if the samples reach farther (Nav2: always 1.5 m)."""
+    """Minimum length of the plan ahead that is considered (Nav2: always 1.5 m)."""
     command_free_time: Annotated[PositiveDuration, Field(le=60)] = 0.5
-    """Time for which the command itself must be free of collisions; otherwise it is slowed down. Nav2 has no such
-    check."""
+    """Time for which a constant command must be free of collisions; otherwise the command is slowed down. Nav2 has no
+    such check."""
     min_slowed_speed: PositiveSpeed = 0.1
-    """Speed to which a command that would lead to a collision is slowed down before the controller fails with
-    NO_VALID_CONTROL."""
+    """Minimum speed to which the controller slows down a command that would lead to a collision. If the slow command
+    collides as well, the controller fails with NO_VALID_CONTROL."""
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1
@@ -264,8 +267,8 @@ class Mppi(PathFollowerSpec):
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
     """Order of the Savitzky-Golay filter that smooths commands: 2 keeps bends, 1 is the mean of nine commands."""
     critics: Annotated[list[CriticName], Field(min_length=1, max_length=11)] | None = None
-    """Critics to use; default: as in Nav2, all except ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic
-    only with the Omni model."""
+    """Critics to use; default: all except ObstaclesCritic and VelocityDeadbandCritic, as in Nav2. TwirlingCritic is
+    only used with the Omni model."""
     ConstraintCritic: MppiConstraintCritic = by_default()
     """Parameters of the critic of velocity limits."""
     CostCritic: MppiCostCritic = by_default()

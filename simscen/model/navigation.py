@@ -1,4 +1,4 @@
-"""Specifications around goals: the navigation action that sends them, their expected outcome, and waiting at them."""
+"""Specifications of the navigation action, of the expected outcome of a goal, and of waiting at a goal."""
 
 from typing import Annotated, Any, Literal
 
@@ -17,18 +17,18 @@ class Navigation(Spec):
 
     mode: Mode = "navigate_to_pose"
     """Navigation action. `navigate_to_pose`: one goal after the other, with a stop at each. `navigate_through_poses`:
-    all goals on one plan, with a stop only at the last. `follow_waypoints`: like navigate_to_pose, but through the
-    waypoint follower, which receives the whole list and fails with STOP_ON_MISSED_WAYPOINT."""
+    all goals on one plan, with a stop only at the last. `follow_waypoints`: all goals with a stop at each; the waypoint
+    follower receives the whole list, and fails with STOP_ON_MISSED_WAYPOINT."""
     loops: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Number of times that the list of goals is driven. In later loops the goals are named `shelf#2`, `shelf#3`, …; the
-    plain name refers to the goal in every loop."""
+    """Number of times that the list of goals is driven. In later loops, the goals are named `shelf#2`, `shelf#3`, … The
+    name `shelf` refers to the goal in every loop."""
     radius: PositiveLength = 0.7
-    """Distance (m) within which a pose of navigate_through_poses counts as passed: the radius of Nav2's
-    RemovePassedGoals. A goal's own `xy_tolerance` takes precedence."""
+    """Distance (m) within which a pose of navigate_through_poses counts as passed, as in Nav2's RemovePassedGoals. The
+    `xy_tolerance` of a goal takes precedence."""
 
 
 def text_or_mapping(value: Any) -> str:
-    """Return the tag of a value in a union of a text and a mapping."""
+    """Return the tag of a value in a union of text and mapping."""
     return "text" if isinstance(value, str) else "mapping"
 
 
@@ -40,7 +40,7 @@ Expectation = Annotated[
 
 
 def expected_failure_name(expected: "Expectation") -> str:
-    """Return "failed" or the name of the expected error code, or "" if the goal should succeed."""
+    """Return "failed" or the name of the expected error code; "" if the goal should succeed."""
     code = getattr(expected, "error_code", None)
     if code is not None:
         return str(code.name)

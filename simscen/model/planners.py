@@ -1,4 +1,4 @@
-"""Specifications of planners: OMPL's and Nav2's, and the `medial_axis` planner of the advanced stack."""
+"""Specifications of the planners of OMPL and Nav2, and of the `medial_axis` planner of the advanced stack."""
 
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -17,18 +17,16 @@ class PlannerSpec(Typed):
     tolerance: NonNegativeLength = 0.5
     """Maximum distance between the end of the plan and an unreachable goal."""
     replanning: Literal["on_invalid", "rate"] = "on_invalid"
-    """`on_invalid`: replan only if the path becomes invalid; the advanced stack also replans if a clearly better path
-    appears, and if moving obstacles will be in the way. `rate`: replan at a fixed rate. Nav2 has a behavior tree for
-    each."""
+    """`rate`: replan at a fixed rate. `on_invalid`: replan only if the path becomes invalid. With `on_invalid`, the
+    advanced stack also replans if a clearly better path appears, or if moving obstacles will be in the way."""
     replanning_rate: Frequency | None = None
-    """Rate of new plans, or of checks of the current plan; default: 1 Hz, with navigate_through_poses 0.333 Hz, as in
-    Nav2's behavior trees."""
+    """Rate of new plans (`rate`) or of checks of the plan (`on_invalid`). Default, as in Nav2: 1 Hz, or 0.333 Hz with
+    navigate_through_poses."""
     proximity_threshold: NonNegativeLength = 4.0
-    """With `replanning: rate`, a plan that is not blocked is kept once its remaining length is below this value
-    (IsGoalNearby in Nav2's behavior trees)."""
+    """With `replanning: rate`, remaining length of the plan below which it is kept unless it is blocked (IsGoalNearby
+    in Nav2's behavior trees)."""
     cautious: bool = False
-    """Whether to prefer paths with more clearance after the robot failed to follow a plan, as the advanced stack does.
-    """
+    """Whether to prefer paths with more clearance after the robot failed to follow a plan."""
 
 
 StateSpace = Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"]
@@ -40,24 +38,22 @@ class OmplParameters(PlannerSpec):
     allow_unknown: bool = True
     """Whether plans may lead through unknown cells, which cost slightly more than the most expensive free cells."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
-    """Cost factor: one meter costs 1 + this value · cell cost / 252 (the parameter of nav2_smac_planner; its default is
-    1)."""
+    """Cost factor: one meter costs 1 + this value · cell cost / 252 (default of nav2_smac_planner: 1)."""
     max_iterations: Iterations = 50_000
-    """Number of iterations after which a search fails. There is no time limit, so that results are reproducible."""
+    """Number of iterations after which a search fails."""
     state_space: StateSpace = "auto"
-    """State space of the search. auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, otherwise
+    """State space of the search. `auto`: reeds_shepp for an Ackermann drive, se2 for a long footprint, otherwise
     holonomic."""
     minimum_turning_radius: PositiveLength | None = None
-    """Turning radius of Dubins and Reeds-Shepp paths; default: 1.15 times that of the robot, so that the controller can
-    correct to both sides, and at least 0.2 m (nav2_smac_planner's parameter; its default is 0.4 m)."""
+    """Turning radius of Dubins and Reeds-Shepp paths; default: 1.15 times the turning radius of the robot, and at
+    least 0.2 m (default of nav2_smac_planner: 0.4 m)."""
     hull_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.10
-    """Clearance of the whole footprint in searches over poses (all state spaces except `holonomic`). If no path has it,
-    half of this clearance is tried, then none."""
+    """Clearance of the whole footprint in searches over poses (all state spaces except `holonomic`). If no path has
+    this clearance, half of it is tried, then none."""
     cusp_penalty: NonNegativeLength = 1.0
-    """Cost, as a length, of each change between forward and backward in searches over poses: a car could drive this far
-    while it stops and steers."""
+    """Cost, as a length, of each change between forward and backward driving in searches over poses."""
     pose_searches: Annotated[int, Field(ge=1, le=100)] = 6
-    """Number of searches over poses, of which the cheapest path is used, because such tree planners make detours."""
+    """Number of searches over poses. The cheapest of their paths is used."""
 
 
 class OmplPlanner(OmplParameters):
@@ -66,25 +62,25 @@ class OmplPlanner(OmplParameters):
     component: ClassVar[str] = "simscen.stack.planners.ompl_planner:ompl_planner"
     type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
     gap_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.07
-    """Minimum clearance in gaps on both sides of the robot's inscribed circle. Narrower gaps are used only if there is
-    no other path. Start and goal may be closer to obstacles. 0 = no minimum."""
+    """Minimum clearance in gaps on both sides of the robot's inscribed circle; 0 = no minimum. Narrower gaps are used
+    only if there is no other path. Start and goal may be closer to obstacles."""
     improving_iterations: Iterations = 500
-    """Number of iterations of planners that improve their path; `bit_star` has `max_batches` instead."""
+    """Number of iterations of planners that improve their path; for `bit_star`, see `max_batches`."""
     samples_per_batch: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Number of samples per batch; `bit_star` only (OMPL: 100)."""
     max_batches: Annotated[int, Field(ge=1, le=1000)] = 2
-    """Number of batches after which a path is good enough; `bit_star` only. OMPL continues until a time limit."""
+    """Number of batches after which the search ends if it has found a path; `bit_star` only."""
     rewire_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None
-    """Factor on the distance, or on the number of neighbors, up to which samples are connected; `bit_star`, `rrt_star`,
-    and `informed_rrt_star` only. Default: 1.3 for `bit_star`, since OMPL's 1.1 makes more detours; otherwise 1.1."""
+    """OMPL's rewire factor: a larger value connects more neighbors of a sample; `bit_star`, `rrt_star`, and
+    `informed_rrt_star` only. Default: 1.3 for `bit_star`, otherwise 1.1 as in OMPL."""
     range: PositiveLength | None = None
     """Longest motion added to a tree; all planners except `bit_star`. Default: OMPL's default in searches over poses,
-    otherwise 1 m, since motions of OMPL's default, a fifth of the map, mostly end in a wall."""
+    otherwise 1 m."""
     goal_bias: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.05
     """Probability of drawing the goal as a sample; `rrt_star`, `informed_rrt_star`, and `kpiece` only."""
     cost_threshold_ratio: Annotated[float, Field(ge=0, le=1000), Quantity("ratio")] = 1.01
-    """The search ends at a path that costs at most this value times the distance to the goal, which is a lower bound of
-    its cost (OMPL's cost threshold); `bit_star` and `rrt_star` only. 0 = never."""
+    """OMPL's cost threshold: the search ends at a path that costs at most this value times the distance to the goal;
+    `bit_star` and `rrt_star` only. 0 = no threshold."""
     simplify: bool = True
     """Whether OMPL shortens the path and moves it to cells of lower cost."""
     simplify_steps: Annotated[int, Field(ge=2, le=100_000)] = 100
@@ -116,6 +112,7 @@ class Smac2d(PlannerSpec):
 
 
 def _planner_tag(value: Any) -> str | None:
+    """Return the tag of a planner specification: its `type`, or "ompl" for all types of OmplPlanner."""
     kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
     return kind if kind in ("navfn", "smac_2d", "medial_axis") else "ompl"
 

@@ -1,4 +1,4 @@
-"""Specifications of recovery behaviors, which run after planning or control has failed, as in Nav2."""
+"""Specifications of recovery behaviors, which run after planning or control failed, as in Nav2."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -58,7 +58,7 @@ class Spin(BehaviorSpec):
 
 
 class Wait(BehaviorSpec):
-    """Wait, since the obstacle may move away (nav2_behaviors::Wait)."""
+    """Wait for the obstacle to move away (nav2_behaviors::Wait)."""
 
     component: ClassVar[str] = "simscen.stack.behaviors:Wait"
     type: Literal["wait"] = "wait"
@@ -98,17 +98,17 @@ class Retrace(BehaviorSpec):
     backup_speed: PositiveSpeed = 0.15
     """Speed of driving back."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which the behavior fails with BACKUP_TIMEOUT. It is extended to 1.5 times the duration of driving
-    `retrace_dist` at `backup_speed` if that is longer."""
+    """Time after which the behavior fails with BACKUP_TIMEOUT, at least 1.5 times the duration of driving
+    `retrace_dist` at `backup_speed`."""
 
 
 class ClearCostmap(BehaviorSpec):
-    """Remove obstacles from the costmaps unless current sensor readings contain them."""
+    """Remove all obstacles from the costmaps, except obstacles in current sensor readings."""
 
     component: ClassVar[str] = "simscen.stack.behaviors:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
     clear_entirely: bool = True
-    """Whether to clear the entire global costmap, as Nav2 does, or only the area of the local costmap."""
+    """Whether to clear the entire global costmap, as in Nav2; otherwise only the area of the local costmap."""
 
 
 _Behaviors = Annotated[
@@ -131,28 +131,27 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrPara
 
 
 class Recovery(Spec):
-    """Recovery behaviors, which run in turn after planning or control has failed (Nav2's default behavior tree)."""
+    """Recovery behaviors, one of which runs each time that planning or control fails (Nav2's default behavior tree)."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """Number of retries before the goal fails."""
     retries_since_progress: bool = False
-    """Whether the count of retries and the list of behaviors start again once the robot is one meter nearer to its goal
-    than at any earlier recovery. Nav2 counts all retries of a goal."""
+    """Whether retries and behaviors start again when the robot is one meter nearer to its goal than at any earlier
+    recovery. Nav2 counts all retries of a goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "PLANNER_TIMEOUT",
         "NO_VALID_PATH",
     ]
-    """Planner errors that start recovery; after others, the goal fails immediately. In Nav2, the condition
-    WouldAPlannerRecoveryHelp decides this. The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and
-    GOAL_OCCUPIED."""
+    """Planner errors that start recovery (WouldAPlannerRecoveryHelp in Nav2). After other errors, the goal fails
+    immediately. The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and GOAL_OCCUPIED."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = ["clear_costmap", "spin", "wait", "backup"]
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
     """Whether `clear_costmap`, and each retry after a planner error, clears the entire global costmap, as in Nav2. With
-    false, `clear_costmap` clears only the area of the local costmap, so that the robot does not forget a known dead end
-    and return to it. A retry after a planner error does the same, except the first one and the next ones after at least
-    10 s, 20 s, 40 s, …, which clear the entire global costmap."""
+    false, only the area of the local costmap is cleared, so that known dead ends are kept. After planner errors, the
+    entire global costmap is then cleared at the first retry, and again at increasing intervals (10 s, 20 s, 40 s, …).
+    """
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
@@ -174,8 +173,8 @@ class Recovery(Spec):
     rotational_acc_lim: PositiveAngularAcceleration | None = None
     """Angular deceleration at the end of `spin`; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which `spin`, `backup`, or `retrace` fails. For `retrace`, it is extended to 1.5 times the duration of
-    driving `retrace_dist` at `backup_speed` if that is longer."""
+    """Time after which `spin`, `backup`, or `retrace` fails. For `retrace`, it is at least 1.5 times the duration of
+    driving `retrace_dist` at `backup_speed`."""
 
     @property
     def names(self) -> list[str]:
@@ -183,10 +182,11 @@ class Recovery(Spec):
         return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
     def behavior_specs(self) -> list[BehaviorSpec]:
-        """Return the behaviors in order; parameters that a behavior does not set have the values of this section."""
+        """Return the behaviors in order. Parameters that a behavior does not set are taken from this specification."""
         return [self._with_shared_parameters(entry) for entry in self.behaviors]
 
     def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
+        """Return the specification of a behavior, given by name or with some of its parameters."""
         model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
         shared = type(self).model_fields.keys() & model.model_fields.keys()
         own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}

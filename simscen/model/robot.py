@@ -74,8 +74,8 @@ class SkidSteer(Spec):
     right: JointNames | None = None
     """Wheel joints of the URDF on the right; default: found by position."""
     turning_scale: Annotated[float, Field(gt=0, le=10), Quantity("ratio")] = 1.0
-    """Effective wheel separation divided by the geometric one; skidding makes it larger than 1 (Clearpath's jackal:
-    1.5)."""
+    """Effective wheel separation divided by the geometric wheel separation, above 1 because of skidding (Clearpath's
+    jackal: 1.5)."""
 
 
 class Ackermann(Spec):
@@ -102,14 +102,14 @@ class Ackermann(Spec):
 
 
 class Omnidirectional(Spec):
-    """Drive in any direction (omni wheels, idealized as a planar drive) with odometry of every motion."""
+    """Idealized drive in any direction, without wheels. Odometry measures every motion."""
 
     type: Literal["omnidirectional"]
     """Type of the drive."""
 
 
 class Mecanum(Spec):
-    """Drive in any direction with four mecanum wheels and odometry from their encoders."""
+    """Drive in any direction with four mecanum wheels. Odometry is computed from the wheel encoders."""
 
     type: Literal["mecanum"]
     """Type of the drive."""
@@ -141,7 +141,7 @@ Drive = Annotated[Differential | SkidSteer | Ackermann | Omnidirectional | Mecan
 
 
 class Limits(Spec):
-    """Limits of the base; commands beyond them are clipped, as by the firmware of a real base."""
+    """Limits of the base. Commands beyond the limits are clipped."""
 
     linear: PositiveSpeed
     """Maximum forward speed."""
@@ -158,8 +158,7 @@ class Limits(Spec):
     angular_acceleration: PositiveAngularAcceleration
     """Maximum angular acceleration and deceleration."""
     command_timeout: PositiveDuration = 0.5
-    """Time without a command after which the base stops (ros2_control's `cmd_vel_timeout` and its default). Commands
-    stop only if a fault on `cmd_vel` blocks them."""
+    """Time without a command after which the base stops (ros2_control's `cmd_vel_timeout`)."""
 
 
 class Mount(Spec):
@@ -172,11 +171,11 @@ class Mount(Spec):
     z: NonNegativeLength = 0.2
     """Height above the ground."""
     roll: Angle = 0.0
-    """Angle about the viewing direction, right side down; 180 deg: mounted upside down."""
+    """Angle about the viewing direction; positive: right side down, 180 deg: upside down."""
     pitch: Annotated[Angle, Field(ge=-1.6, le=1.6)] = 0.0
-    """Downward angle of the viewing direction; negative: upward."""
+    """Angle of the viewing direction to the horizontal; positive: downward."""
     yaw: Angle = 0.0
-    """Viewing direction, counterclockwise from straight ahead."""
+    """Horizontal angle of the viewing direction; 0: straight ahead, positive: to the left."""
 
     @property
     def is_level(self) -> bool:
@@ -185,7 +184,7 @@ class Mount(Spec):
 
     @property
     def pose(self) -> Pose3:
-        """Pose of the sensor frame in the base frame; roll, pitch, and yaw are those of a URDF's `rpy`."""
+        """Pose of the sensor frame in the base frame."""
         return Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw)
 
 
@@ -193,18 +192,18 @@ class SensorSpec(Component):
     """Base class of sensor specifications. The component is called with a simscen.sensors.sensor.SensorSetting."""
 
     reading_type: ClassVar[str]
-    """Type of the readings: Scan, Odometry, Imu, Bump, or Image of simscen.core.messages.sensor_data."""
+    """Class name of the readings in simscen.core.messages.sensor_data: Scan, Odometry, Imu, Bump, or Image."""
     localizes: ClassVar[bool] = False
-    """Whether the localizer matches the scans with the map; costmaps use all scans."""
+    """Whether the localizer uses the scans of this sensor."""
 
     rate: Frequency = 10.0
     """Rate of the readings."""
     latency: Duration = 0.0
-    """Delay between the time stamp of a reading and its arrival at the stack: exposure, sweep, driver, and bus."""
+    """Delay between the time stamp of a reading and its arrival at the stack."""
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Return why this class is not a valid specification of a sensor, or ""."""
+        """Return why this class is not a valid specification of a sensor; "" if it is valid."""
         if problem := super().definition_problem():
             return problem
         is_known = getattr(cls, "reading_type", None) in READING_KINDS
@@ -271,7 +270,7 @@ class InertialUnit(SensorSpec):
 
 
 class Bumper(SensorSpec):
-    """Contact sensor of the base: pressed while the base touches an object."""
+    """Contact sensor that is pressed while the base touches an object."""
 
     component: ClassVar[str] = "simscen.sensors.camera_and_bumper:BumperSensor"
     reading_type: ClassVar[str] = "Bump"
@@ -301,7 +300,7 @@ class Camera(SensorSpec):
 
 
 class Sensor(Choice):
-    """Sensor of a robot."""
+    """Sensor of a robot: exactly one of the types below, or of the types that plug-ins add."""
 
     group: ClassVar[str] = "sensor"
 
@@ -313,19 +312,19 @@ class Sensor(Choice):
 
     @property
     def reading_type(self) -> str:
-        """Type of the readings."""
+        """Class name of the readings in simscen.core.messages.sensor_data."""
         assert isinstance(self.chosen, SensorSpec)
         return self.chosen.reading_type
 
     @property
     def localizes(self) -> bool:
-        """Whether the localizer matches the scans with the map."""
+        """Whether the localizer uses the scans of this sensor."""
         assert isinstance(self.chosen, SensorSpec)
         return self.chosen.localizes
 
     @property
     def may_render(self) -> bool:
-        """Whether the sensor may need the renderer: cameras do, and sensors of installed packages may."""
+        """Whether the sensor may need the renderer: a camera, or a sensor of a plug-in."""
         return self.original_class is not None or self.reading_type == "Image"
 
 
@@ -358,10 +357,10 @@ class RobotSpec(Spec):
     radius: PositiveLength | None = None
     """Radius of the footprint of a round robot."""
     footprint: Ring | None = None
-    """Corners of the footprint in the base frame for any other robot; default: computed from the shapes."""
+    """Corners of the footprint of any other robot in the base frame; default: computed from the shapes."""
     hull_friction: Friction = 0.5
-    """Friction coefficient of the hull against walls and objects. It is multiplied by theirs: 1 for walls and fixed
-    obstacles, 0.6 for movable ones."""
+    """Friction coefficient of the hull. It is multiplied by the coefficient of what the hull touches: 1 for walls and
+    fixed obstacles, 0.6 for movable obstacles."""
     drive: Drive
     """Wheels and their kinematics."""
     limits: Limits
@@ -369,11 +368,11 @@ class RobotSpec(Spec):
     sensors: dict[Name, Sensor]
     """Sensors by name; faults refer to these names."""
     latency: RobotLatency = by_default()
-    """Computing times and sensor delays on this robot, for scenarios that use them."""
+    """Computing times and sensor delays of this robot, for scenarios with `stack: {latency: robot}`."""
 
     @property
     def top_speed(self) -> float:
-        """Maximum ground speed in m/s in the fastest direction."""
+        """Maximum speed over ground in m/s, in any direction."""
         forward = max(self.limits.linear, self.limits.reverse or self.limits.linear)
         sideways = (self.limits.lateral or self.limits.linear) if isinstance(self.drive, Holonomic) else 0.0
         return float((forward**2 + sideways**2) ** 0.5)

@@ -70,10 +70,10 @@ class InitialEstimate(PoseSpec):
 
 
 class EstimateOrPlace(PlaceAllowed):
-    """Annotation of an initial estimate in a file, which can also be given as the name of a place."""
+    """Annotation of a field that takes an initial estimate or the name of a place."""
 
     def value_at(self, pose: PoseSpec) -> InitialEstimate:
-        """Return an estimate at the pose of the place with the default standard deviations."""
+        """Return an estimate at the pose of a place, with the default standard deviations."""
         return InitialEstimate(x=pose.x, y=pose.y, yaw=pose.yaw)
 
 
@@ -86,7 +86,7 @@ else:
 
 
 class Payload(Spec):
-    """Load on the robot that its robot file does not include and that its stack does not know."""
+    """Load on the robot, which is not part of its robot file and unknown to its stack."""
 
     mass: PositiveMass
     """Mass in kg."""
@@ -102,10 +102,10 @@ class RobotEntry(Spec):
     pose: PlaceOrPose
     """True start pose: a pose, or the name of a place of the world."""
     initial_estimate: EstimateOrUnknown | None = None
-    """Pose, or name of a place of the world, that the localizer starts with; `unknown`: anywhere on the map. Default:
-    the true pose with Nav2's default covariance."""
+    """Initial pose estimate of the localizer: a pose, the name of a place of the world, or `unknown` (anywhere on the
+    map). Default: the true pose with Nav2's default covariance."""
     payload: Payload | None = None
-    """Load that the robot carries. The motors are not stronger because of it."""
+    """Load that the robot carries."""
     motor_torque: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """Fraction of the nominal motor torque that is available, e.g. because of wear, heat, or a weak battery."""
 
@@ -120,9 +120,9 @@ class GoalEntry(Spec):
     timeout: PositiveDuration | None = None
     """Simulated time after which this goal fails with NAVIGATE_TIMEOUT."""
     xy_tolerance: PositiveLength | None = None
-    """Distance from the goal within which the goal counts as reached; default: that of the stack's goal checker."""
+    """Distance from the goal within which the goal counts as reached; default: tolerance of the goal checker."""
     yaw_tolerance: PositiveAngle | None = None
-    """Heading error within which the goal counts as reached; default: that of the stack's goal checker."""
+    """Heading error within which the goal counts as reached; default: tolerance of the goal checker."""
     expect: Expectation = "succeeded"
     """Expected outcome: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. The goal
     passes only with this outcome."""
@@ -137,8 +137,8 @@ MAX_GOALS = 1000
 class MultiRobotEntry(RobotEntry):
     """One of several robots, with its own start, goals, faults, and criteria.
 
-    A robot without its own `map` or `on_goal_failure` uses those of the scenario. Its `stack` is merged with the stack
-    of the scenario.
+    Without `map` or `on_goal_failure`, the value of the scenario applies. The `stack` is merged with the stack of the
+    scenario.
 
     Example: `robots: {left: {pose: {x: 1, y: 1}, goals: [{pose: dock}]}, right: {pose: {x: 4, y: 1}}}`
     """
@@ -154,12 +154,13 @@ class MultiRobotEntry(RobotEntry):
     on_goal_failure: Literal["stop", "continue"] | None = None
     """Whether this robot stops or drives to the next goal after a failed goal."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    """Faults of this robot's sensors and wheels; their triggers refer to this robot unless they name another one."""
+    """Faults of this robot's sensors and wheels. Triggers refer to this robot unless they name another one."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
     """Criteria for this robot, in addition to those for all robots."""
 
 
 MAX_ROBOTS = 20
+"""Maximum number of robots."""
 
 
 def _check_reason(reason: str) -> str:
@@ -172,16 +173,16 @@ Reason = Annotated[str, Field(max_length=500), AfterValidator(_check_reason)]
 
 
 class ExpectedFailure(Spec):
-    """Known failure: a run that fails counts as failed-as-expected, and a run that passes counts as a failure.
+    """Known failure. A run that fails counts as failed-as-expected, and a run that passes counts as a failure.
 
     Example: `expected: {fail: "the planner hugs corners, NAV-123", criteria: [clearance]}`
     """
 
     fail: Reason
-    """Reason for people, e.g. a ticket and the problem."""
+    """Reason, e.g. a ticket and the problem."""
     criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
     """Ids of the criteria that must fail, and names of the events and faults that must not happen. Nothing else may
-    fail. Default: any criteria may fail, at least one."""
+    fail. Default: at least one criterion must fail."""
 
     @model_validator(mode="before")
     @classmethod
@@ -192,8 +193,7 @@ class ExpectedFailure(Spec):
 
 
 MIN_TRUTH_RATE_HZ = 20.0
-"""Lowest rate of the truth: at lower rates, criteria could miss violations between two samples, and `smoothness`
-(SPARC) has no value."""
+"""Minimum rate at which the ground truth is recorded. At lower rates, criteria could miss violations."""
 
 
 class Physics(Spec):
@@ -255,18 +255,17 @@ class ScenarioSpec(Spec):
     physics: Physics = by_default()
     """Parameters of the physics simulation."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
-    """Criteria that must all hold; with several robots, for each of them."""
+    """Criteria that all robots must meet."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_check_unique)] = []
-    """Additional metrics of types that installed packages add."""
+    """Additional metrics of installed plug-ins."""
     expected: ExpectedFailure | None = None
     """Known failure of the run, with a reason. An aborted run is still an error."""
     skip: Reason | None = None
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
-    """Values by the path of a key, such as `robot.motor_torque`; each combination is a separate run. Default: the file
-    as it is."""
+    """Values by the path of a key, such as `robot.motor_torque`. Each combination is a separate run."""
     acceptance: Acceptance | None = None
-    """Claim about many random runs, which `simscen study` tests; other commands ignore it."""
+    """Claim about many random runs, which `simscen study` tests. Other commands ignore the claim."""
 
     @property
     def only_robot(self) -> RobotEntry:
@@ -276,7 +275,7 @@ class ScenarioSpec(Spec):
 
     @property
     def steps(self) -> "list[SequenceStep]":
-        """All steps of the events in order; see `steps_of`."""
+        """The events in order, each followed by the steps of its sequence."""
         from simscen.model.disturbances import steps_of
 
         return steps_of(self.events)
@@ -315,12 +314,12 @@ def initial_estimate(entry: RobotEntry, truth: Pose2) -> Estimate:
 
 
 def expected_failure(spec: ScenarioSpec) -> DeclaredFailure | None:
-    """Return the known failure that a scenario declares as `expected`, or None."""
+    """Return the known failure that a scenario declares as `expected`; None if it declares none."""
     return None if spec.expected is None else DeclaredFailure(spec.expected.fail, tuple(spec.expected.criteria))
 
 
 class CriteriaSpec(ScenarioSpec):
-    """Scenario whose `world` and `robot` are optional: enough to evaluate an existing log by the criteria in `pass`."""
+    """Scenario for judging existing logs, with optional `world` and `robot`."""
 
     simscen: LanguageVersion = 1
     """Version of the scenario language."""

@@ -19,7 +19,8 @@ Profile = Literal["reference", "advanced", "nav2", "simscen"]
 Values = Mapping[str, Any]
 
 SECTIONS_BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
-"""Sections whose parameters depend on `type`. In a profile, they have parameters by type; the first is the default."""
+"""Sections whose parameters depend on `type`. Profiles contain their parameters by type; the first type is the default.
+"""
 _COSTMAP: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
     "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
@@ -103,7 +104,7 @@ def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _complete_section(name: str, defaults: Any, section: Any) -> Any:
-    """Return a section with missing parameters from the profile; a validated specification is returned unchanged."""
+    """Return a section with missing parameters from the profile. A validated specification is returned unchanged."""
     if section is None:
         if name not in SECTIONS_BY_TYPE:
             return defaults
@@ -133,6 +134,7 @@ _LatencyOrRobot = Annotated[
 ]
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
+"""Classes that build the stack from its specification, as `module:Class`."""
 
 
 class InProcessStack(StackBase, Typed):
@@ -145,16 +147,16 @@ class StackSpec(InProcessStack):
     component: ClassVar[str] = "simscen.stack.build:configured_stack"
     type: Literal["reference"] = "reference"
     profile: Profile = "reference"
-    """Set of default values for the other parameters. `nav2`: those of nav2_bringup. `advanced`: components that Nav2
-    does not have, such as motion prediction and scan matching. `simscen` is the deprecated name of `advanced`."""
+    """Set of default values for the other parameters. `nav2`: the values of nav2_bringup. `advanced`: components that
+    Nav2 does not have, such as motion prediction and scan matching. `simscen`: deprecated name of `advanced`."""
     nav2_params: ParameterFile | None = None
-    """Parameter file of Nav2, such as nav2_params.yaml; its values apply to all parameters that exist here."""
+    """Parameter file of Nav2, such as nav2_params.yaml. Parameters that do not exist here are ignored."""
     localizer: Localizer = by_default()
     """Localizer, which estimates the pose of the robot."""
     odometry: OdometryFilter = by_default()
     """Source of the transform from odom to base."""
     costmap: Costmap = by_default()
-    """Global costmap for planning; parameters that the local costmap does not set have the values given here."""
+    """Global costmap for planning. The values also apply to parameters that the local costmap does not set."""
     local_costmap: LocalCostmap = by_default()
     """Local costmap for control and recovery behaviors."""
     planner: Planner = by_default()
@@ -162,8 +164,8 @@ class StackSpec(InProcessStack):
     controller: Controller = by_default()
     """Controller that follows the path."""
     failure_tolerance: Annotated[float, Field(ge=-1, le=86400), Quantity("duration")] = 0.3
-    """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED; 0: it fails immediately
-    with NO_VALID_CONTROL; -1: it never fails."""
+    """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED. 0: the controller fails
+    immediately with NO_VALID_CONTROL. -1: the controller never fails."""
     goal_checker: GoalChecker = by_default()
     """Checker that decides whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()
@@ -175,7 +177,7 @@ class StackSpec(InProcessStack):
     collision_monitor: CollisionMonitor = by_default()
     """Monitor that stops or slows the robot before a collision."""
     latency: _LatencyOrRobot = by_default()
-    """Computing times of the stack, or `robot` for those of the robot file, which include the delays of its sensors."""
+    """Computing times of the stack, or `robot` for the computing times and sensor delays of the robot file."""
     prediction: Prediction = by_default()
     """Prediction of moving obstacles."""
 
@@ -187,7 +189,7 @@ class StackSpec(InProcessStack):
 
     @property
     def builder(self) -> str:
-        """Builder of the stack, as `module:Class`; that of the advanced stack if any parameter needs it."""
+        """Class that builds the stack: ADVANCED_BUILDER if any parameter needs the advanced stack."""
         is_advanced = (
             self.prediction.enabled
             or self.planner.cautious

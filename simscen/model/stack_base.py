@@ -10,7 +10,7 @@ from simscen.spec.quantities import Duration, Frequency, PositiveAngle, Positive
 
 
 class GoalTolerances(Spec):
-    """Tolerances of goals that do not have their own, used by the stack and by criteria."""
+    """Tolerances for goals without tolerances. The stack and criteria use them."""
 
     xy_goal_tolerance: PositiveLength = 0.25
     """Distance from the goal within which the goal counts as reached."""
@@ -28,12 +28,12 @@ class SpeedZone(Spec):
 
 
 class StackBase(Spec):
-    """Base class of stack specifications: the parameters that the simulation and the criteria use."""
+    """Base class of stack specifications, with the parameters that the simulation and the criteria use."""
 
     controller_frequency: Frequency = 20.0
     """Rate at which the stack computes commands."""
     goal_checker: GoalTolerances = by_default()
-    """Tolerances of goals that do not have their own."""
+    """Tolerances for goals without tolerances."""
     keepout: Annotated[list[RegionName], Field(max_length=100)] = []
     """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
     speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
@@ -59,7 +59,7 @@ class ControllerSpec(Typed):
 
     @property
     def lookahead_s(self) -> float:
-        """Time in seconds that the controller looks ahead. The default size of the local costmap follows from it."""
+        """Time in seconds that the controller looks ahead. It determines the default size of the local costmap."""
         return 2.0
 
 
@@ -67,27 +67,26 @@ class PathFollowerSpec(ControllerSpec):
     """Base class of the specifications of the shipped controllers, which follow a path."""
 
     goal_tolerance_ratio: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.45
-    """Fraction of the goal's `xy_goal_tolerance` at which the position counts as reached, and the robot turns to the
-    goal's heading. With 1, as in Nav2, a robot may stop at the tolerance, so that a localization error of a
-    centimeter makes it report a false success."""
+    """Fraction of the goal's `xy_goal_tolerance` within which the robot stops driving and turns to the goal's heading
+    (Nav2: 1)."""
     max_robot_pose_search_dist: PositiveLength = 1.5
-    """Distance along the plan, beyond the previous nearest point, in which the point nearest to the robot is searched
-    (Nav2: half the size of the local costmap). Without this limit, the robot could skip a loop of the plan."""
+    """Length of the plan in which the point nearest to the robot is searched, from the previous nearest point on (Nav2:
+    half the size of the local costmap)."""
 
 
 class Latency(Spec):
     """Computing times of the parts of a stack, rounded to physics ticks.
 
-    A part uses the data at the start of its computation; its result is available after this time. Parts run in
-    parallel, as Nav2's servers do; a part that is still busy is not started again.
+    The result of a part is available after its computing time. Parts run in parallel, as Nav2's servers do. A part that
+    is still computing is not started again.
     """
 
     localizer: Duration = 0.0
-    """Time from a scan to the pose correction; odometry updates the pose in the meantime."""
+    """Time from a scan to the pose correction. Odometry updates the pose in the meantime."""
     costmap: Duration = 0.0
     """Time from sensor data to the updated costmaps."""
     planner: Duration = 0.0
-    """Time from a request to the plan; the controller follows the previous plan in the meantime."""
+    """Time from a request to the plan. The controller follows the previous plan in the meantime."""
     controller: Duration = 0.0
     """Time from pose and costmap to the command."""
     collision_monitor: Duration = 0.0
@@ -95,10 +94,7 @@ class Latency(Spec):
 
 
 class RobotLatency(Latency):
-    """Computing times on the robot's usual computer, and usual delays of its sensors.
-
-    They apply to scenarios with `stack: {latency: robot}`.
-    """
+    """Computing times on the robot's computer, and delays of its sensors, for scenarios with `stack: {latency: robot}`."""
 
     sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}
     """Delays by sensor name, instead of the `latency` of the sensor."""

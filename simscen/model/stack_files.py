@@ -13,16 +13,15 @@ from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
 _TAG = "an external stack"
-"""Tag of external stacks in validation errors. It contains spaces, so that it differs from all types of stacks."""
+"""Tag of external stacks in validation errors."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 
 class ExternalStackSpec(StackBase):
     """Stack in a separate process, in any language, in lockstep with the simulation.
 
-    A scenario contains only the name. The command that starts the process is given on the command line (`--stack
-    mine='COMMAND'`) or in the user configuration, so that scenarios contain no code. With several robots, each robot
-    has its own process.
+    A scenario contains only the name of the stack. The command that starts the process is given on the command line
+    (`--stack mine='COMMAND'`) or in the user configuration. With several robots, each robot has its own process.
 
     Example: `stack: {external: mine, controller_frequency: 10 Hz}`
     """
@@ -38,7 +37,7 @@ class ExternalStackSpec(StackBase):
         return self.ground_truth
 
 
-def _kind(value: Any) -> str:
+def _stack_tag(value: Any) -> str:
     """Return the tag of a stack specification: its `type`, or `_TAG` if it is external."""
     if isinstance(value, dict):
         return _TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
@@ -46,22 +45,22 @@ def _kind(value: Any) -> str:
 
 
 _Stacks = Annotated[
-    Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_TAG)], Discriminator(_kind)
+    Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_TAG)], Discriminator(_stack_tag)
 ]
 AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack", _Stacks)]
 
 
 class StackFileSpec(Spec):
-    """Stack for `--stack NAME=FILE`, with the same `stack` section as a scenario.
+    """Stack file for `--stack NAME=FILE`, which replaces the `stack` section of scenarios.
 
-    Parameters that the file does not set have their default values, not those of the scenarios. Exceptions are keepout
-    regions, speed zones, filter masks, and goal tolerances, which come from the scenario if it sets them.
+    Keepout regions, speed zones, filter masks, and goal tolerances are taken from the scenario if the file does not set
+    them. Other parameters that the file does not set have their default values.
     """
 
     simscen: LanguageVersion
     """Version of the scenario language."""
     name: Name | None = None
-    """Name for people."""
+    """Name of the stack."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """Description for people."""
     stack: AnyStack

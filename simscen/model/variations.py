@@ -1,4 +1,4 @@
-"""Specification of variations (`variations:`): values of a scenario, and how they are combined or drawn."""
+"""Specification of variations (`variations:`): values of a scenario that are combined or drawn at random."""
 
 from typing import Annotated, Any, Literal
 
@@ -9,9 +9,9 @@ from simscen.spec.choice import Choice
 from simscen.spec.quantities import AnyAmount
 
 MAX_VARIATIONS = 1000
-"""Maximum number of variations that are listed or run at once; a study draws any number of them one after the other."""
+"""Maximum number of variations of a scenario, except in studies."""
 MAX_DRAWS = 1_000_000
-"""Maximum number of variations of a study."""
+"""Maximum number of random variations of a scenario in a study."""
 
 ValuePath = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 """Path of a value in the scenario: `robot.pose.x`, `goals[0].pose`, `goals.shelf.pose`."""
@@ -30,7 +30,7 @@ class Normal(Spec):
     std: AnyAmount
     """Standard deviation."""
     min: AnyAmount | None = None
-    """Smallest value; truncation does not change the shape of the distribution above it."""
+    """Smallest value."""
     max: AnyAmount | None = None
     """Largest value."""
 
@@ -57,7 +57,7 @@ class Integer(Value[Annotated[tuple[int, int], Field(strict=False)]]):
 
 
 class OneOf(Value[Values]):
-    """Random choice of one of several values with equal probability.
+    """Random choice of one of several values, which are equally likely.
 
     Example: `choice: [turtlebot, amr]`
     """
@@ -76,8 +76,7 @@ class Draw(Choice):
 class Sampled(Spec):
     """Reproducible random values of several paths.
 
-    The k-th value of a path depends only on the seed, the path, and k: a larger count or more paths do not change
-    existing values. Numbers are rounded to six digits.
+    The k-th value of a path depends only on the seed, the path, and k. Numbers are rounded to six digits.
     """
 
     count: Annotated[int, Field(ge=1, le=MAX_DRAWS)]
@@ -85,9 +84,9 @@ class Sampled(Spec):
     seed: Annotated[int, Field(ge=1, le=2**32 - 1)] = 1
     """Seed of these values; the runs keep the seed of the scenario."""
     method: Literal["random", "latin_hypercube", "sobol"] = "random"
-    """`latin_hypercube` spreads the values of each path evenly over its range; another `count` then changes all of
-    them. `sobol` spreads all paths together evenly (a Sobol sequence with a random shift); another path then changes
-    existing values. Only `random` values are independent, so that an `acceptance` claim can be made."""
+    """`random`: independent values, which an `acceptance` claim requires. `latin_hypercube`: values that are evenly
+    spread over the range of each path; they change with `count`. `sobol`: values that are evenly spread over all paths
+    together (a Sobol sequence with a random shift); they change with the paths."""
     values: Annotated[dict[ValuePath, Draw], Field(min_length=1, max_length=50)]
     """Distribution of the value of each path."""
 
@@ -102,17 +101,18 @@ class VariationBlock(Spec):
     grid: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """All combinations of the values of each path."""
     pairwise: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """Few combinations, in which each pair of values of any two paths occurs: far fewer than a grid of many paths."""
+    """Few combinations, in which each pair of values of any two paths occurs."""
     pairs: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """The first values of all paths together, then the second ones, and so on; all lists must have the same length."""
+    """The first values of all paths together, then the second values, and so on. All lists must have the same length.
+    """
     list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MAX_VARIATIONS, alias="list")] = None
     """Each variation as a mapping of paths to values, with an optional `name`."""
     sampled: Sampled | None = None
     """Random values."""
     require: Annotated[list[Annotated[str, StringConstraints(max_length=1000)]], Field(max_length=50)] = []
-    """Conditions that all variations meet, such as `goals[0].pose.x > robot.pose.x + 1`; other combinations are left
-    out. Paths may also lead to values that are not varied. Numbers count in SI units; quantities are written in quotes:
-    `time_limit < '2 min'`. Random values are drawn again until `count` of them meet the conditions."""
+    """Conditions that all variations meet, such as `goals[0].pose.x > robot.pose.x + 1`. Other combinations are left
+    out, and random values are drawn again. Paths may also lead to values that are not varied. Numbers are in SI units;
+    quantities with a unit are written in quotes: `time_limit < '2 min'`."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":
@@ -127,7 +127,7 @@ class VariationBlock(Spec):
 
     @property
     def is_sampled_alone(self) -> bool:
-        """Whether the block has `sampled` values and no others."""
+        """Whether the block has only `sampled` values."""
         others = (self.grid, self.pairwise, self.pairs, self.list_)
         return self.sampled is not None and all(other is None for other in others)
 
@@ -141,18 +141,18 @@ class Variations(
         ]
     ]
 ):
-    """Values by path; each combination is a separate run. A list of blocks runs one block after the other.
+    """Values by path, as one block or a list of blocks. Each combination in a block is a separate run.
 
     `[]` removes the variations that a file inherits.
     """
 
     @property
     def blocks(self) -> list[VariationBlock]:
-        """Blocks in order."""
+        """The blocks in order."""
         return self.root if isinstance(self.root, list) else [self.root]
 
 
 class VariationsSection(Spec):
-    """The `variations` of a scenario without its other keys."""
+    """Scenario of which only the key `variations` is read."""
 
     variations: Variations

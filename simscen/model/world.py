@@ -18,14 +18,14 @@ class Wall(Spec):
     name: Name = "wall"
     """Name in collision reports; default: wall_1, wall_2, …"""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=10_000)]
-    """Corners of the center line as [x, y] or names of places; repeat the first one at the end to close the wall."""
+    """Corners of the center line as [x, y] or names of places. Repeat the first corner at the end to close the wall."""
     thickness: PositiveLength = 0.1
     """Thickness across the center line."""
     height: PositiveLength = 1.0
     """Height above the ground."""
 
     def label(self, number: int) -> str:
-        """Return the name, or `wall_3` for the third wall of a world."""
+        """Return the given name, or e.g. `wall_3` for wall number 3."""
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
@@ -39,14 +39,14 @@ class WorldObject(ShapedObject):
 
 
 class Obstacle(WorldObject):
-    """Object that never moves; robots drive over it if it is low enough."""
+    """Object that never moves. Robots drive over the object if it is low enough."""
 
     friction: Friction = 1.0
-    """Friction of the surface for wheels on top of it, e.g. on a sill, step, or platform."""
+    """Friction coefficient of the surface for wheels on a sill, step, or platform."""
 
 
 class Ramp(Spec):
-    """Wedge that rises from the ground; its slope follows from its length and height."""
+    """Wedge that rises from the ground."""
 
     name: Name
     """Name in collision reports."""
@@ -59,7 +59,7 @@ class Ramp(Spec):
     height: PositiveLength
     """Height of the upper edge above the ground."""
     friction: Friction = 1.0
-    """Friction of the surface."""
+    """Friction coefficient of the surface."""
 
 
 class Travel(Motion):
@@ -70,12 +70,12 @@ class Travel(Motion):
 
 
 class Movable(WorldObject):
-    """Object that can move: pushed by the robot if it has a mass, or on its own along waypoints."""
+    """Object that can move. The robot can push an object with a mass. An object with `move` follows its waypoints."""
 
     mass: Mass = 0.0
     """Mass in kg; 0: the robot cannot push the object."""
     move: Travel | None = None
-    """Motion of the object. Keyframes may start at another pose than `pose`."""
+    """Motion of the object. Keyframes may start at a pose other than `pose`."""
 
 
 class Door(Spec):
@@ -86,7 +86,7 @@ class Door(Spec):
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
     """The two door posts as [x, y] or names of places. A door swings about the first post, or slides past it."""
     motion: Literal["swing", "slide"] = "swing"
-    """`swing`: by 90° counterclockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
+    """`swing`: the panel turns by 90° counterclockwise about the hinge. `slide`: the panel moves along its own line."""
     travel: PositiveLength | None = None
     """Distance that a sliding door moves; default: its width."""
     closed: bool = False
@@ -145,7 +145,7 @@ class WorldSpec(Spec):
 
 
 class RosMapSpec(Spec):
-    """ROS map: an image and the meaning of its gray values (nav2_map_server, map_io.cpp, which ignores other keys)."""
+    """ROS map: an image and the meaning of its gray values, as in nav2_map_server. Other keys are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 

@@ -278,7 +278,7 @@ def windowed_robustness(
     context: EvaluationContext,
     begin: int = 0,
 ) -> Robustness:
-    """Return the robustness of "`condition` is always (or eventually) true in a window". For `begin`, see `robustness`."""
+    """Return the robustness of "always (or eventually) `condition`" in a window. For `begin`, see `robustness`."""
     windows = context.sample_windows(window)
     return _apply_windows(operator, robustness(condition, context, _start(windows, begin)), windows, context)
 
