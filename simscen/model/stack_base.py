@@ -94,7 +94,7 @@ class Latency(Spec):
 
 
 class RobotLatency(Latency):
-    """Computing times on the robot's computer, and delays of its sensors, for scenarios with `stack: {latency: robot}`."""
+    """Computing times on a robot, and delays of its sensors, for scenarios with `stack: {latency: robot}`."""
 
     sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}
     """Delays by sensor name, instead of the `latency` of the sensor."""
