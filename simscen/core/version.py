@@ -1,4 +1,4 @@
-"""Version of simscen and location of its files; imports no other module of the package."""
+"""Version of simscen and location of its files."""
 
 from pathlib import Path
 

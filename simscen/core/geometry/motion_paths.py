@@ -108,7 +108,7 @@ class PathSegment(NamedTuple):
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
     """Return an upper bound in m/s of the speed of any point within `reach` m of the origin of the body.
 
-    The result is inf if the path contains a jump.
+    The result is inf if the path contains a jump, such as a segment without duration.
     """
     speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
     if path.mode == "loop" and _max_distance(_displacement(path.poses[-1], path.poses[0]), reach) > 0:

@@ -142,7 +142,7 @@ class Belief:
 
 
 Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
-"""Nav2's navigation actions: one goal after the other, all goals in one drive, or waypoints with a task at each."""
+"""Nav2's navigation actions: one goal at a time, all goals in one drive, or a list of waypoints with a stop at each."""
 
 FAILED = "failed"
 """Value of the YAML key `expect` of a goal that must fail with any error code."""

@@ -126,7 +126,7 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Minimum height of hits that `level_scan` uses, unless half the height of the lidar is lower. Lower hits are floor."""
+"""Height below which `level_scan` ignores hits on the floor. For a lidar below 0.1 m, it is half the lidar's height."""
 MAX_HEIGHT_M = 2.0
 """Maximum height of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
 AT_BASE = Pose3()

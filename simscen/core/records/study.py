@@ -36,7 +36,7 @@ class ClaimResult:
         limits: Lower and upper confidence limit of the pass rate. Each limit holds with the probability `confidence`;
             for the method `anytime`, both hold together. None for `sprt`, and before the first run.
         target: Pass rate of a robot that `sprt` should accept; None for other methods.
-        power: Minimum probability that `sprt` does not reject such a robot; None for other methods.
+        power: Minimum probability that `sprt` does not reject a robot with this rate; None for other methods.
     """
 
     method: str
