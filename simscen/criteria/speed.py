@@ -47,8 +47,8 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Check only while the action `speed_zone` has enabled the limit in the region, beginning `grace` after the switch;
-    default: the whole run."""
+    """Check only while the action `speed_zone` has enabled the limit in the region, from `grace` after it was enabled.
+    Default: check the whole run."""
     mask: SpeedMask | None = None
     """Filter mask of speed limits: file, type, base and multiplier, as in `stack.speed_mask`.
 

@@ -100,7 +100,10 @@ class TemporalCriterion(Criterion):
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, with_hint: bool) -> Finding:
-    """Return the inconclusive finding for a `whenever` whose premise was never true; with a hint at `required`."""
+    """Return the inconclusive finding for a `whenever` whose premise was never true.
+
+    If `with_hint`, the finding mentions the key `required`.
+    """
     premise = describe(response.premise_condition)
     if response.may_be_tested:
         because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"

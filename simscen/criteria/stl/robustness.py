@@ -193,7 +193,7 @@ class ResponseRobustness(Robustness):
 
     @property
     def may_be_tested(self) -> bool:
-        """Whether the premise was true at a sample, or may become true after the last sample."""
+        """Whether the premise was true at a sample, or may have become true after the last sample."""
         return bool((self.premise.high[self.premise_samples] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
