@@ -14,7 +14,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
-from simscen.criteria.speed import _highest_around
+from simscen.criteria.speed import _sliding_maximum
 from simscen.judge.evaluation import judge
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -165,4 +165,4 @@ def test_highest_value_around_each_sample_is_that_of_all_samples_within_reach(se
     ticks = np.unique(rng.integers(0, 60, 20))
     values, reach = rng.normal(size=len(ticks)) - 5.0, int(rng.integers(0, 15))
     expected = [values[np.abs(ticks - tick) <= reach].max() for tick in ticks]
-    assert _highest_around(values, ticks, reach).tolist() == expected
+    assert _sliding_maximum(values, ticks, reach).tolist() == expected
