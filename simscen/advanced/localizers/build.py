@@ -1,4 +1,4 @@
-"""Functions that build the advanced localizers. The attribute `component` of a specification names one of them."""
+"""Functions that build the advanced localizers from their specifications, and the models they share between runs."""
 
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ from simscen.stack.setting import Setting
 
 
 def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Localizer:
-    """Return a scan-matching AMCL, or dead reckoning if there is no map to match scans with."""
+    """Return a scan-matching AMCL, or dead reckoning if there is no map."""
     if setting.map is None:
         return DeadReckoning(setting.estimate)
     motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
@@ -43,7 +43,7 @@ def slip_ekf(spec: model.SlipEkf, setting: Setting) -> Localizer:
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Everything that scan-matching AMCL computes from a map before a run. All runs on the map share it."""
+    """Models that scan-matching AMCL computes from a map before a run. All runs on the map share them."""
 
     sensor: SensorModel
     free_space: FreeSpace
@@ -54,7 +54,7 @@ class MapModels:
 
 @cached_on_instance
 def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
-    """Return the models of a map; cached with the map, since a map of 100 x 100 m takes 0.3 s."""
+    """Return the models of a map, which are cached with the map."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), unmapped_cells(grid).ravel()
     trust_field = field if spec.laser_likelihood_max_dist > FIT_DISTANCE_M else obstacle_field(grid, 2 * FIT_DISTANCE_M)
@@ -75,5 +75,5 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
 
 
 def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
-    """Compute the models of a map and the tables of its search, before worker processes are forked that share them."""
+    """Compute the models of a map before worker processes are forked, so that these share the models."""
     map_models(grid, spec).search.precompute()

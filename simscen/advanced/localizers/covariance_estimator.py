@@ -1,4 +1,4 @@
-"""Covariance of a pose estimate, from the scatter of recent poses and from the residuals of scans."""
+"""Covariance of a pose estimate, from the scatter of recent poses and the residuals of scans."""
 
 import math
 from collections import deque
@@ -14,48 +14,39 @@ from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotati
 WINDOW_SIZE = 36
 """Number of recent corrections that are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
-"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, by `step_length`.
-
-The errors of poses 4 m apart have the correlations 0.4, 0.4 and 0.1, both with correct maps and with moved furniture.
-"""
+"""Correlation lengths of the errors (longitudinal, lateral, yaw), as distances driven by `step_length`."""
 DRIFT_VARIANCE = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
-"""Factor on the weight of everything learned before, at each correction."""
+"""Factor on the weights of all learned values at each correction."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
 """Initial ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, if residuals
-are as large as `sigma_hit`. The weight is the number of corrections that count as much as this ratio."""
+are as large as `sigma_hit`; and the number of corrections that have the same weight as this ratio."""
 EXPECTED_WEIGHT = 0.05
-"""Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections. The expected ratio
-dominates while the robot hardly moves, because poses close to each other share their errors."""
+"""Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections."""
 DEGREES_OF_FREEDOM = 6.0
 """Degrees of freedom of a covariance that is estimated from few, correlated corrections."""
 ODOMETRY_STD = 0.05, 0.05
-"""Prior standard deviations of odometry in m and rad per meter."""
+"""Initial standard deviations of odometry in m and rad per meter."""
 ODOMETRY_STD_WEIGHT = 0.2
 """Weight of ODOMETRY_STD, as a sum of squared step lengths in m²: that of about three steps."""
 MIN_COVARIANCE = np.diag(np.square((1e-3, 1e-3, 1e-3)))
-"""Added to each covariance (m², m², rad²), so that none is singular."""
+"""Covariance (m², m², rad²) that is added to each covariance, so that none is singular."""
 
 
 class CovarianceEstimator:
     """Scales the covariance of the particles to the real errors of the estimated pose.
 
-    A particle filter treats the errors of all beams and scans as independent. But furniture that was moved, or a map
-    that is half a cell off, shifts the pose in the same direction for as long as it is in sight, so that the
-    covariance of the particles is too small. Two measurements show by which ratio, along each axis of the robot:
+    A particle filter treats the errors of successive scans as independent. Moved furniture causes equal errors in many
+    scans, so that the covariance of the particles is too small. Two measurements show by which ratio:
 
-    - The scatter of the last WINDOW_SIZE poses. Scan matching, which does not use the map, propagates each of them to
-      the present. Their differences are due to the errors of both poses, as far as these are independent, and to the
-      drift of scan matching.
-    - The residuals of the beams that the map explains (the variance of unit weight of a least-squares adjustment).
-      They also show errors that all poses share. How residuals translate to errors of the pose is learned from the
+    - The scatter of the last WINDOW_SIZE poses, which scan matching without the map propagates to the present.
+    - The residuals of the beams that the map explains. The ratio of pose errors to residuals is learned from the
       scatter.
 
-    The ratio is the mean of both, divided by the share of the beams that the map explains, because some of these fit by
-    chance. Because the covariance is estimated, errors have a Student's t-distribution, whose variance is greater by
-    DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2). Between corrections, the covariance grows by the errors of
-    odometry that scan matching has observed.
+    The ratio is the mean of both, divided by the share of the beams that the map explains. Because it is estimated, the
+    errors have a Student's t-distribution with DEGREES_OF_FREEDOM. Between corrections, the covariance grows by the
+    errors of odometry that scan matching has observed.
     """
 
     def __init__(self) -> None:
@@ -66,7 +57,7 @@ class CovarianceEstimator:
         self.forget_poses()
 
     def forget_poses(self) -> None:
-        """Forget the poses, after the robot was found elsewhere, but keep everything learned from them."""
+        """Forget the stored poses, because the robot was found elsewhere, but keep all learned values."""
         self._poses: Array = np.empty((0, 3))
         self._bases: Array = np.empty((0, 3))
         self._drifts: Array = np.empty((0, 3, 3))  # since each pose, in the frame of the bases
@@ -75,7 +66,7 @@ class CovarianceEstimator:
         self._base: Pose2 | None = None
 
     def learn_odometry_error(self, matched: Pose2, odometry: Pose2) -> None:
-        """Learn the error of odometry from one step, measured by scan matching and by odometry."""
+        """Learn the error of odometry from one step by scan matching and by odometry."""
         x, y, yaw = odometry.between(matched)
         self._odometry_square = max(
             0.0,
@@ -85,16 +76,17 @@ class CovarianceEstimator:
         self._step_square = FORGETTING_FACTOR * self._step_square + step_length(odometry) ** 2
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) of a pose with heading `yaw` after `delta`, measured by odometry."""
+        """Return the covariance (3, 3) of a pose with heading `yaw` after the motion `delta` by odometry."""
         c, s, share = math.cos(yaw), math.sin(yaw), step_length(delta) ** 2 / self._step_square
         translation_variance = self._odometry_square * share
         noise = translation_variance, 0.0, 0.0, translation_variance, 0.0, self._yaw_square * share
         return propagate_covariance(covariance, c * delta.x - s * delta.y, s * delta.x + c * delta.y, noise)
 
     def propagate_poses(self, base: Pose2, step_covariance: Array | None) -> None:
-        """Propagate all poses to `base`, the robot's pose in the scan matcher's frame.
+        """Propagate all stored poses to `base`, the robot's present pose in the frame of the scan matcher.
 
-        `step_covariance` (3, 3) is that of the step, in the base frame before it; None if odometry measured the step.
+        `step_covariance` (3, 3) belongs to the step since the last call, in the base frame at its start; None if
+        odometry and not scan matching measured the step.
         """
         last, self._base = self._base or base, base
         step = last.between(base)
@@ -114,9 +106,9 @@ class CovarianceEstimator:
         self._distances = self._distances + distance
 
     def estimate(self, pose: Pose2, covariance: Array, residuals: ScanResiduals | None) -> Array:
-        """Return the covariance (3, 3) of `pose` after a correction at the base of the last `propagate_poses`.
+        """Store the corrected `pose` in the map, and return its covariance (3, 3). Call `propagate_poses` before.
 
-        `covariance` is that of the particles; `residuals` are those of the scan, None if the map explains nothing.
+        `covariance` is that of the particles. `residuals` are those of the scan, or None if the map explains no beam.
         """
         own = covariance + MIN_COVARIANCE
         self._add(pose, 1.0 / float(own[0, 0] + own[1, 1]))
@@ -146,17 +138,17 @@ class CovarianceEstimator:
         self._weights = np.append(self._weights[recent], weight)
 
     def _mean_residuals(self) -> tuple[float, float]:
-        """Return the share of explained beams in the last scans, and the RMS of their residuals in `sigma_hit`."""
+        """Return the share of explained beams in recent scans, and the RMS of their residuals in `sigma_hit`."""
         if not self._residuals:
             return 1.0, 1.0
         explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))
         return explained, math.sqrt(max(square / explained, 1e-3))
 
     def _scatter_ratio(self, own: Array, expected: Array) -> Array:
-        """Return the ratio (3,) of the poses' scatter to their own standard deviations (longitudinal, lateral, yaw).
+        """Return the ratio (3,) of the scatter of poses to the standard deviations of the particles.
 
-        `own` (3,) are the variances of the particles. The difference of a pose from the newest pose has less weight if
-        more of it is drift. `expected` (3,) are the squared ratios to assume without poses.
+        The axes are longitudinal, lateral, and yaw. `own` (3,) are the variances of the particles. `expected` (3,) are
+        the squared ratios to assume without independent poses.
         """
         x, y, yaw = self._poses[-1]
         rotations = self._poses[:, 2] - self._bases[:, 2]

@@ -1,8 +1,8 @@
 """Search of a robot's pose on the whole map by correlative scan matching over the likelihood field.
 
-Source: Olson, Real-time correlative scan matching (ICRA 2009), section III. The score of each pose of a coarse grid
-consists of the share of endpoints near obstacles of the map and the share of points along the beams in free space. The
-best poses are refined. The search is deterministic, and its time depends only on the size of the map.
+Source: Olson, Real-time correlative scan matching (ICRA 2009), section III. The score of a pose combines the nearness
+of endpoints to obstacles of the map, and the share of points along the beams that are in free space. All poses of a
+coarse grid get a score, and the best poses are refined.
 """
 
 import cmath
@@ -19,22 +19,23 @@ from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.sensor_models import surfaces
 
 ENDPOINT_STD_M = 0.2
-"""Standard deviation of the distance of an endpoint from its obstacle."""
+"""Standard deviation of the distance of an endpoint from an obstacle, in the score of the endpoint."""
 MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
-"""Distance from obstacles beyond which an endpoint has the score 0."""
+"""Distance from obstacles beyond which the score of an endpoint is 0."""
 COARSE_CELL_M, HEADING_COUNT = 0.2, 180
 """Cell size and number of headings of the coarse grid."""
 COARSE_POINTS, FINAL_POINTS = 80, 240
-"""Maximum number of points of each kind (endpoints, points along beams): for the search, and for the final scores."""
+"""Maximum number of endpoints, and of points along beams: in the search, and for the final scores."""
 MAX_RANGE_M = 15.0
-"""Points farther away are ignored, because they move too far from one heading of the coarse grid to the next."""
+"""Range beyond which points are ignored, because the headings of the coarse grid are too far apart for them."""
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
-"""Maximum numbers of poses: taken from the coarse grid, then refined, then returned."""
-NEARBY_STEPS, REFINED_NEARBY_POSES = ((6, 0.2), (9, 0.035)), 12
-"""Grid of `search_near`: (steps to each side, step size) for x and y in m, and for yaw in rad. Number of poses that it
-refines."""
+"""Maximum number of poses that are taken from the coarse grid, that are refined, and that are returned."""
+NEARBY_STEPS = ((6, 0.2), (9, 0.035))
+"""Grid of `search_near`: number of steps to each side and step size, for x and y in m, and for yaw in rad."""
+REFINED_NEARBY_POSES = 12
+"""Maximum number of poses that `search_near` refines."""
 MIN_SEPARATION = (0.5, 0.2)
-"""Poses that differ by no more than both of these values (m, rad) count as the same."""
+"""Two poses are distinct if they differ by more than either value (m, rad)."""
 PASSED_SHARES = (0.3, 0.55, 0.8)
 """Points along a beam, as shares of its length, that should be free."""
 FREE_WEIGHT = 0.5
@@ -46,7 +47,7 @@ Levels = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What the lidar sees: endpoints of beams, `ends` (n,), and points along them, `passed` (m,), in the base frame."""
+    """Endpoints of beams, `ends` (n,), and points along the beams, `passed` (m,), in the base frame."""
 
     ends: Plane
     passed: Plane
@@ -70,15 +71,15 @@ class GlobalSearch:
     """Finds the poses on a map at which a view fits best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Prepare searches on the map `grid`. `field` has its distances from obstacles, if already computed."""
+        """Prepare searches on the map `grid`. `field` has the distances from its obstacles, if already computed."""
         self._grid, self._given_field = grid, field
 
     def precompute(self) -> None:
-        """Compute the lookup tables, which are otherwise computed when first used."""
+        """Compute the lookup tables now instead of in the first search."""
         _ = self._nearness_table, self._free_table
 
     def search(self, view: View) -> tuple[Array, Array]:
-        """Return poses (k, 3) in the map frame and their scores (k,) in 0 … 1, best first, at most MAX_RESULTS."""
+        """Return at most MAX_RESULTS poses (k, 3) in the map frame and their scores (k,) in 0 … 1, best first."""
         near_view = _without_far_points(view)
         if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
@@ -91,7 +92,7 @@ class GlobalSearch:
         return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
-        """Return poses and scores like `search`, but only near `pose` (3,), see NEARBY_STEPS."""
+        """Return poses and scores as `search` does, but only within NEARBY_STEPS of `pose` (3,)."""
         near_view = _without_far_points(view)
         coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(FINAL_POINTS)
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
@@ -102,7 +103,7 @@ class GlobalSearch:
         return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def score(self, poses: Array, view: View) -> Array:
-        """Return the scores (n,) in 0 … 1 of a view, one for each of the `poses` (n, 3)."""
+        """Return the scores (n,) in 0 … 1 of `poses` (n, 3) for a view."""
         parts = [(self._nearness_table, view.ends, 1.0), (self._free_table, view.passed, FREE_WEIGHT)]
         nonempty = [(table, points, weight) for table, points, weight in parts if len(points)]
         total = sum(weight * self._mean(table, poses, points) for table, points, weight in nonempty)
@@ -110,7 +111,7 @@ class GlobalSearch:
         return scores
 
     def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
-        """Return the mean (n,) of the table's values at the points, 0 … 1, for each of the `poses` (n, 3)."""
+        """Return the means (n,), 0 … 1, of the table values at the `points` of a view, for the `poses` (n, 3)."""
         blocks = [
             table.take(self._field.endpoint_cells(poses[begin : begin + 512], points)).mean(axis=1)
             for begin in range(0, len(poses), 512)
@@ -126,21 +127,20 @@ class GlobalSearch:
 
     @cached_property
     def _nearness_table(self) -> Levels:
-        """Score of an endpoint in each cell by its distance to the nearest obstacle, 0 … 255."""
+        """Score 0 … 255 of an endpoint in each cell, by the distance to the nearest obstacle."""
         return self._field.tabulate(_nearness, np.uint8)
 
     @cached_property
     def _free_table(self) -> Levels:
-        """255 for free cells, 0 for others."""
+        """255 for free cells, 0 for all others."""
         levels: Levels = np.pad(np.where(self._grid.cells == FREE, 255, 0).astype(np.uint8), 1).ravel()
         return levels
 
     @cached_property
     def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
-        """Tables for coarse cells: (factor, nearness table, free table, mask of the coarse cells with any free cell).
+        """Factor, nearness table, free table, and mask of the coarse cells that contain a free cell.
 
-        A coarse cell consists of `factor` x `factor` map cells. Its value in a table is their maximum in the table of
-        the same name for map cells.
+        A coarse cell consists of `factor` x `factor` map cells. Its values are the maxima of the values of these cells.
         """
         factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape
@@ -178,7 +178,7 @@ class GlobalSearch:
         return np.column_stack((self._grid.origin.apply(positions), wrap_array(yaw)))
 
     def _improve(self, poses: Array, view: View, meters: float, turn: float) -> Array:
-        """Return each pose (n, 3), or the best of its neighbors, `meters` and `turn` rad away."""
+        """Return each pose (n, 3), or the best of its neighbors at steps of `meters` and `turn` rad."""
         steps = np.array([(x, y, a) for x in (0, -1, 1) for y in (0, -1, 1) for a in (0, -1, 1)])
         around = (poses[:, None] + steps * (meters, meters, turn)).reshape(-1, 3)
         best = self.score(around, view).reshape(len(poses), -1).argmax(axis=1)
@@ -188,6 +188,7 @@ class GlobalSearch:
 
 
 def _nearness(meters: Float32) -> Levels:
+    """Return the scores 0 … 255 of endpoints at distances from the nearest obstacle."""
     nearness = np.exp(np.square(np.minimum(meters, np.float32(MAX_DISTANCE_M))) / (-2 * ENDPOINT_STD_M**2))
     levels: Levels = np.round(255 * nearness).astype(np.uint8)
     return levels
@@ -202,7 +203,7 @@ def _pooled(levels: Levels, factor: int) -> Levels:
 
 
 def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
-    """Return the best of `poses` (n, 3) that are not the same (MIN_SEPARATION), best first, and their scores."""
+    """Return the best distinct poses (MIN_SEPARATION) of `poses` (n, 3), and their scores, best first."""
     order = np.argsort(-scores, kind="stable")
     remaining = poses[order]
     chosen_indices: list[int] = []

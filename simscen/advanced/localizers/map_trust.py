@@ -1,4 +1,4 @@
-"""Agreement of scans with the map: residuals of their endpoints, and the weight of scans if the map is outdated."""
+"""Agreement of scans with the map: residuals of the endpoints, and lower weights of scans if the map is outdated."""
 
 from typing import NamedTuple
 
@@ -12,11 +12,11 @@ from simscen.stack.localizers.particles import Particles
 
 
 class ScanResiduals(NamedTuple):
-    """Residuals of one scan, of the beams that end on the mapped area.
+    """Residuals of the beams of one scan that end on the mapped area.
 
-    explained:    share of the beams that the map explains
-    mean_square:  mean squared distance of the endpoints from obstacles, in units of `sigma_hit`²; a beam that the map
-                  does not explain counts as 0
+    explained:    share of these beams that the map explains
+    mean_square:  mean squared distance of the endpoints from obstacles, in units of `sigma_hit`²; 0 for beams that the
+                  map does not explain
     """
 
     explained: float
@@ -24,17 +24,16 @@ class ScanResiduals(NamedTuple):
 
 
 class MapResiduals:
-    """Measures how well the map explains scans.
+    """Computes how well the map explains scans.
 
-    A beam hit the obstacle next to its endpoint with the probability hit / (hit + random), the two parts of its
-    likelihood. Its residual is weighted by this probability, so that furniture that was moved a little increases the
-    residuals, but people who are not on the map do not.
+    The map explains a beam with the probability hit / (hit + random), by the two parts of the likelihood. Residuals are
+    weighted by this probability, so that people who are not on the map do not increase them.
     """
 
     def __init__(
         self, field: DistanceField, unmapped: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
     ) -> None:
-        """Take a map and AMCL's parameters. `unmapped` marks cells of `field.table` outside the mapped area."""
+        """Take the map and AMCL's parameters. `unmapped` marks cells of `field.table` outside the mapped area."""
         self._field, self._unmapped = field, unmapped
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
@@ -51,16 +50,16 @@ class MapResiduals:
 
 
 FIT_DISTANCE_M = 0.3
-"""A beam fits the map if it ends closer than this to an obstacle."""
+"""Distance from an obstacle of the map below which the endpoint of a beam fits."""
 CLUSTER_RADIUS_M = 1.0
-"""Particles that are all within this distance of their mean are one narrow cluster."""
+"""Maximum distance of the particles from their mean for being one narrow cluster."""
 SAMPLED_PARTICLES = 50
-"""Number of particles at which beams are compared with the map."""
+"""Approximate number of particles at which beams are compared with the map."""
 MAPPED_SHARE = 0.1, 0.8
-"""Shares of the beams that end on the mapped area: up to the first, a scan is ignored; from the second on, it has its
-full weight. A few beams that reach back over the edge of the map fit one of its walls from many poses."""
+"""Share of the beams that end on the mapped area, up to which a scan is ignored, and from which on it has its full
+weight."""
 MIN_PARTICLE_SHARE = 0.5
-"""Share of the particles for which a beam must end on the mapped area to be used."""
+"""A beam is used if it ends on the mapped area for more than this share of the particles."""
 _UNMAPPED, _FITS, _MISSES = 0, 1, 2
 """Classes of cells for the endpoint of a beam."""
 
@@ -68,9 +67,9 @@ _UNMAPPED, _FITS, _MISSES = 0, 1, 2
 class ScanWeight(NamedTuple):
     """Weight of a scan.
 
-    exponent:       exponent of its likelihood, 0 … 1
-    fitting_share:  share of the beams that fit the map, of those that end on the mapped area
-    used_hits:      mask (m,) of the beams with a hit that are used; None for all
+    exponent:       exponent of the likelihood, 0 (scan is ignored) … 1
+    fitting_share:  share of the beams that fit the map, among those that end on the mapped area
+    used_hits:      mask (m,) of the m beams with a hit: which of them to use; None for all
     """
 
     exponent: float
@@ -79,16 +78,14 @@ class ScanWeight(NamedTuple):
 
 
 class MapTrust:
-    """Determines the weight of each scan, which is small if the map does not agree with it.
+    """Determines the weight of each scan.
 
-    If the particles are one narrow cluster, the pose is right, or the relocalization will find that it is wrong. Beams
-    that do not fit then show that the map is outdated. The other beams may fit by chance and move the cluster. Outside
-    the map, particles spread, and the first beams that touch the map would attract them to a wrong pose. A scan of
-    which few beams end on the mapped area is therefore ignored as well.
+    The weight is low if few beams end on the mapped area. It is also low if few beams fit the map while the particles
+    are one narrow cluster: the pose is then probably right, and the map outdated.
     """
 
     def __init__(self, field: DistanceField, unmapped: npt.NDArray[np.bool_], zero: float, full: float) -> None:
-        """Classify the cells of a map. `unmapped`, in the order of `field.table`, marks cells outside the mapped area.
+        """Classify the cells of a map. `unmapped` marks cells of `field.table` outside the mapped area.
 
         A scan is ignored if at most the share `zero` of its beams fits. From the share `full` on, it counts fully.
         """
@@ -99,8 +96,8 @@ class MapTrust:
     def weight(self, particles: Particles, beams: Beams) -> ScanWeight:
         """Return the weight of a scan.
 
-        For a narrow cluster, only beams that end on the mapped area for most particles are used. The others would move
-        the particles into the map or out of it, because their likelihood is between that of a hit and that of a miss.
+        For a narrow cluster, only beams that end on the mapped area for most particles are used. Others would attract
+        the particles to the edge of the map, or repel them.
         """
         classes = self._classes(self._endpoint_cells(particles.poses, beams))
         known_share, fitting = _shares(classes)
@@ -113,15 +110,16 @@ class MapTrust:
         return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used)
 
     def fitting_share(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
-        """Return the share of the beams that fit at `poses` (n, 3), of those that end on the mapped area.
+        """Return the share of the beams that fit at `poses` (n, 3), among those that end on the mapped area.
 
-        None if fewer than the share `min_mapped` end there.
+        `ends` are the endpoints in the base frame. None if less than the share `min_mapped` ends on the mapped area.
         """
         known_share, fitting = _shares(self._classes(self._field.endpoint_cells(poses, ends)))
         return fitting if known_share and known_share >= min_mapped else None
 
     def _endpoint_cells(self, poses: Array, beams: Beams) -> Cells:
-        """Return the cells of the endpoints for some of the `poses`. For few poses, all are cached anyway."""
+        """Return the cells of the endpoints for about SAMPLED_PARTICLES of the `poses` (n, 3)."""
+        # For few poses, the cells of all poses are cached.
         step = -(-len(poses) // SAMPLED_PARTICLES)
         if len(poses) <= BLOCK_POSES:
             return beams.cells(self._field, poses)[::step]
@@ -133,11 +131,11 @@ class MapTrust:
 
 
 def _shares(classes: npt.NDArray[np.uint8]) -> tuple[float, float]:
-    """Return the share of beams that end on the mapped area, and the share of these that fit."""
+    """Return the share of the endpoints on the mapped area, and the share of these that fit."""
     mapped, fitting = int(np.count_nonzero(classes)), int(np.count_nonzero(classes == _FITS))
     return mapped / max(classes.size, 1), fitting / max(mapped, 1)
 
 
 def _ramp(value: float, none: float, full: float) -> float:
-    """Return 0 up to `none`, 1 from `full` on, and linear values in between."""
+    """Return 0 for values up to `none`, 1 for values from `full` on, and linear values in between."""
     return 1.0 if value >= full else max(0.0, (value - none) / (full - none))

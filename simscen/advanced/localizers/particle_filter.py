@@ -23,23 +23,19 @@ from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNINFORMATIVE_SHARE_OF_HIT = 0.4
-"""Likelihood of a beam that ends outside the map, relative to a hit.
-
-About the geometric mean of the likelihoods of all beams of a well localized robot. Leaving such beams out instead would
-favor poses from which more beams leave the map.
-"""
+"""Likelihood of a beam that ends outside the map, relative to a hit: about the mean of a well localized robot."""
 MAX_WALL_THICKNESS_M = 1.0
 """Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
-    """`likelihood_field_prob` raised to a power below 1, because the errors of neighboring beams are similar."""
+    """Sensor model `likelihood_field_prob`, raised to a power because the errors of neighboring beams are similar."""
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,
         exponent: float = 1.0, unmapped: npt.NDArray[np.bool_] | None = None,
     ) -> None:  # fmt: skip
-        """Create the model. `unmapped`, in the order of `field.table`, marks cells where beams carry no information."""
+        """Create the model. `unmapped` marks cells of `field.table` in which beams carry no information."""
         super().__init__(field, z_hit, z_rand, sigma_hit, skipping)
         self.exponent, self._unmapped = exponent, unmapped
 
@@ -55,7 +51,7 @@ def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     """Return the mask (rows + 2, columns + 2) of the cells outside the mapped area, with a border of one cell.
 
     These are the unknown cells whose nearest known cell is free, and those farther than MAX_WALL_THICKNESS_M from all
-    known cells, which may be unmapped rooms. The other unknown cells are the inside of walls, which no beam reaches.
+    known cells. The other unknown cells are the inside of walls.
     """
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
@@ -75,16 +71,14 @@ def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
 ODOMETRY_SHARE = 0.2
 """Share of the particles that follow odometry if odometry and scan matching disagree."""
 FIRST_SCAN_WEIGHT = 0.2
-"""Weight of the first scan after an initial pose: the exponent of the scan's likelihood.
-
-The weight grows to 1 until the robot has driven the distance `settling_distance` (a parameter of the localizer).
-"""
+"""Weight (exponent of the likelihood) of the first scan after an initial pose. It grows to 1 over the parameter
+`settling_distance`, because early scans of a single room fit many poses."""
 CERTAIN_FIT = 0.9
 """Minimum share of a scan's beams that fit the map for the filter to be certain."""
 
 
 class ScanMatchingParticleFilter(ParticleFilter):
-    """Particle filter that can move by scan matching, and that gives scans less weight where the map is outdated."""
+    """Particle filter that can move by scan matching, and that reduces the weight of scans if the map is outdated."""
 
     _spec: ScanMatchingAmcl
 
@@ -103,7 +97,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
             self._augmented_mcl = AugmentedMcl(0.0, 0.0)
         self._map_weight, self._is_one_cluster = 1.0, False
         self.fitting_share = 0.0
-        """Share of the last scan's beams that fit the map at the particles, of those that end on the mapped area."""
+        """Share of the beams of the last scan that fit the map, among those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
         self._scan_weight = FIRST_SCAN_WEIGHT if has_prior else 1.0
 
@@ -119,12 +113,10 @@ class ScanMatchingParticleFilter(ParticleFilter):
         super().move(delta)
 
     def follow(self, step: Step, delta: Pose2) -> None:
-        """Move each particle by its own sample of a motion from scan matching.
+        """Move each particle by its own sample of the motion `step` from scan matching.
 
-        `step` is the motion from scan matching, and `delta` the motion that odometry measured in the same time, both in
-        the base frame. If they disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some
-        particles then follow odometry, and later scans show which particles fit the map. If the map does not show the
-        surroundings, all particles follow scan matching.
+        `delta` is the same motion by odometry, in the base frame. If both disagree, the share ODOMETRY_SHARE of the
+        particles follows odometry, unless the last scan was ignored.
         """
         self._settle(delta)
         poses = sample_step(self.particles.poses, step, self._rng)
@@ -134,16 +126,12 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
-        """Increase the weight of scans by the motion `delta`, up to 1 after `settling_distance`.
-
-        One scan of a room fits many poses; scans of several rooms together do not. Early scans therefore count less
-        than the initial pose. Turns count as distance, too.
-        """
+        """Increase the weight of scans by the motion `delta`; it reaches 1 after `settling_distance`."""
         if self._scan_weight < 1.0:
             self._scan_weight = min(1.0, self._scan_weight + step_length(delta) / self._spec.settling_distance)
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
-        """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
+        """Distribute all particles around `poses` (k, 3) with the `shares` (k,). Return the new pose and covariance."""
         count = self._bound.max_samples
         drawn = poses[self._rng.choice(len(poses), count, p=shares)] + self._rng.normal(0.0, CERTAIN_STD, (count, 3))
         drawn[:, 2] = wrap_array(drawn[:, 2])
@@ -153,7 +141,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         return summarize(self.particles, self._sensor.peak_power)
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return the weight of a scan, which is the exponent of its likelihood, and the beams to use."""
+        """Return the weight of a scan (exponent of its likelihood), and the beams to use."""
         if self._trust is not None and len(beams.ends):
             self._map_weight, self.fitting_share, used_hits = self._trust.weight(self.particles, beams)
             if used_hits is not None and self._map_weight > 0:

@@ -1,4 +1,4 @@
-"""Prior of a pose: the last certain pose, propagated by the motion that scans and wheels have measured since."""
+"""Prior probability of poses: the last certain pose, propagated by the motion that scans and wheels have measured."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,32 +13,24 @@ from simscen.stack.localizers.particles import pose_errors
 CERTAIN_STD = (0.1, 0.1, 0.05)
 """Standard deviations (m, m, rad) of a certain pose."""
 ODOMETRY_DRIFT = (0.03, 0.01)
-"""Drift of odometry in m and rad per meter driven, if scans do not show the motion."""
+"""Drift of odometry in m and rad per meter driven, if scan matching fails."""
 MAX_SLIP_DIFFERENCE = 0.1, 0.5
-"""Largest difference that slip can cause between a step measured by scans and by wheels: in m, and as a share of the
-wheels' step.
-
-If both limits are exceeded, the scans show people who walk next to the robot. Slipping wheels differ by at most 40 %,
-except if they spin while the robot stands. The scans then show no motion anyway.
-"""
+"""Largest difference that wheel slip can cause between motions by scan matching and by odometry: in m, and as a share
+of the motion by odometry. If both limits are exceeded, the scans show people who walk next to the robot."""
 KNOWN_STEP_STD_M = 0.012
-"""Standard deviation of a step above which the wheels determine the step, and not the scans.
-
-An example is a step along a corridor that looks the same everywhere. Wheel slip lasts for some time, so that the errors
-of such steps add up in one direction.
-"""
-
+"""Standard deviation of a step above which odometry and not the scans determined it, as in a corridor that looks the
+same everywhere. The excess counts as a systematic error."""
 NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Process noise 0 for `propagate_covariance`."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedMotion:
-    """Motion from one correction to the next.
+    """Motion between two successive scans.
 
-    disagreement:  pose by scan matching relative to the pose by odometry, if they disagree; otherwise zero
-    step:          motion by scan matching; None if scans do not show the motion
-    was_carried:   whether the robot was probably carried, because the last scan hardly overlaps with earlier ones;
-                   None if unknown
+    disagreement:  motion by scan matching relative to the motion by odometry, if they disagree; otherwise zero
+    step:          motion by scan matching; None if scan matching failed
+    was_carried:   whether the robot was carried elsewhere, because the scans hardly overlap; None if unknown
     """
 
     disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)
@@ -47,7 +39,7 @@ class ObservedMotion:
 
     @property
     def is_scene_moving(self) -> bool:
-        """Whether scans and wheels differ by more than slip can cause, because the scans show moving objects."""
+        """Whether scans and wheels differ by more than MAX_SLIP_DIFFERENCE, because the scans show moving objects."""
         apart = math.hypot(self.disagreement.x, self.disagreement.y)
         if self.step is None or apart < MAX_SLIP_DIFFERENCE[0]:
             return False
@@ -55,9 +47,9 @@ class ObservedMotion:
         return apart > MAX_SLIP_DIFFERENCE[1] * math.hypot(wheels.x, wheels.y)
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
-        """Return the errors in m and rad of this motion that have the same direction as those of the next motions.
+        """Return the systematic errors of this motion in m and rad: those with the same direction in many steps.
 
-        `meters` is the distance driven as returned by `traveled`, in which rotations count as well.
+        `meters` is the distance driven by `scan_memory.traveled`.
         """
         if self.step is None:
             return ODOMETRY_DRIFT[0] * meters, ODOMETRY_DRIFT[1] * meters
@@ -70,11 +62,11 @@ class ObservedMotion:
 class PosePrior:
     """A certain pose and the errors of the motion since then.
 
-    pose:              certain pose in the map
-    base:              pose of the base at the same time in a slowly drifting frame: that of scan matching or odometry
+    pose:              certain pose in the map frame
+    base:              the robot's pose at the same time in the drifting frame of scan matching or odometry
     std (3,):          standard deviations of `pose` in m, m and rad
-    covariance (3, 3): covariance of the motion since then in the drifting frame, only for independent errors
-    systematic_error:  sum of the other errors, which have the same direction in all steps, in m and rad
+    covariance (3, 3): covariance of the motion since then, in the drifting frame, from independent errors
+    systematic_error:  sum of the systematic errors of the motion since then, in m and rad
     """
 
     pose: Pose2
@@ -85,11 +77,14 @@ class PosePrior:
 
     @classmethod
     def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = CERTAIN_STD) -> "PosePrior":
-        """Return the prior of a pose (3,) with standard deviations `std`."""
+        """Return the prior of a `pose` (3,) that is certain now, with standard deviations `std` in m, m and rad."""
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
     def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
-        """Return the prior after `motion` from `before` to `base`, over `meters` as returned by `traveled`."""
+        """Return the prior after `motion` from the pose `before` to the pose `base` in the drifting frame.
+
+        `meters` is the distance driven by `scan_memory.traveled`.
+        """
         meter, rad = motion.systematic_error(meters)
         meter, rad = self.systematic_error[0] + meter, self.systematic_error[1] + rad
         noise = NO_NOISE if motion.step is None else rotate_covariance(motion.step.covariance, before.yaw)
@@ -97,11 +92,14 @@ class PosePrior:
         return replace(self, covariance=covariance, systematic_error=(meter, rad))
 
     def expected(self, base: Pose2) -> Array:
-        """Return the pose (3,) in the map of a robot at `base`, without any drift since the certain pose."""
+        """Return the pose (3,) in the map of a robot at `base` in the drifting frame, as if nothing had drifted."""
         return np.array(self.pose.compose(self.base.between(base)))
 
     def negative_log_likelihood(self, poses: Array, base: Pose2) -> Array:
-        """Return the negative log-likelihoods (n,) of `poses` (n, 3) of a robot at `base`; 0 at the expected pose."""
+        """Return the negative log-likelihoods (n,) of map `poses` (n, 3) for a robot at `base` in the drifting frame.
+
+        The value at the expected pose is 0.
+        """
         frame = rotation_matrix(self.pose.yaw - self.base.yaw)
         meter, rad = self.systematic_error
         std = np.square(self.std + np.array((meter, meter, rad)))

@@ -1,6 +1,7 @@
-"""Relocalization: detects that the particle filter is lost, and searches the map for the robot.
+"""Relocalization: detects that the particle filter is lost, and searches the map for the robot's pose.
 
-All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores are those of GlobalSearch.score.
+All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores are those of GlobalSearch.score. The lead of
+a pose is the difference between its score and the next best one.
 """
 
 import math
@@ -19,53 +20,48 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.particles import pose_errors
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
-"""The robot may be lost if the mean share of fitting beams in this many scans is below the second value."""
+"""The robot may be lost if the mean share of fitting beams in this many scans is below MIN_FITTING_SHARE."""
 MIN_MAPPED_SHARE = 0.6
-"""Share of the beams that must end on the mapped area for the fit of a scan to be known."""
+"""Minimum share of the beams of a scan that end on the mapped area. With fewer, the fit of the scan is unknown."""
 SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 """Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
 MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
-"""A robot without initial pose gets a pose if the score of this pose, over at least MIN_LENGTH_M driven, exceeds that
-of any other pose by MIN_LEAD."""
+"""Minimum distance driven and minimum lead of the pose that a robot without initial pose gets."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
-"""A robot that had a pose gets another one if two searches agree. The score must be above MIN_SCORE, and exceed that of
-any other pose by MIN_LEAD and that of the current pose by MIN_GAIN."""
+"""Minimum difference to the score of the current pose, and minimum score, of a pose that replaces it. The lead must be
+MIN_LEAD, and two searches must agree."""
 CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
-"""Distance driven after which poses near the current pose are searched, unless its score is above CERTAIN_SCORE."""
+"""Distance driven between two searches near the current pose, and the score of the current pose that makes a search
+unnecessary."""
 MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
-"""The estimate is moved to a nearby pose if the score of that pose is at least MIN_NEAR_SCORE, exceeds that of any
-other pose by MIN_LEAD, and exceeds that of the estimate by MIN_GAIN. Above CERTAIN_SCORE, CERTAIN_GAIN suffices.
-
-Scores are reduced by SCORE_SCALE times the negative log-likelihood of the drift since the last certain pose, because in
-a changed corridor a pose one meter away may have a better score by chance.
-"""
+"""Minimum score of a nearby pose that replaces the current one. The lead must be MIN_LEAD, and the gain MIN_GAIN, or
+CERTAIN_GAIN above CERTAIN_SCORE."""
 MAX_REDUCTION = 0.1
-"""Maximum reduction of a score, because the last certain pose may be wrong."""
+"""Maximum reduction of the score of a pose to which the drift since the last certain pose would be unlikely."""
 MIN_LOG_RATIO = 3.0
-"""Log-likelihood ratio by which another pose must exceed the current one in the first `settling` m of Relocalizer."""
+"""Minimum log-likelihood ratio of another pose to the current one in the first `settling` m of Relocalizer."""
 SAME_POSE = 0.7, 0.3
 """Maximum difference (m, rad) of the poses found by two searches that agree."""
 AGREEMENT_LENGTH_M = 2.0
-"""Distance driven over which searches must agree."""
+"""Minimum distance driven between two searches that agree."""
 UNMAPPED_DISTANCE_M, RETURN_SCORE, RETURN_LEAD = 5.0, 0.9, 0.1
-"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score and
-lead exceed these values, which are higher than usual because unmapped rooms often resemble mapped ones."""
+"""Distance driven outside the mapped area after which the map is searched, and minimum score and lead of a pose found
+in this search. They are higher because unmapped rooms often resemble mapped ones."""
 SCORE_SCALE = 0.02
-"""Difference of two scores for which one pose is e times as likely as the other, and gets e times as many particles."""
+"""Difference of scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 UNOBSERVED_MOTION = ObservedMotion()
-"""The motion if there is no scan matching."""
+"""The motion without scan matching."""
 
 
 class Relocalizer:
     """Compares scans with the map at the estimated pose, and searches the whole map if they do not fit.
 
-    The search uses the scans of the last meters together, which distinguishes rooms that look alike. A robot without
-    initial pose has particles at all poses that fit until one of them is clearly the best. A robot with an initial pose
-    gets another pose only if that pose is clearly better.
+    The search uses the scans of the last meters together. A robot without initial pose has particles at all poses that
+    fit until one of them is clearly the best. A robot with a pose gets another one only if that is clearly better.
     """
 
     def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
-        """Create the relocalizer. For the first `settling` m driven, it also searches near the initial `estimate`."""
+        """Create the relocalizer. For the first `settling` m driven, it also searches near the pose of `estimate`."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._has_pose, self._estimate, self._settling = estimate.pose is not None, estimate, settling
         self._initial: PosePrior | None = None
@@ -81,13 +77,15 @@ class Relocalizer:
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
         motion: ObservedMotion = UNOBSERVED_MOTION, fitting_share: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
-        """Return poses (k, 3) where the robot may be, with their shares (k,); None if the estimate should be kept.
+        """Return poses (k, 3) where the robot may be, and their shares of the particles (k,).
 
-        base:           pose of the robot when the scan was taken, in the drifting frame of scan matching or odometry
-        estimated:      pose of the robot in the map
+        None if the estimate should be kept.
+
+        base:           pose of the robot at the time of the scan, in the drifting frame of scan matching or odometry
+        estimated:      estimated pose of the robot in the map
         limits:         minimum and maximum range of beams to use, in m
         motion:         motion since the last scan
-        fitting_share:  share of the beams that fit at the estimated pose, if it is already known
+        fitting_share:  share of the beams that fit the map at the estimated pose; None if not computed yet
         """
         ends = self.add_scan(scan, base, limits, motion)
         if not len(ends):
@@ -111,12 +109,12 @@ class Relocalizer:
         return self._search_map(self._memory.view_from(base), base, current)
 
     def add_scan(self, scan: Scan, base: Pose2, limits: tuple[float, float], motion: ObservedMotion) -> Plane:
-        """Add a scan without checking the pose. Return its endpoints in the base frame. Arguments as in `update`."""
+        """Add a scan without checking the pose. Return the endpoints in the base frame. Arguments as in `update`."""
         self._propagate(base, motion)
         return self._memory.add(scan, base, *limits)
 
     def _propagate(self, base: Pose2, motion: ObservedMotion) -> None:
-        """Propagate the priors of the pose, or forget them if the robot was carried."""
+        """Propagate the pose priors by a motion to `base`, or forget them if the robot was carried."""
         last, self._last = self._last, base
         if last is None:
             if self._estimate.pose is not None:
@@ -137,11 +135,9 @@ class Relocalizer:
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the most likely pose, given the initial pose and all scans since; None if the estimate is near it.
+        """Return the most likely pose, given the initial pose and all scans since; None if `current` is nearly as good.
 
-        In a room whose furniture was moved, one scan may fit a wrong pose, and the next scans, which show the same,
-        confirm it. All scans together, and the condition that beams cross only free space, often show that this pose is
-        wrong. If the map shows little of the surroundings, many poses fit by chance, and only the expected pose counts.
+        If few beams end on the mapped area, many poses fit by chance, and only the expected pose is considered.
         """
         if not self._memory.length:
             return None
@@ -164,7 +160,7 @@ class Relocalizer:
         return poses[best : best + 1], np.ones(1)
 
     def _search_nearby(self, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return a better pose near the current one, e.g. after drift outside the map; None if there is none."""
+        """Return a better pose near the `current` one (1, 3), e.g. after drift; None if there is none."""
         if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
             return None
         self._since_check, view = 0.0, self._memory.view_from(base)
@@ -187,19 +183,19 @@ class Relocalizer:
         return poses[order], reduced[order]
 
     def _reduce_scores(self, scores: Array, poses: Array, base: Pose2) -> Array:
-        """Return the scores (n,) of `poses` (n, 3), reduced by how unlikely the drift to them is."""
+        """Return the scores (n,) of `poses` (n, 3), reduced by the negative log-likelihood of the drift to them."""
         if self._certain is None:
             return scores
         return scores - np.minimum(SCORE_SCALE * self._certain.negative_log_likelihood(poses, base), MAX_REDUCTION)
 
     def _accept(self, poses: Array, base: Pose2) -> tuple[Array, Array]:
-        """Return `poses` (1, 3) with all particles, and mark it as certain."""
+        """Return a pose (1, 3) with the share 1 of the particles, and make it the last certain pose."""
         self._fitting_shares.clear()
         self._certain = PosePrior.at(poses[0], base)
         return poses, np.ones(1)
 
     def _update_doubt(self) -> bool:
-        """Return whether recent scans do not fit. When this begins, forget scans that may be from another place."""
+        """Return whether recent scans do not fit. When this begins, forget older scans and search at once."""
         is_in_doubt = (
             len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE
         )
@@ -217,11 +213,11 @@ class Relocalizer:
 
     @property
     def _has_left_map(self) -> bool:
-        """Whether the robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
+        """Whether the robot drove out of the mapped area, and was not carried."""
         return self._is_unmapped and self._certain is not None
 
     def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the poses that fit; for a robot that had a pose, only a pose that two searches agree on, or None."""
+        """Return the poses that fit, and their shares. If the robot has a pose, two searches must agree on a pose."""
         poses, scores = self._search.search(view)
         last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
         if not len(poses):
@@ -250,11 +246,11 @@ class Relocalizer:
 
 
 def _leads(scores: Array, lead: float) -> bool:
-    """Return whether the first of the scores exceeds the second by `lead`."""
+    """Return whether the first of the scores (n,) exceeds the second by `lead`."""
     return len(scores) == 1 or bool(scores[0] - scores[1] > lead)
 
 
 def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -> bool:
-    """Return whether the motion of the base leads from the first pose to the second."""
+    """Return whether the motion from `first_base` to `second_base` leads from `first` to `second` (SAME_POSE)."""
     difference = first.compose(first_base.between(second_base)).between(second)
     return math.hypot(difference.x, difference.y) < SAME_POSE[0] and abs(difference.yaw) < SAME_POSE[1]

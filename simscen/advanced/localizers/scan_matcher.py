@@ -1,8 +1,7 @@
-"""Scan matching: the motion between two scans, with odometry as the initial guess.
+"""Scan matching: the motion between two scans, by point-to-line ICP with odometry as the initial guess.
 
-Source: Censi, An ICP variant using a point-to-line metric (ICRA 2008). A scan is matched with the scans of the last
-meters. The guess is also a measurement (Gauss-Newton with a prior), so that odometry decides where scans cannot, e.g.
-along a corridor that looks the same everywhere.
+Source: Censi, An ICP variant using a point-to-line metric (ICRA 2008). A scan is matched with several earlier scans.
+The guess is also a prior: along a corridor that looks the same everywhere, odometry determines the motion.
 """
 
 import cmath
@@ -19,26 +18,25 @@ from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
 from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 BASELINE_M = 0.15
-"""Distance between the two points whose line gives the normal of the point between them."""
+"""Approximate length of the line between two neighbors of a point. The line determines the normal of the point."""
 MAX_BEND_M = 0.05
 """Maximum distance of the point from this line."""
 MAX_LINE_M = 0.5
-"""Maximum length of this line, at least four beam spacings. Points farther apart are not on the same surface."""
+"""Maximum length of this line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
 MAX_RANGE_M = 20.0
-"""Points farther away are not used."""
-
+"""Range beyond which points are ignored."""
 _NONE: Plane = np.empty(0, dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Points (n,) on surfaces, and the unit normals (n,) there, all as x + iy."""
+    """Points (n,) on surfaces and their unit normals (n,), as x + iy."""
 
     points: Plane
     normals: Plane
 
     def placed(self, pose: Pose2) -> "Surface":
-        """Return the surface in the parent frame of `pose`."""
+        """Return the surface, transformed from the frame at `pose` to the parent frame."""
         turn = cmath.rect(1.0, pose.yaw)
         return Surface(self.points * turn + complex(pose.x, pose.y), self.normals * turn)
 
@@ -51,7 +49,7 @@ class Surface:
 
 
 def extract_surface(scan: Scan) -> Surface:
-    """Return the hits of a scan in the base frame, without those at edges, where the normal is unknown."""
+    """Return the hits of a scan in the base frame, without those at edges of surfaces, which have no normal."""
     ranges = scan.ranges
     hit = ((ranges > scan.range_min) & (ranges < min(scan.range_max, MAX_RANGE_M))).nonzero()[0]
     if len(hit) < 3:
@@ -73,71 +71,62 @@ def extract_surface(scan: Scan) -> Surface:
 REFERENCE_SCANS = 4
 """Number of earlier scans that a new scan is matched with."""
 REFERENCE_POINTS, SCAN_POINTS = 120, 90
-"""Maximum number of points of each of these scans, and of the new scan."""
+"""Maximum number of points of each earlier scan, and of the new scan."""
 GATES_M, MAX_ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
-"""Maximum distance of a point from its nearest neighbor in successive iterations, and maximum number of iterations."""
+"""Maximum distances of a point from its nearest neighbor in successive iterations, and maximum number of iterations."""
 LAST_GATE_STEP, CONVERGED_STEP = (0.02, 0.01), (0.002, 0.001)
-"""Changes of the pose (m, rad) by an iteration below which the last of GATES_M follows, and the match ends."""
+"""Changes of the pose (m, rad) in an iteration below which the last of GATES_M is used next, and the match ends."""
 OUTLIER_DISTANCE_M, OUTLIER_RATIO = 0.1, 1.5
-"""A point has a quarter of its weight (Geman-McClure) if its distance from its neighbor is OUTLIER_DISTANCE_M, or
-OUTLIER_RATIO times the root mean square of all distances if that is more.
-
-If most points fit, a person who walks along does not change the match. If none fits, the wheels have slipped, and all
-points must keep their weight.
-"""
+"""Scale of the Geman-McClure weights: the larger one of OUTLIER_DISTANCE_M, and OUTLIER_RATIO times the root mean
+square of all distances. A point at this distance from its neighbor has a quarter of the full weight."""
 POINT_STD_M = 0.03
 """Standard deviation of the distance of points from surfaces, including correlations."""
 MIN_NORMAL_COSINE = 0.7
-"""Minimum cosine of the angle between the normals of two points on the same surface."""
+"""Minimum cosine of the angle between the normals of two matched points."""
 MIN_MATCHED_POINTS = 12
-GUESS_STD = (0.15, 0.02, 0.15, 0.03)
-"""Standard deviation of the guess: a share of the distance plus m, and a share of the rotation plus rad."""
+"""Minimum number of matched points; with fewer, the match fails."""
+GUESS_STD_PER_M, GUESS_STD_M = 0.15, 0.02
+"""Standard deviation of the translation of the guess: a part per meter of translation, and a constant."""
+GUESS_STD_PER_RAD, GUESS_STD_RAD = 0.15, 0.03
+"""Standard deviation of the rotation of the guess: a part per radian of rotation, and a constant."""
 MAX_BEAM_ANGLE_RAD = 0.04
-"""Maximum angle between two beams. With a larger angle, the normals of surfaces are unknown."""
-AGREEMENT = (0.03, 0.1, 0.03, 0.1)
-"""Maximum difference of a match that agrees with odometry: m plus a share of the distance, rad plus one of the turn."""
+"""Maximum angle between two beams. Scans with larger angles are not matched."""
+AGREEMENT_PER_M, AGREEMENT_M = 0.1, 0.03
+"""Maximum difference between the translations by odometry and by an agreeing match: per meter, and a constant."""
+AGREEMENT_PER_RAD, AGREEMENT_RAD = 0.1, 0.03
+"""Maximum difference between the rotations by odometry and by an agreeing match: per radian, and a constant."""
 MIN_OVERLAP = 0.3
-"""Share of a scan's points that earlier scans also showed, below which the match is rejected."""
+"""Minimum share of the points of a scan that match earlier scans. With less, the match fails."""
 MAX_OVERLAP_STEP = 0.75, 0.75
-"""Longest step between two scans (m, rad) after which an overlap below MIN_OVERLAP means that the robot was carried.
-
-After a longer step, e.g. around a corner between sparse scans, the scans may share little anyway.
-"""
+"""Longest step between two scans (m, rad) after which little overlap means that the robot was carried elsewhere."""
 COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
-"""Factor on the covariance of the least-squares solution, and variances (m², m², rad²) added to it.
-
-They are fitted to observed errors: consecutive scans share the errors of their surfaces.
-"""
+"""Factor on the covariance of the least-squares solution, and variances (m², m², rad²) that are added."""
 
 
 Symmetric = tuple[float, float, float, float, float, float]
-"""Upper triangle of a symmetric matrix (3, 3) by rows. A tuple is faster than an array of this size."""
+"""Upper triangle of a symmetric matrix (3, 3) by rows."""
 Equations = tuple[tuple[float, float, float, float], ...]
 """Normal equations of x, y and yaw, right-hand side last, in units of 1 / POINT_STD_M²."""
 
 
 class _Reference:
-    """Surfaces of earlier scans, with which a new scan is matched.
+    """Surfaces of earlier scans, with which a new scan is matched."""
 
-    The nearest neighbors are found by comparing all pairs of points in one matrix product. For so few points, this
-    takes less time than building a k-d tree.
-    """
-
-    def __init__(self, frames: Iterable[Surface], middle: complex) -> None:
-        """Combine scans. Distances are computed relative to `middle`, near the robot, to keep rounding errors small."""
-        seen = list(frames)
-        self._points = np.concatenate([frame.points for frame in seen])
-        self._normals = np.concatenate([frame.normals for frame in seen])
+    def __init__(self, surfaces: Iterable[Surface], middle: complex) -> None:
+        """Combine surfaces. `middle` is a point near the robot, used as the origin to keep rounding errors small."""
+        combined = list(surfaces)
+        self._points = np.concatenate([surface.points for surface in combined])
+        self._normals = np.concatenate([surface.normals for surface in combined])
         self.overlap = 0.0
-        """Share of the last matched scan's points that have a neighbor in the earlier scans."""
+        """Share of the points of the last scan that have a neighbor in the earlier scans."""
         self._middle, around = middle, self._points - middle
-        # The b nearest to a has the greatest a·b - b²/2.
+        # All pairs in one product, faster than a k-d tree here: the b nearest to a has the greatest a·b - b²/2.
         self._compared = np.empty((3, len(around)))
         self._compared[0], self._compared[1] = around.real, around.imag
         self._compared[2] = (around * around.conj()).real * -0.5
 
     def equations(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
-        """Return the normal equations of a scan, `own` in the base frame, for a base at `pose`.
+        """Return the normal equations of the scan `own` in the base frame, for a base at `pose`.
 
         None if too few points have a neighbor within `gate` m with a similar normal.
         """
@@ -177,12 +166,12 @@ class Step:
     covariance: Array
 
     def agrees(self, odometry: Pose2) -> bool:
-        """Return whether odometry measured nearly the same motion."""
+        """Return whether the motion by odometry is nearly the same."""
         difference = odometry.between(self.delta)
         distance, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
         return (
-            math.hypot(difference.x, difference.y) < AGREEMENT[0] + AGREEMENT[1] * distance
-            and abs(difference.yaw) < AGREEMENT[2] + AGREEMENT[3] * turned
+            math.hypot(difference.x, difference.y) < AGREEMENT_M + AGREEMENT_PER_M * distance
+            and abs(difference.yaw) < AGREEMENT_RAD + AGREEMENT_PER_RAD * turned
         )
 
 
@@ -204,38 +193,42 @@ def sample_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
 class ScanMatcher:
     """Estimates the motion of the base by matching successive scans of one lidar.
 
-    `pose` is that of the base in a frame that begins at the first scan and drifts slowly.
+    `pose` is the pose of the base in a frame that begins at the first scan and drifts slowly.
     """
 
     def __init__(self) -> None:
-        self._frames: deque[Surface] = deque(maxlen=REFERENCE_SCANS)
+        self._surfaces: deque[Surface] = deque(maxlen=REFERENCE_SCANS)
         self.pose = Pose2(0.0, 0.0, 0.0)
         self.overlap: float | None = None
-        """Share of the last scan's points that earlier scans also showed; None if unknown or after a long step."""
+        """Share of the points of the last scan that match earlier scans; None if unknown or after a long step."""
 
     @property
     def was_carried(self) -> bool | None:
-        """Whether the robot was carried elsewhere, because the last scan overlaps little; None if unknown."""
+        """Whether the robot was carried elsewhere, because the last scan hardly overlaps; None if unknown."""
         return None if self.overlap is None else self.overlap < MIN_OVERLAP
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
-        """Return the motion of the base since the last scan; None if scans do not show it. `guess` is by odometry."""
+        """Return the motion of the base since the last scan; None if the match fails.
+
+        `guess` is the motion by odometry.
+        """
         self.overlap = None
         if abs(scan.angle_increment) > MAX_BEAM_ANGLE_RAD:
             self.pose = self.pose.compose(guess)
             return None
         seen = extract_surface(scan)
-        found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
+        is_possible = len(seen.points) and any(len(surface.points) for surface in self._surfaces)
+        found = self._matched(seen, guess) if is_possible else None
         if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
-        self._frames.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
+        self._surfaces.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
         return Step(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
     def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
-        """Return the pose in the matcher's frame, and its covariance in units of POINT_STD_M²."""
+        """Return the pose in the frame of `self.pose`, and its covariance in units of POINT_STD_M²."""
         guessed = pose = self.pose.compose(guess)
-        reference, own = _Reference(self._frames, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
+        reference, own = _Reference(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
         (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
         for _ in range(MAX_ITERATIONS):
             if (equations := reference.equations(own, pose, GATES_M[gate])) is None:
@@ -260,11 +253,10 @@ class ScanMatcher:
 
 
 def _prior_information(guess: Pose2) -> tuple[float, float]:
-    """Return the information of the guess about each coordinate and about the yaw, in units of 1 / POINT_STD_M²."""
-    distance, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
-    return (POINT_STD_M / (GUESS_STD[0] * distance + GUESS_STD[1])) ** 2, (
-        POINT_STD_M / (GUESS_STD[2] * turned + GUESS_STD[3])
-    ) ** 2
+    """Return the inverse variances of x and y, and of the yaw, of the guess, in units of 1 / POINT_STD_M²."""
+    position_std = GUESS_STD_PER_M * math.hypot(guess.x, guess.y) + GUESS_STD_M
+    yaw_std = GUESS_STD_PER_RAD * abs(guess.yaw) + GUESS_STD_RAD
+    return (POINT_STD_M / position_std) ** 2, (POINT_STD_M / yaw_std) ** 2
 
 
 def _inverse(matrix: Symmetric) -> Symmetric:
@@ -277,7 +269,7 @@ def _inverse(matrix: Symmetric) -> Symmetric:
 
 
 def _step_covariance(yaw: float, inverse: Symmetric) -> Array:
-    """Return the covariance (3, 3) of a step in the frame of a base with heading `yaw`."""
+    """Return the covariance (3, 3) of a step in the frame of a base with heading `yaw`; `inverse` as in `_matched`."""
     c, s, scale = math.cos(yaw), math.sin(yaw), COVARIANCE_SCALE * POINT_STD_M**2
     xx, xy, xa, yy, ya, aa = (scale * value for value in inverse)
     crossed = c * s * (yy - xx) + (c * c - s * s) * xy

@@ -18,17 +18,13 @@ from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import covariance_about
 
 CERTAIN_AFTER_UPDATES = 8
-"""The robot is certain of its pose after this many consecutive updates in which map, scans and wheels agreed."""
+"""Number of consecutive updates in which map, scan matching and odometry agreed, after which scans may be skipped."""
 
 
 class ScanMatchingAmclLocalizer(AmclLocalizer):
-    """AMCL with scan matching as its motion model, and optional relocalization and covariance estimation.
+    """AMCL with scan matching as motion model, and with optional relocalization and covariance estimation.
 
-    Extends the reference AMCL by its three hooks:
-
-    - `_correct`: moves the particles by the motion between two scans, and starts a relocalization if needed
-    - `_propagated_covariance`: uses the odometry errors that scan matching has observed
-    - `reset`: clears the state of these parts
+    `_correct` and `_propagated_covariance` are hooks of AmclLocalizer.
     """
 
     _spec: ScanMatchingAmcl
@@ -41,8 +37,8 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
     ) -> None:  # fmt: skip
         """Create the localizer.
 
-        search:     search for a lost robot, and map trust; None if only random particles find a lost robot
-        residuals:  measures how well the map explains a scan; None if the covariance is that of the particles alone
+        search:     arguments of Relocalizer; None if only random particles find a lost robot
+        residuals:  residuals for the covariance estimation; None if the covariance is that of the particles
         """
         self._search, self._residuals = search, residuals
         self._update_interval = spec.sure_update_interval if residuals is None else 1
@@ -62,13 +58,16 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         self._skipped = 0  # consecutive scans that were not compared with the map
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Update the pose with a scan, then search elsewhere on the map if the robot may be lost."""
+        """Update the pose with a scan, then search the map if the robot may be lost. `delta` is as in `_update`."""
         self._update(scan, odometry, delta)
         if self._relocalizer is not None:
             self._relocalize(self._relocalizer, scan, odometry)
 
     def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles, by scan matching if possible. Weigh them unless `sure_update_interval` skips the scan."""
+        """Move the particles, by scan matching if possible. Weigh them unless `sure_update_interval` skips the scan.
+
+        `delta` is the motion by odometry since the last update; None at the first one.
+        """
         matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
         was_carried = None if self._matcher is None else self._matcher.was_carried
         self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
@@ -104,7 +103,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
-        """Return the motion since the last update, from scans of the first lidar only; None if they do not show it."""
+        """Return the motion since the last update, from scans of the first lidar only; None if matching fails."""
         sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
             return None
@@ -129,11 +128,11 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
                 self._covariance_estimator.forget_poses()
 
     def _base(self, odometry: Pose2) -> Pose2:
-        """Return the robot's pose in the scan matcher's frame, which drifts less than odometry."""
+        """Return the robot's pose in the frame of the scan matcher, or `odometry` without scan matching."""
         if self._matcher is None or self._matched is None:
             return odometry
         return self._matcher.pose.compose(self._matched[1].between(odometry))
 
     def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after `delta`, by the observed odometry errors if they are estimated."""
+        """Return the covariance (3, 3) after the motion `delta` by odometry since the `last` correction."""
         return (self._covariance_estimator or self._motion).propagate(last.covariance, last.pose.yaw, delta)

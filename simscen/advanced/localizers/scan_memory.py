@@ -1,4 +1,4 @@
-"""Memory of the scans of the last meters, combined by odometry. Many scans identify a pose far better than one."""
+"""Memory of the scans of the last meters, combined by odometry."""
 
 import cmath
 import math
@@ -13,23 +13,22 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
 
 MEMORY_LENGTH_M = 6.0
-"""Distance driven after which scans are forgotten, because odometry has drifted too far since."""
+"""Distance driven after which scans are forgotten, because odometry drifts."""
 BEAMS_PER_SCAN = 40
 """Maximum number of beams of a scan that are stored."""
 MIN_SPACING_M = 0.2
 """Minimum distance driven between two scans that are stored."""
 METERS_PER_RAD = 0.5
-"""Distance that a rotation by 1 rad counts as, because the lidar also measures new surroundings while it turns."""
-
-
+"""Distance that a rotation by 1 rad counts as in `traveled` and `step_length`."""
 _BEAM_SHARES = np.array([[share] for share in (*PASSED_SHARES, 1.0)])
+"""Stored points along a beam, as shares of its length."""
 
 
 @dataclass(frozen=True, eq=False)
 class _StoredScan:
-    """A stored scan, taken at `odometry` after `driven` m as returned by `traveled`.
+    """A stored scan, taken at the pose `odometry` after `driven` m by `traveled`.
 
-    `points` (m, n) are points on the paths of the n beams and, in the last row, their endpoints, in the odometry frame.
+    `points` (m, n) are points along n beams in the odometry frame. The last row contains the endpoints.
     """
 
     odometry: Pose2
@@ -45,13 +44,13 @@ class ScanMemory:
 
     @property
     def length(self) -> float:
-        """Distance driven in m between the oldest and the newest scan, as returned by `traveled`."""
+        """Distance driven in m between the oldest and the newest scan, by `traveled`."""
         return self._scans[-1].driven - self._scans[0].driven if self._scans else 0.0
 
     def add(self, scan: Scan, odometry: Pose2, min_range: float, max_range: float) -> Plane:
-        """Add a scan with its ranges between the limits in m, unless it is closer than MIN_SPACING_M to the last one.
+        """Add a scan unless the last one is closer than MIN_SPACING_M. Return the endpoints (n,) in the base frame.
 
-        `odometry` is the pose of the base in any frame that drifts slowly. Return the endpoints (n,) in the base frame.
+        Only ranges between the limits in m are used. `odometry` is the pose of the base in any slowly drifting frame.
         """
         ends = endpoints_of(scan, min_range, max_range)
         if self._scans:
@@ -84,7 +83,7 @@ class ScanMemory:
 
 
 def step_length(step: Pose2) -> float:
-    """Return the length of a step in m; a rotation by 1 rad counts as METERS_PER_RAD."""
+    """Return the length of a step in m, in which a rotation by 1 rad counts as METERS_PER_RAD."""
     return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)
 
 
@@ -94,7 +93,7 @@ def traveled(before: Pose2, after: Pose2) -> float:
 
 
 def endpoints_of(scan: Scan, min_range: float, max_range: float) -> Plane:
-    """Return the endpoints (n,) in the base frame of at most BEAMS_PER_SCAN beams that hit something in this range."""
+    """Return the endpoints (n,) in the base frame of at most BEAMS_PER_SCAN beams with ranges between the limits."""
     min_range, max_range = max(scan.range_min, min_range), min(scan.range_max, max_range, MAX_RANGE_M)
     hit = ((scan.ranges > min_range) & (scan.ranges < max_range)).nonzero()[0]
     if len(hit) > BEAMS_PER_SCAN:

@@ -1,11 +1,7 @@
 """Extended Kalman filter of odometry and gyroscope that detects wheel slip in turns, with optional scan matching.
 
-If the wheels slip in a turn, the turn rates of wheels and gyroscope disagree. The wheels then also measure a wrong
-distance. A gyroscope cannot correct the distance, but scan matching can.
-
 Source: Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter. As in robot_localization, the turn
-rate is a state that both sensors measure. The bias of the gyroscope is also a state; it is measured while the robot
-stands still.
+rate is a state that both wheels and gyroscope measure. The bias of the gyroscope is also a state.
 """
 
 import math
@@ -35,7 +31,7 @@ from simscen.stack.localizers.dead_reckoning import initial_pose
 
 
 class ScanMatchingCorrection:
-    """Corrects the translation of dead reckoning between scans of one lidar. The heading is not changed."""
+    """Corrects the translation of dead reckoning between scans of one lidar, but not the heading."""
 
     def __init__(self, tick_rate: int) -> None:
         self._matcher = ScanMatcher()
@@ -44,14 +40,13 @@ class ScanMatchingCorrection:
         self._previous: tuple[str, Pose2] | None = None
 
     def add_pose(self, tick: int, pose: Pose2) -> None:
-        """Add a pose of dead reckoning, which includes all corrections so far."""
+        """Add a pose of dead reckoning in the map frame, which includes all corrections so far."""
         self._dead_reckoning.add(tick, Pose2(pose.x - self._x, pose.y - self._y, pose.yaw))
 
     def correction(self, scan: Scan) -> tuple[float, float]:
-        """Return the translation (x, y) in m, in the map frame, to add to dead reckoning since the last scan.
+        """Return the error (x, y) of dead reckoning since the last scan, as a translation in the map frame to add.
 
-        It is 0 if scans do not show the motion, or if they differ too much from dead reckoning (`Step.agrees`). In the
-        latter case, they probably show moving objects.
+        The result is 0 if scan matching fails or differs too much from dead reckoning (`Step.agrees`).
         """
         if not self._dead_reckoning:
             return 0.0, 0.0
@@ -74,17 +69,14 @@ class ScanMatchingCorrection:
 MAX_TURN_RATE_RAD_S = 100.0
 """Turn rate above which readings of the gyroscope are ignored as faulty."""
 MIN_RATE_STD_RAD_S = 0.002
-"""Minimum standard deviation of the wheels' turn rate, because of the resolution of encoders.
-
-Without it, wheels that stand still would exactly measure no rotation, even if the base is rotated.
-"""
+"""Minimum standard deviation of the turn rate of the wheels, because of the resolution of encoders."""
 _GYRO_MEASUREMENT = np.zeros((1, 7))
 """Measurement matrix of the gyroscope, which measures the sum of turn rate and bias."""
 _GYRO_MEASUREMENT[0, [RATE, BIAS]] = 1.0
 
 
 class SlipEkfLocalizer:
-    """Dead reckoning with the heading from odometry and gyroscope. It uses no map, so it drifts.
+    """Localizer by dead reckoning with wheels and gyroscope, without a map.
 
     If the turn rates of wheels and gyroscope disagree by more than their noise, the wheels slip. Then only the
     gyroscope determines the turn, and the uncertainty of the translation increases with the speed.
@@ -95,7 +87,7 @@ class SlipEkfLocalizer:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart at an estimate, with unknown bias of the gyroscope."""
+        """Restart at an estimate, with the initial uncertainty of the gyroscope's bias."""
         from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
 
         pose, covariance = initial_pose(estimate)
@@ -157,7 +149,7 @@ class SlipEkfLocalizer:
         return Pose2(x, y, wrap(yaw))
 
     def _step(self, pose: Pose2, seconds: float) -> WheelStep:
-        """Return the step of the wheels by `pose` in `seconds`, with the slip that was detected in it."""
+        """Return the step of the wheels by the motion `pose` in `seconds`, with the detected slip."""
         speed = math.hypot(pose.x, pose.y) / seconds
         without_slip = WheelStep(pose, seconds, speed)
         if not self._readings:
@@ -172,7 +164,7 @@ class SlipEkfLocalizer:
         return WheelStep(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
 
     def _measure(self, step: WheelStep) -> None:
-        """Estimate the turn rate from the wheels, unless they slip, and from the gyroscope."""
+        """Update the turn rate with the wheels, unless they slip, and with the gyroscope."""
         model = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
         predicted = model.f @ self._filter.x
         predicted[RATE] = step.pose.yaw / step.seconds
@@ -189,24 +181,25 @@ class SlipEkfLocalizer:
             self._speed = step.speed
 
     def _wheel_noise(self, step: WheelStep) -> float:
-        """Return the variance of the wheels' turn rate in (rad/s)²."""
+        """Return the variance of the turn rate of the wheels in (rad/s)²."""
         turned = step.length + abs(step.pose.yaw)
         return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_RATE_STD_RAD_S**2
 
     @property
     def _turn_rate(self) -> float:
-        """Mean reading of the gyroscope in this step, in rad/s."""
+        """Mean reading of the gyroscope since the last odometry message, in rad/s."""
         return sum(self._readings) / len(self._readings)
 
     @property
     def _gyro_noise(self) -> float:
+        """Variance of this mean in (rad/s)²."""
         return self._spec.gyro_noise**2 / len(self._readings)
 
     def _predict(self, model: StepModel, state: Array) -> None:
-        """Predict the filter to `state` (7,), with the covariance of the model."""
+        """Set the predicted `state` (7,), and predict the covariance by the model."""
         self._filter.F, self._filter.Q = model.f, model.q
         self._filter.predict(state)
 
     def _advance(self, state: Array) -> None:
-        """Replace filterpy's `predict_x`, for nonlinear motion: set the predicted `state`."""
+        """Replace filterpy's linear `predict_x` by setting the predicted `state`."""
         self._filter.x = state

@@ -10,26 +10,24 @@ from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 
 GATE = 15.1
-"""Ratio of squared innovation to its variance above which the wheels are assumed to slip. Without slip, one of 10 000
-steps exceeds it (chi-square)."""
+"""Ratio of the squared innovation to its variance above which the wheels slip: the chi-square quantile of 99.99 %."""
 WINDOW_S, WINDOW_GATE = 0.5, 24.0
-"""Time over which innovations are summed to detect small slip, and the gate of the sum. Without slip, one of a million
-sums exceeds it."""
+"""Time over which innovations are summed to detect slow slip, and the gate of the sum (quantile of 99.9999 %)."""
 RELEASE_S, RELEASE_GATE = 0.15, 4.0
-"""Time over which innovations are summed to detect the end of small slip, and the gate of the sum (95 % quantile)."""
+"""Time over which innovations are summed to detect the end of slow slip, and the gate of the sum (quantile of 95 %)."""
 
 
 class SlipDetector:
-    """Detects wheel slip by the difference between the turn rates of gyroscope and wheels."""
+    """Detects wheel slip by the innovation: the turn rate of the gyroscope minus that of the wheels."""
 
     def __init__(self) -> None:
         self._recent: deque[tuple[float, float, float]] = deque()  # rad, rad², seconds of each step
         self._slips_slowly = self._slips = False
 
     def update(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the seconds of slip until the end of this step that were not detected before; 0 without slip.
+        """Return the time in s that the wheels have slipped without being detected before; 0 without slip.
 
-        innovation:  turn rate of the gyroscope minus that of the wheels, in rad/s
+        innovation:  in rad/s
         noise:       variance of this step's innovation, in (rad/s)²
         bias:        variance of the gyroscope's bias, in (rad/s)², the same for all steps
         seconds:     duration of the step
@@ -42,7 +40,7 @@ class SlipDetector:
         return seconds if known else max(seconds, lasted)
 
     def _slow_slip(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the time in s over which the innovations have been summed if the sum exceeds its gate, otherwise 0."""
+        """Return the time in s over which innovations are summed if their sum exceeds the gate, otherwise 0."""
         self._recent.append((innovation, noise, seconds))
         window, gate = (RELEASE_S, RELEASE_GATE) if self._slips_slowly else (WINDOW_S, WINDOW_GATE)
         while len(self._recent) > 1 and sum(step[2] for step in self._recent) > window + 1e-9:
@@ -52,9 +50,9 @@ class SlipDetector:
 
 
 X, Y, YAW, RATE, BIAS, SLIP_X, SLIP_Y = range(7)
-"""Indices of the state: pose in the map, turn rate, gyroscope bias, longitudinal and lateral slip.
+"""Indices of the state (7,) of the EKF: pose in the map, turn rate, gyroscope bias, longitudinal and lateral slip.
 
-Slip is the speed that the wheels do not measure, as a share of the robot's possible speed (`WheelStep.speed`).
+Slip is the speed that the wheels do not measure, relative to the possible speed of the robot (`WheelStep.speed`).
 """
 SLIP_TIME_S = 1.0
 """Correlation time of slip."""
@@ -63,10 +61,9 @@ UNKNOWN_RATE_STD_RAD_S = 10.0
 SLIP_LEVER_M = 0.1
 """Distance from the base to the point around which a slipping robot rotates."""
 SLIP_STD = 0.7
-"""Standard deviation of slip in each direction while the wheels slip. It would be 0.58 for a uniform distribution up to
-the possible speed, and 1 if the robot always slipped at the possible speed."""
+"""Standard deviation of slip in each direction while the wheels slip; 0.58 would be a uniform distribution up to 1."""
 PUSHED_SPEED_M_S = 0.3
-"""Possible speed of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
+"""Minimum possible speed if the robot turns faster than its wheels measure, because a slope or a person moves it."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +72,9 @@ class WheelStep:
 
     pose:             motion, in the base frame at its start
     seconds:          duration
-    speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
+    speed:            possible speed: the highest plausible speed of the robot in m/s
     slips:            whether the wheels slip
-    undetected_slip:  time in s of slip until the end of the step that was not detected before
+    undetected_slip:  time in s that the wheels have slipped without being detected before
     """
 
     pose: Pose2
@@ -101,10 +98,10 @@ class StepModel:
 
 
 def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped: bool) -> StepModel:
-    """Return the model of turn rate, bias and slip from one step to the next.
+    """Return the model of turn rate, bias and slip for a step.
 
-    `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped` states whether the wheels slipped in the
-    step before.
+    `noise` is the variance of the turn rate of the wheels in (rad/s)². `slipped` states whether the wheels slipped in
+    the previous step.
     """
     f, q = np.eye(7), np.zeros((7, 7))
     f[RATE, RATE], q[RATE, RATE] = 0.0, UNKNOWN_RATE_STD_RAD_S**2 if step.slips else noise
@@ -119,10 +116,7 @@ def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped: bool) -> S
 
 
 def predict_state(state: Array, step: WheelStep) -> Array:
-    """Return the state (7,) after a step. Only the pose changes.
-
-    If the turn differs from that of the wheels, the translation is rotated by half of the difference.
-    """
+    """Return the state (7,) after a step, in which only the pose changes."""
     after: Array = state.copy()
     after[[X, Y]] += _translation(state, step)
     after[YAW] = math.remainder(state[YAW] + state[RATE] * step.seconds, 2 * math.pi)
@@ -130,7 +124,7 @@ def predict_state(state: Array, step: WheelStep) -> Array:
 
 
 def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> StepModel:
-    """Return the model of the pose for a step from `state` (7,); `predict_state` is the nonlinear function."""
+    """Return the model of the pose for a step from `state` (7,): the linearized `predict_state`."""
     dx, dy = _translation(state, step)
     c, s = _direction(state, step)
     f, q = np.eye(7), np.zeros((7, 7))
@@ -145,7 +139,7 @@ def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> StepModel:
 
 
 def _direction(state: Array, step: WheelStep) -> tuple[float, float]:
-    """Return the cosine and sine of the direction of a step."""
+    """Return the cosine and sine of the heading in the map frame along which a step is added."""
     along = float(state[YAW] + (state[RATE] * step.seconds - step.pose.yaw) / 2)
     return math.cos(along), math.sin(along)
 

@@ -1,11 +1,10 @@
 """Informed set: the region of near-shortest paths over a coarse grid, in which OMPL's planners sample.
 
 Source: Gammell et al., Informed RRT* (2014). Their informed set is an ellipse: the points whose straight distances from
-start and goal add up to at most a limit. Between walls, straight distances are too short. Both are therefore measured
-over a coarse grid here, so that planners find a path sooner.
+start and goal add up to at most a limit. Here, both distances are measured along paths over a coarse grid.
 
-Two blocks of the grid are connected if free cells touch across their border. A gap narrower than a block therefore
-stays open, and a wall thinner than a block stays closed.
+A block of the grid consists of several costmap cells. Two blocks are connected if free cells touch across their border.
+A gap narrower than a block therefore stays open, and a wall thinner than a block stays closed.
 """
 
 import math
@@ -22,26 +21,25 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
 BLOCK_M, COST_BLOCK_M = 0.2, 0.15
-"""Approximate size of the blocks, for lengths and for costs."""
+"""Approximate side length of the blocks, if lengths are distances and if they are costs."""
 MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
-"""Maximum number of blocks; Dijkstra's algorithm takes 10 ms for 40 000. Blocks of larger maps are larger, but not
-wider than the robot, because a wall inside a block would not separate its two sides."""
+"""Number of blocks above which blocks become larger, but not wider than the robot. Dijkstra's algorithm takes 10 ms for
+40 000 blocks."""
 PATH_SPACING_M = 0.45
-"""Distance between the points that `path` returns where there is ample clearance."""
+"""Distance between the points of `InformedSet.path` where there is ample clearance."""
 MAX_LEG_M = 30.0
 """Maximum distance between two of the `waypoints`."""
 Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
-    """Points on near-shortest paths from start to goal; `length` is the approximate length of the shortest path in m.
+    """Points on near-shortest paths from start to goal. `length` is the length of the shortest path in m.
 
-    From each block, a path can go to 16 neighbors (a king's and a knight's moves in chess), so that it is at most
-    2.8 % too long.
+    A path moves from block to block as a king or a knight in chess. It is therefore up to 2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
-        """Search the shortest paths. If `by_cost`, lengths are costs instead, in m of driving through free space."""
+        """Search the shortest paths. If `by_cost`, lengths are traversal costs, in m of driving through free space."""
         size, max_blocks = (COST_BLOCK_M, MAX_COST_BLOCKS) if by_cost else (BLOCK_M, MAX_BLOCKS)
         max_factor = max(1, int(2.0 * costs.inscribed / costs.resolution))
         min_factor = min(math.ceil(math.sqrt(costs.height * costs.width / max_blocks)), max_factor)
@@ -60,9 +58,10 @@ class InformedSet:
         self._inside = b"\1" * len(self._through)
 
     def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
-        """Restrict the set to paths that exceed the shortest path by at most the ratio `slack` and two block diagonals.
+        """Restrict the set to paths that are longer than the shortest path by at most the ratio `slack`.
 
-        `section` is the range of distances in m along such a path to keep. Replaces earlier restrictions.
+        Only points whose distances in m along the path are in the range `section` are kept. Replaces earlier
+        restrictions. The tolerance is two block diagonals.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
         is_inside = self._through <= self.length * (1.0 + slack) + tolerance
@@ -77,7 +76,7 @@ class InformedSet:
         return inside
 
     def lengths_through(self, points: Array) -> Array:
-        """Return the length or cost (n,) of the shortest path through each of the points (n, 2)."""
+        """Return the lengths (n,) in m of the shortest paths from start to goal through points (n, 2)."""
         return np.asarray(self._through[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
@@ -85,9 +84,9 @@ class InformedSet:
         return np.asarray(rows * self._width + columns)
 
     def path(self, costmap: CostmapView, ample_clearance: float) -> Array:
-        """Return the point with the most clearance in each block of the shortest path, (n, 2), without start and goal.
+        """Return points (n, 2) of the shortest path without start and goal: the one with the most clearance per block.
 
-        Where the clearance is at least `ample_clearance` m, only points that are PATH_SPACING_M apart are returned.
+        Where the clearance is at least `ample_clearance` m, only points PATH_SPACING_M apart are returned.
         """
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
@@ -102,15 +101,15 @@ class InformedSet:
         return points
 
     def waypoints(self, costmap: CostmapView) -> list[tuple[Point, float]]:
-        """Return points that divide a near-shortest path, at most MAX_LEG_M apart, each with its distance along it.
+        """Return points at most MAX_LEG_M apart on a near-shortest path, with their distances in m along the path.
 
-        A tree planner needs far fewer samples for several short legs than for one long path through many doors.
+        A tree planner needs far fewer samples for several short legs than for one long path.
         """
         legs = math.ceil(self.length / MAX_LEG_M) if math.isfinite(self.length) else 1
         return [self._point_with_most_clearance(costmap, self.length * number / legs) for number in range(1, legs)]
 
     def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
-        """Return the point with the most clearance at the distance `along` of the shortest paths, and `along`."""
+        """Return the point with the most clearance at the distance `along` m on near-shortest paths, and `along`."""
         near_shortest = self._through <= self.length + 2 * self._size
         blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size)).tolist()
         cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
@@ -154,10 +153,10 @@ def _as_blocks(free: Mask, factor: int) -> Mask:
 
 
 def _steps(blocks: Mask) -> dict[tuple[int, int], Mask]:
-    """Return the blocks from which each move (rows, columns) is possible; for 8 of 16 moves, the others are opposite.
+    """Return, for 8 of the 16 moves (rows, columns), the mask of blocks from which the move is possible.
 
-    A move to one of the four adjacent blocks is possible if free cells touch on both sides of the border. Other moves
-    are possible if the blocks between can be crossed in this way; a knight's move needs both ways around.
+    A move to an adjacent block is possible if free cells touch across the border. A diagonal move needs one way over
+    adjacent blocks, a knight's move needs both. The other 8 moves are the opposite ones.
     """
     right, up = np.zeros(blocks.shape[:2], dtype=bool), np.zeros(blocks.shape[:2], dtype=bool)
     right[:, :-1] = (blocks[:, :-1, :, -1] & blocks[:, 1:, :, 0]).any(axis=2)
@@ -187,7 +186,7 @@ def _shifted(mask: Mask, rows: int, columns: int) -> Mask:
 
 
 def _graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
-    """Return the edges between blocks, with the length of the move in blocks, times the mean cost if `by_cost`."""
+    """Return the lengths in blocks of the moves between blocks, times the mean cost if `by_cost`."""
     blocks = _as_blocks(costs.free, factor)
     height, width = blocks.shape[:2]
     steps = _steps(blocks)
@@ -207,9 +206,9 @@ def _graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
 
 
 def _block_costs(costs: TraversalCosts, factor: int) -> Array:
-    """Return the cost per m of each block, flat: the mean of its cheapest cell and its average over free cells.
+    """Return the cost per m (blocks,) of each block: the mean of the cheapest cell and the average of free cells.
 
-    The cheapest cell alone ignores expensive cells, and the average alone makes a gap more expensive than its center.
+    The average alone would make a gap more expensive than its center.
     """
     finite = np.isfinite(costs.rates)
     minimum = pool_blocks(costs.rates, factor, np.minimum, np.inf)
@@ -222,7 +221,7 @@ Numbers = npt.NDArray[np.float32]
 
 
 def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, ufunc: np.ufunc, padding: float) -> Numbers:
-    """Reduce each block of `factor` x `factor` cells by a ufunc; the last blocks are filled up with `padding`."""
+    """Reduce each block of `factor` x `factor` cells to one value by a ufunc, after adding `padding` at the end."""
     height, width = (-(-side // factor) * factor for side in cells.shape)
     padded = np.full((height, width), padding, dtype=np.float32)
     padded[: cells.shape[0], : cells.shape[1]] = cells
@@ -234,7 +233,10 @@ def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, ufunc: np.u
 def cells_with_most_clearance(
     clearance: Numbers, blocks: npt.NDArray[np.int64], factor: int
 ) -> tuple[npt.NDArray[np.int64], ...]:
-    """Return row and column of the cell with the most clearance in each of the blocks (n, 2)."""
+    """Return the rows (n,) and columns (n,) of the cells with the most clearance in blocks (n, 2: row, column).
+
+    A block consists of `factor` x `factor` cells.
+    """
     inner = np.arange(factor)
     rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), clearance.shape[0] - 1)
     columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), clearance.shape[1] - 1)

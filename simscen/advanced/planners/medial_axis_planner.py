@@ -1,7 +1,8 @@
 """Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path.
 
-The optimization divides the path by stations, and places several points across the path at each. Viterbi's algorithm
-finds the cheapest path through one point of each station. The path stays on the same side of each obstacle.
+The optimization divides the path by stations, and places several points to the left and right of each station.
+Viterbi's algorithm finds the cheapest path through one point per station. The path stays on the same side of each
+obstacle.
 """
 
 import math
@@ -33,14 +34,14 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, Rob
 from simscen.stack.setting import Setting
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
-"""Rounds of refinement: distance between stations in m, maximum offset in m, and number of points per station."""
+"""Rounds of `refine`: distance between stations in m, maximum offset from a station in m, and points per station."""
 MIN_SEGMENTS = 2
 """Minimum number of segments of a path, so that there is a station between its ends."""
 Costs = npt.NDArray[np.float32]
 
 
 def refine(costs: TraversalCosts, points: Array) -> Array:
-    """Return the cheapest path near a path (n, 2) with the same ends, smoothed."""
+    """Return an optimized and smoothed path near a path (n, 2), with the same ends."""
     points = _with_shortcuts(costs, points)
     cost = costs.along(points)
     for spacing, max_offset, count in ROUNDS:
@@ -59,7 +60,7 @@ def refine(costs: TraversalCosts, points: Array) -> Array:
 
 
 def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path with straight shortcuts wherever they are not more expensive."""
+    """Return the path with straight shortcuts where they are not more expensive."""
     resampled = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
     rows = resampled.tolist()
     cost = [0.0]
@@ -81,8 +82,9 @@ def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
 
 
 def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
-    """Return the cheapest path through points at `offsets` m to the left of each station except the first and last.
+    """Return the cheapest path through one point per station, by Viterbi's algorithm.
 
+    The points are at `offsets` m to the left of the stations (n, 2). The first and the last station have no offset.
     Costs are sampled every `stride` m.
     """
     direction = np.empty_like(stations)
@@ -106,7 +108,7 @@ def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, st
 
 
 def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
-    """Return the costs (n - 1, k, k) from each point of a station to each point of the next; `points` (n, k, 2)."""
+    """Return the costs (n - 1, k, k) from each of the `points` (n, k, 2) of a station to each point of the next one."""
     before = ((points[:-1] - costs.origin) / costs.resolution).astype(np.float32)[:, :, None]
     step = ((points[1:] - costs.origin) / costs.resolution).astype(np.float32)[:, None] - before
     samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
@@ -121,11 +123,11 @@ def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
 
 
 MAX_CACHED_CELLS = 500_000
-"""Largest costmap for which intermediate results are kept for the next plan; they take up to 10 MB."""
+"""Number of cells up to which intermediate results of a costmap are kept for the next plan (10 MB)."""
 
 
 def medial_axis_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Build the planner: in the plane, or over poses for cars and long hulls."""
+    """Return the planner: in the plane, or over poses for cars and long hulls."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return MedialAxisPlanner(spec, setting.robot)
@@ -140,7 +142,7 @@ class MedialAxisPlanner:
         self._costs: TraversalCosts | None = None
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, 5 cm apart. Raises NavigationFailure if there is none."""
+        """Return a path of poses in the map frame, SPACING_M apart. Raises NavigationFailure if there is none."""
         radius = self._robot.circumscribed_radius
         points = straight_path(
             costmap, start, goal, radius, lambda part, part_goal: self._path_on_part(part, start, part_goal, seed)
@@ -208,18 +210,15 @@ ATTEMPTS = (
     (2.0, 0.0, 0.4, POSE_SPACING_M),
     (2.0, 0.0, 0.4, POSE_SPACING_M / 10),
 )
-"""Successive attempts: `slack` of the informed set, ratio of `hull_clearance`, share of the iterations, and spacing of
-collision checks in m.
-
-Cars need wider sets than discs because they swing out.
-"""
+"""Successive attempts: slack of the informed set (`InformedSet.restrict`), ratio of the clearance to `hull_clearance`,
+share of the iterations, and spacing of collision checks in m."""
 
 
 class ConfinedPosePlanner(PosePlanner):
-    """Plans over poses, but only in the informed set, so that the tree does not grow into wrong rooms."""
+    """Plans over poses with RRT-Connect, only within the informed set."""
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield the attempts, in increasingly wide informed sets."""
+        """Yield the ATTEMPTS."""
         informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
         for slack, part, fraction, spacing in ATTEMPTS:
             informed.restrict(slack)
@@ -228,17 +227,17 @@ class ConfinedPosePlanner(PosePlanner):
 
 
 MAX_COSTLY_RATIO = 0.5
-"""Maximum share of a straight path that is replaced by a detour. A larger detour does not save time."""
+"""Maximum share of a straight path that is replaced by a detour."""
 MARGIN_BEHIND_M, MARGIN_AROUND_M = 2.0, 2.0
 """Margins of the part of the costmap in which a detour is planned: behind the costly cells, and around both ends."""
 MAX_COST_RATIO = 1.01
-"""Maximum ratio of the cost of a path with a detour to the straight distance. Usual plans cost up to 5 % too much."""
+"""Maximum ratio of the cost of a path with a detour to the straight distance."""
 PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
 """Function that returns a path (n, 2) to a pose on a part of the costmap, and its cost. Raises NavigationFailure."""
 
 
 def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
-    """Return a straight path (n, 2), with a detour planned by `plan_part` if there are costly cells near the start.
+    """Return a straight path (n, 2). If there are costly cells near the start, `plan_part` plans a detour around them.
 
     Cells within `radius` m of an obstacle are costly. None if the path may cost too much.
     """
@@ -278,10 +277,7 @@ def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: flo
 def _cells_on_line(
     costmap: CostmapView, start: Pose2, goal: Pose2
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Return column and row of each cell on the straight line, and the ratio of the line at which it leaves the cell.
-
-    Between two crossings of grid lines, the line is in the cell that contains the center between them.
-    """
+    """Return the columns and rows of the cells on a straight line, and where the line leaves them (0 start, 1 goal)."""
     crossings = [np.array((0.0, 1.0))]
     origin, direction = np.empty(2), np.empty(2)
     for axis, (start_coordinate, end) in enumerate(((start.x, goal.x), (start.y, goal.y))):

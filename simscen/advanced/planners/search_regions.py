@@ -1,7 +1,7 @@
-"""Searches of the medial-axis planner in the order in which they are tried, each in a wider region than the last.
+"""BIT* searches of the medial-axis planner, in the order in which they are tried.
 
 Sampling on the medial axis finds narrow passages that uniform samples miss (Wilmarth, Amato and Stiller 1999). On the
-axis, the distance to the nearest obstacle decreases to both sides.
+medial axis, the clearance (distance to the nearest obstacle) decreases to both sides.
 """
 
 import math
@@ -22,18 +22,21 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
 BLOCK_M = 0.1
-"""Approximate size of the blocks of cells in which the medial axis is determined."""
+"""Approximate side length of the blocks of cells in which the medial axis is determined."""
 RIDGE_OFFSET_M = 0.2
 """Distance to each side of the axis at which the clearance must be smaller."""
 NARROW_SPACING_M, AXIS_SPACING_M, OPEN_SPACING_M = 0.3, 0.8, 1.1
 """Distance between samples in narrow passages, on the rest of the axis, and elsewhere."""
 NARROW_MARGIN_M = 0.15
-"""A passage is narrow if its clearance exceeds that of the narrowest one by less than this."""
+"""A block of the axis is narrow if its clearance exceeds the smallest one by less than this."""
 Mask = npt.NDArray[np.bool_]
 
 
 def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:
-    """Return random centers (n, 2) of `free` cells: many on the medial axis, few elsewhere; all times `density`."""
+    """Return random centers (n, 2) of `free` cells: many on the medial axis, few elsewhere.
+
+    `density` divides the distances between samples.
+    """
     rng = np.random.default_rng(seed)
     factor = max(1, round(BLOCK_M / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution
@@ -55,7 +58,7 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
 
 
 def _ridges(clearance: npt.NDArray[np.float32], reach: int, drop: float) -> Mask:
-    """Return the blocks whose clearance decreases by `drop` m within `reach` blocks in two opposite directions."""
+    """Return the mask of blocks whose clearance is lower by `drop` m at `reach` blocks in two opposite directions."""
     padded = np.pad(clearance, reach)
     height, width = clearance.shape
     lowered = clearance - np.float32(drop)
@@ -68,7 +71,7 @@ def _ridges(clearance: npt.NDArray[np.float32], reach: int, drop: float) -> Mask
 
 
 def _thinned(mask: Mask, spacing: float, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-    """Return one block (n, 2) of the mask for each square of a grid at a random offset. `spacing` is in blocks."""
+    """Return one random block (row, column) of the mask for each square of a grid with `spacing` in blocks."""
     cells = rng.permutation(np.flatnonzero(mask))
     rows, columns = np.divmod(cells, mask.shape[1])
     row_offset, column_offset = rng.uniform(0.0, spacing, 2)
@@ -82,18 +85,17 @@ def _thinned(mask: Mask, spacing: float, rng: np.random.Generator) -> npt.NDArra
 
 
 DENSITIES = (1, 2, 4, 8)
-"""Sample densities of successive searches, relative to the usual density."""
+"""Values of `density` in successive searches of the entire costmap."""
 CORRIDOR_SLACKS = (0.05, 0.15, 1.0)
 """Ratios by which paths in successive corridors may be longer than the shortest path over the coarse grid."""
 COST_SLACK = 0.15
 """Ratio by which paths in the first search may cost more than the cheapest path over the coarse grid."""
 MAX_SAMPLES = 3000
-"""Maximum number of samples of the first search, because BIT* takes about ten iterations for each. Those on the
-cheapest paths are kept."""
+"""Maximum number of samples of the first search. BIT* takes about ten iterations for each."""
 REACH_M = 1.8
-"""Distance up to which samples are connected if they include the points of the coarse path."""
+"""Distance up to which BIT* connects samples in the first search."""
 FAR_REACH_M = 2.3
-"""Distance up to which samples are connected otherwise."""
+"""Distance up to which BIT* connects samples in later searches."""
 AMPLE_CLEARANCE_M = 0.15
 """Clearance beyond the robot's radius that suffices for straight motions between samples."""
 
@@ -102,7 +104,7 @@ AMPLE_CLEARANCE_M = 0.15
 class Leg:
     """A part of the path, to be found by BIT*.
 
-    BIT* connects the `samples` (n, 2) up to a distance of `reach` m. If they are None, it draws its own samples.
+    BIT* connects the `samples` (n, 2) up to a distance of `reach` m. If `samples` is None, BIT* draws its own samples.
     """
 
     problem: Problem
@@ -110,17 +112,17 @@ class Leg:
     reach: float = FAR_REACH_M
 
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
-        """Return a search for this leg, to be started with `solve`."""
+        """Return the search for this leg, which is started with `solve`."""
         if self.samples is None:
             return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
         return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
 
 
 def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iterator[Leg]]:
-    """Yield the searches, each as an iterator of the successive legs to search for.
+    """Yield the searches. A search is an iterator of successive legs from start to goal.
 
-    The first one samples the medial axis, and sparsely the open space, near the cheapest path over the coarse grid. If
-    the medial axis has more than MAX_SAMPLES, searches in corridors follow. The last ones sample everywhere, with
+    The first search samples the region of near-cheapest paths over a coarse grid. If the entire costmap has more than
+    MAX_SAMPLES, searches in corridors of near-shortest paths follow. The last ones sample the entire costmap, with
     increasing density.
     """
     problem, samples = make_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
@@ -135,7 +137,7 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
 
 
 def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Array:
-    """Return samples (n, 2): those on near-cheapest paths over the coarse grid, and points of the cheapest path."""
+    """Return the samples on near-cheapest paths over the coarse grid, and points of the cheapest path (n, 2)."""
     informed = InformedSet(costs, ends.start, ends.goal, by_cost=True)
     informed.restrict(COST_SLACK)
     chosen = samples[informed.contains_points(samples)]
@@ -148,7 +150,7 @@ def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Ar
 def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet, slack: float) -> Iterator[Leg]:
     """Yield the legs of a path in the corridor of near-shortest paths over the coarse grid.
 
-    A leg must be solved before the next one is taken, because the corridor is restricted to each leg in turn.
+    A leg must be solved before the next one is taken, because `informed` is restricted to the current leg.
     """
     waypoints = informed.waypoints(costs.costmap) if slack < 1.0 else []
     leg_start, distance_before = ends.start, 0.0
@@ -159,7 +161,7 @@ def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet
 
 
 def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
-    """Return the cost function `motion`, but inf for motions outside the informed set."""
+    """Return a cost function of motions: `motion` within the informed set, otherwise inf."""
     contains = informed.contains
 
     def confined_motion(ax: float, ay: float, bx: float, by: float) -> float:
@@ -170,14 +172,13 @@ def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
 
 
 CHECKS_BEFORE_FIRST_BATCH = 4
-"""Number of times that BIT* evaluates the termination condition before its first batch is complete."""
+"""Number of evaluations of the termination condition by BIT* before its first batch is complete."""
 
 
 class _SampledValidity(StateValidity):
-    """Validity check that also replaces each state that OMPL draws by the next of the samples.
+    """Validity check that also replaces each state that BIT* draws by the next sample.
 
-    With OMPL's Python bindings (2.0.1), a planner cannot get a sampler of states. But BIT* checks the validity of each
-    state that it has drawn, and continues with the replaced state.
+    OMPL's Python bindings (2.0.1) do not support custom state samplers.
     """
 
     def __init__(self, problem: Problem, samples: Array) -> None:
@@ -186,7 +187,10 @@ class _SampledValidity(StateValidity):
         self._remaining: Iterator[list[float]] = iter(samples.tolist())
 
     def __call__(self, state: Any) -> bool:
-        """Replace a drawn state by the next sample, and return whether it is valid; False after the last sample."""
+        """Set a drawn state to the next sample and return True, or return False after the last sample.
+
+        Start and goal are checked without a change.
+        """
         if (state[0], state[1]) in self._ends:
             return super().__call__(state)
         sample = next(self._remaining, None)
@@ -197,7 +201,7 @@ class _SampledValidity(StateValidity):
 
 
 class SampledSearch(OmplSearch):
-    """One batch of BIT* on `samples` (n, 2), which are connected if they are at most `reach` m apart."""
+    """Search with one batch of BIT* on `samples` (n, 2), which are connected if they are at most `reach` m apart."""
 
     def __init__(self, problem: Problem, samples: Array, reach: float, seed: int, max_iterations: int) -> None:
         all_samples = PlannerSpec(max_iterations=max_iterations, cost_threshold_ratio=0.0)
@@ -213,7 +217,7 @@ class SampledSearch(OmplSearch):
         planner.setRewireFactor(self._reach / _connection_radius(self.problem.bounds, len(self._samples) + 2))
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Return a condition that stops BIT* at its second batch, which is reduced to one sample to save time."""
+        """Return a condition that stops BIT* after the first batch, or after the maximum number of iterations."""
         batches, remaining = planner.numBatches, self.spec.max_iterations
 
         def should_stop() -> bool:
@@ -227,6 +231,6 @@ class SampledSearch(OmplSearch):
 
 
 def _connection_radius(bounds: tuple[float, float, float, float], states: int) -> float:
-    """Return the connection radius in m of BIT* for a number of states and a rewire factor of 1 (r of RRG)."""
+    """Return the connection radius in m of BIT* (r of RRG) for a number of states and a rewire factor of 1."""
     area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
     return 2.0 * math.sqrt(1.5 * area / math.pi * math.log(states) / states)
