@@ -1,4 +1,4 @@
-"""Find and read the files that worlds and robots refer to, only in the folders that the user allowed."""
+"""Find and read the files that worlds and robots refer to, but only in the folders that the user allows."""
 
 import errno
 import os
@@ -22,7 +22,7 @@ from simscen.core.files import record_read_file
 MAX_PATH_LENGTH = 1000
 """Maximum number of characters of a path or URI."""
 MESH_SUFFIXES = (".dae", ".stl", ".obj")
-"""Suffixes of mesh files. References to a mesh often have the wrong one."""
+"""Suffixes of mesh files. References to meshes often have the wrong suffix."""
 _NOT_FOUND = "no such file or directory"
 
 
@@ -43,7 +43,7 @@ class AllowedFolders:
     """The folders in which files may be read.
 
     roots:     absolute paths without symbolic links: the root of the scenarios first, then those of `--world-path`
-    packages:  folders of ROS packages by name, which are used without a search
+    packages:  folders of ROS packages by name; other packages are searched
     """
 
     roots: tuple[Path, ...]
@@ -56,7 +56,7 @@ class AllowedFolders:
 
     @property
     def search_folders(self) -> tuple[Path, ...]:
-        """All `roots` but the first: files that are not next to the file that refers to them are searched there."""
+        """All `roots` except the first, which are searched for files."""
         return self.roots[1:]
 
     def display_path(self, path: Path) -> str:
@@ -64,10 +64,10 @@ class AllowedFolders:
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
     def find(self, uri: str, base: Path, *, absolute: bool = False) -> Path:
-        """Return the real path of the file or folder to which a URI or a path refers; see `uris.candidate_paths`.
+        """Return the real path of the file or folder that a URI or path refers to, see `uris.candidate_paths`.
 
         base:      folder of the file that contains the URI
-        absolute:  accept absolute paths, which xacro creates from `$(find package)`, and which Gazebo saves in worlds
+        absolute:  whether absolute paths are accepted (xacro and Gazebo write them)
 
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
@@ -99,7 +99,7 @@ class AllowedFolders:
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package_folder(self, name: str, near: Path) -> Path:
-        """Return the folder of the ROS package `name`, to which a file in the folder `near` refers.
+        """Return the folder of the ROS package `name`. The search begins at the folder `near`.
 
         Raises UnusableFile, or NoSuchFile if there is no such package.
         """
@@ -134,10 +134,7 @@ class AllowedFolders:
         return real
 
     def check_file(self, path: Path, max_bytes: int) -> Path:
-        """Return the real path of a file. Raises UnusableFile if it is not a regular file of at most `max_bytes`.
-
-        Bullet would abort on a folder and wait forever for a pipe.
-        """
+        """Return the real path of a file. Raises UnusableFile if it is not a regular file of at most `max_bytes`."""
         real = self.resolve(path)
         try:
             status = real.stat()
@@ -188,10 +185,9 @@ def _to_unusable_file(error: OSError) -> UnusableFile:
 
 
 def find_similar_name(folder: Path, path: Path) -> str | None:
-    """Return the existing path in `folder` that the misspelled `path` probably means, relative to `folder`, or None.
+    """Return the existing path in `folder` that a misspelled `path` probably means, relative to `folder`, or None.
 
-    Capitalization and the suffix of a mesh may differ. Symbolic links are not followed, so that messages do not reveal
-    names outside the folder.
+    Capitalization and the suffix of a mesh may differ. Symbolic links are not followed.
     """
     current, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:

@@ -1,7 +1,7 @@
-"""Parse XML with line numbers, and reject everything that refers to data outside the file.
+"""Parse XML into elements with line numbers.
 
-The standard library's ElementTree forgets line numbers, so the tree is built here from expat's events. A document
-type declaration is rejected, which prevents entity bombs and external entities (CWE-776, CWE-611).
+ElementTree of the standard library has no line numbers. A document type declaration is rejected, which prevents entity
+bombs and external entities (CWE-776, CWE-611).
 """
 
 import re
@@ -13,13 +13,13 @@ from xml.parsers import expat
 from typing_extensions import Self
 
 MAX_DEPTH = 100
-"""Maximum number of elements that are nested in each other."""
+"""Maximum depth of nested elements."""
 MAX_ELEMENTS = 200_000
-"""Maximum number of elements. Worlds of BARN have 13,000; without a limit, 20 MB of `<a/>` take gigabytes of memory."""
+"""Maximum number of elements, to limit memory."""
 MAX_SHOWN_LINE_BYTES = 300
-"""Length up to which messages show the line with the problem."""
+"""Maximum length of a line that messages show."""
 _COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
-"""A comment; CDATA sections and processing instructions match too, so that no comment is found inside them."""
+"""Comment with the group `text`. CDATA sections and processing instructions match without this group."""
 
 
 class MalformedXml(Exception):
@@ -36,7 +36,12 @@ class MalformedXml(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that was read: its name for messages, the folder to which its relative paths refer, and its lines."""
+    """A file that was read.
+
+    name:    name for messages
+    folder:  folder to which relative paths in the file refer
+    lines:   lines of the file, to show them in messages
+    """
 
     name: str
     folder: str = ""
@@ -55,7 +60,7 @@ class Source:
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An XML element with its position in the file. Line and column count from 1; joined `text_parts` are its text."""
+    """An XML element with its text in parts and its position in the file. Lines and columns count from 1."""
 
     tag: str
     attributes: dict[str, str]
@@ -84,12 +89,12 @@ E = TypeVar("E", bound=Element)
 
 
 def refuse_doctype(data: bytes) -> None:
-    """Check XML before another library parses it. Raises MalformedXml if it has a DOCTYPE or is not well-formed."""
+    """Raise MalformedXml if an XML text has a DOCTYPE or is not well-formed."""
     _run(expat.ParserCreate(), data, Source(""))
 
 
 def parse(data: bytes, source: Source, kind: type[E]) -> E:
-    """Parse an XML text into elements of the class `kind` and return the root. Raises MalformedXml."""
+    """Parse an XML text into elements of the class `kind`, and return the root. Raises MalformedXml."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
     root: list[E] = []
@@ -125,8 +130,7 @@ def parse(data: bytes, source: Source, kind: type[E]) -> E:
 def blank_hyphens_in_comments(data: bytes) -> bytes:
     """Return the XML text with hyphens in comments replaced by spaces; all positions stay the same.
 
-    XML forbids `--` in comments, and expat rejects it. The parsers of Gazebo and ROS (tinyxml2) accept it, so that many
-    published files contain it.
+    XML forbids `--` in comments, but the parser of Gazebo and ROS (tinyxml2) accepts it.
     """
 
     def blank(match: re.Match[bytes]) -> bytes:

@@ -1,4 +1,4 @@
-"""List the paths at which the file of a Gazebo or ROS URI may be found (model://, package://, file://, Fuel)."""
+"""Paths at which the file of a Gazebo or ROS URI (model://, package://, file://, Fuel) may be found."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,23 +10,23 @@ PACKAGE_SCHEMES = ("package://", "model://")
 """Schemes of ROS and Gazebo whose first path component is the name of a package or model."""
 SCHEMES = (*PACKAGE_SCHEMES, "file://")
 MAX_MANIFEST_BYTES = 1 << 16
-"""Bytes of a package.xml that are read to find its `<name>`."""
+"""Number of bytes of a package.xml that are read to find the `<name>`."""
 _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
 )
-"""URI of a model or world on Gazebo Fuel, on the website or its API, or of a file in the model or world."""
+"""URI of a model or world on Gazebo Fuel (website or API), or of a file in it."""
 _BUILTIN_MODELS = {"sun", "ground_plane"}
 """Models that Gazebo installs."""
 
 
 @dataclass(frozen=True)
 class FuelUri:
-    """URI of a model on Gazebo Fuel. Only local copies are used; simscen never connects to the server.
+    """URI of a model or world on Gazebo Fuel, of which only local copies are used.
 
     kind:     "models" or "worlds"
     version:  number, "tip" for the newest version, or "" if the URI has none
-    rest:     path of a file in the model; "" for the model itself
+    rest:     path of a file in the model or world; "" for the model or world itself
     """
 
     server: str
@@ -39,7 +39,7 @@ class FuelUri:
     def candidate_paths_in(self, folder: Path) -> Iterator[Path]:
         """Yield the paths at which `folder` may contain a copy of the model or file.
 
-        The folder may be a cache of Fuel (~/.gz/fuel), whose newest version comes first, or contain models by name.
+        The folder may be a cache of Fuel (~/.gz/fuel) or contain models by name. The newest version comes first.
         """
         spellings = [self.name, self.name.lower()]
         for name in dict.fromkeys([*spellings, *(name.replace(" ", "_") for name in spellings)]):
@@ -82,16 +82,16 @@ def builtin_model_name(uri: str) -> str | None:
 def candidate_paths(
     uri: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
-    """Yield pairs (folder, path in it) in the order in which they are to be tried for a URI.
+    """Yield pairs (folder, path in it) at which the file of a URI may be found, the preferred one first.
 
-    `base` is the folder of the file that contains the URI; `roots` are the allowed folders, see `AllowedFolders`.
+    `base` is the folder of the file that contains the URI. `roots` are the allowed folders, see `AllowedFolders`. The
+    search folders are all roots except the first.
 
     - model:// and package:// with a name in `packages`: only that folder.
-    - model:// and package:// with another name: in all roots but the first, then in folders that may be a package of
-      this name, around `base` or below the roots.
-    - file:// and paths: relative to `base`, then to all roots but the first. The path of a file:// URI may start with
-      the name of the root itself (`file://models/crate` in a root called `models`).
-    - Fuel: in all roots but the first.
+    - model:// and package:// with another name: the search folders, then `package_folder_candidates`.
+    - file:// and paths: relative to `base`, then to the search folders. The path of a file:// URI may start with the
+      name of a search folder (`file://models/crate` in a folder `models`).
+    - Fuel: the search folders.
     """
     address, search = parse_fuel_uri(uri), roots[1:]
     if address is not None:
@@ -125,15 +125,15 @@ def _in_packages(
 
 
 def is_package_name(name: str) -> bool:
-    """Return whether a word consists of the characters of ROS package names (REP 144), and is therefore not a path."""
+    """Return whether a name consists of the characters of ROS package names (REP 144)."""
     return name.replace("_", "").replace("-", "").isalnum()
 
 
 def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
     """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
 
-    First come folders of this name: at `near` and its parents, in the roots, and up to two levels below the roots,
-    because a workspace contains repositories that contain packages. Then come folders whose package.xml has this name.
+    First come folders of this name: at `near` and its parents, in the roots, and up to two levels below the roots. Then
+    come folders whose package.xml has this name.
     """
     for folder in (near, *near.parents):
         if folder.name == name:
@@ -149,7 +149,7 @@ def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> I
 
 
 def _folders_by_manifest(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Yield folders whose package.xml contains this package name, whatever the name of the folder."""
+    """Yield folders whose package.xml contains this package name."""
     for folder in (near, *near.parents):
         if not any(folder.is_relative_to(root) for root in roots):
             break

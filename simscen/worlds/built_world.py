@@ -16,8 +16,7 @@ from simscen.worlds.maps.occupancy_map import draw_map
 def build_world_and_map(world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
     """Merge the static solids to one mesh, and draw the map that SLAM with a lidar at `lidar_height` m would build.
 
-    `resolution` is the edge length of a map cell in m. A world is built once for all its runs: mesh and map are NumPy
-    arrays, whose memory forked processes share. Raises InvalidInput for a map of more than MAX_MAP_CELLS cells.
+    `resolution` is the edge length of a map cell in m. Raises InvalidInput for a map of more than MAX_MAP_CELLS cells.
     """
     mesh = merge_solids(world.solids)
     return BuiltWorld(world, mesh, draw_map(world, mesh, lidar_height, resolution))
@@ -35,7 +34,6 @@ class WorldItem:
     shape: str
     """Kind of shape, for example "box"; "box+cylinder" for a body with both."""
     triangles: int
-    """Number of triangles."""
     extent: Extent
     """Bounding box in the world frame; zeros without triangles."""
     mass: float | None = None

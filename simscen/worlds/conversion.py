@@ -71,7 +71,7 @@ class PrismShape:
 def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismShape]:
     """Return the shapes that replace a solid, without any part below the ground.
 
-    A solid that no shape of world files equals is replaced by prisms over its cross section at `height` m, or at half
+    A solid without an equal shape in world files is replaced by prisms over its cross section at `height` m, or at half
     its height if it does not reach `height`. A sentence about each difference is appended to `changes`.
     """
     exact = _exact_shape(solid)
@@ -119,7 +119,7 @@ def _exact_shape(solid: Solid) -> PrismShape | None:
 
 
 def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismShape]:
-    """Yield prisms over the cross section of a solid, see `prism_shapes`; none if it is not closed or is empty."""
+    """Yield prisms over the cross section of a solid, see `prism_shapes`; none if it is not closed or empty."""
     mesh = merge_solids([solid])
     kind = type(solid.shape).__name__.lower()
     kind = f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
@@ -144,7 +144,7 @@ def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismSh
 
 
 def _is_prism(solid: Solid, volume: float) -> bool:
-    """Return whether a solid equals prisms of this volume (m³): each face is level or upright, the volume is equal."""
+    """Return whether a solid equals prisms of this volume (m³): equal volume, and each face is level or upright."""
     mesh = merge_solids([solid])
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     normals = np.cross(b - a, c - a)
@@ -165,14 +165,14 @@ def _rounded(values: Sequence[float]) -> list[float]:
 
 @dataclass
 class Conversion:
-    """Obstacles and objects of a world file, with a sentence in `changes` for each difference from the world."""
+    """Obstacles and objects of a world file, and a sentence in `changes` for each difference from the world."""
 
     obstacles: list[Obstacle] = field(default_factory=list)
     objects: list[Movable] = field(default_factory=list)
     changes: list[str] = field(default_factory=list)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
-        """Return a copy of `spec` with these obstacles and objects before its own, and without its `sdf`.
+        """Return a copy of `spec` with these obstacles and objects before those of `spec`, and without `sdf`.
 
         Raises pydantic.ValidationError if there are more obstacles or objects than a world file may have.
         """
@@ -232,10 +232,10 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
 
 
 def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
-    """Return the scripted motion of a body; None with a sentence in `changes` if it cannot be converted.
+    """Return the scripted motion of a body; None with a sentence in `changes` if the motion cannot be converted.
 
-    It has waypoints if the body moves along straight lines with a constant speed, otherwise keyframes. `shape` is the
-    shape of the body at its initial pose.
+    The motion has waypoints if the body moves along straight lines with a constant speed, otherwise keyframes. `shape`
+    is the shape of the body at its initial pose.
     """
     assert body.path is not None
     path, start, is_round = body.path, shape.pose, shape.radius is not None
@@ -281,7 +281,7 @@ def _is_straight(a: tuple[float, float], b: tuple[float, float], c: tuple[float,
 
 
 def _are_same_motion(converted: MotionPath, path: MotionPath, is_round: bool) -> bool:
-    """Return whether two paths have the same poses at all times of both; headings of round objects are ignored."""
+    """Return whether two paths have equal poses at all times of both. Headings of round objects are ignored."""
     times = sorted({*converted.times, *path.times})
     pairs = [(pose_at(converted, t + path.start), pose_at(path, t + path.start)) for t in times]
     return math.isclose(converted.times[-1], path.times[-1], rel_tol=1e-6) and all(

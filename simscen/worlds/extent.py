@@ -1,4 +1,4 @@
-"""Extents of solids and models, and a hint which model makes the map of a world too large."""
+"""Extents of solids and models, and a hint about the model that makes the map of a world too large."""
 
 from collections.abc import Iterable, Sequence
 
@@ -10,9 +10,9 @@ from simscen.worlds.maps.map_size import Bounds, map_size_error
 
 
 def placed_solids(solids: Sequence[Solid], bodies: Sequence[Body]) -> list[Solid]:
-    """Return all solids of a world in the world frame: the static `solids`, then those of the bodies.
+    """Return all solids of a world in the world frame: the static `solids`, then the solids of the `bodies`.
 
-    A solid of a body is at the initial pose of the body, and has the name of the body.
+    Bodies are at their initial poses. Their solids get the name of the body.
     """
     moved = (Solid(solid.shape, body.pose.compose(solid.pose), body.name) for body in bodies for solid in body.solids)
     return [*solids, *moved]
@@ -43,16 +43,16 @@ def top_height(solid: Solid) -> float:
 
 
 def oversize_hint(world: World) -> str:
-    """Return a hint for a world whose map is too large: which model to move or remove, or else to move the goals."""
+    """Return a hint for a world whose map is too large: the model to move or remove, or else to move the goals."""
     if name := _largest_model(world):
         return f'"{name}" makes it large; move or remove it'
     return "move the start and the goals closer together"
 
 
 def _largest_model(world: World) -> str:
-    """Return the name of the model without which the world has the smallest area.
+    """Return the name of the model whose removal leaves the smallest area; "" if all models fit on a map.
 
-    Floors do not count as models. Returns "" if all models fit on a map.
+    Floors do not count as models.
     """
     rectangles: dict[str, list[Bounds]] = {}
     for solid in placed_solids(world.solids, world.bodies):

@@ -39,7 +39,7 @@ def world_from_spec(
     name:   name of the world if `spec` has none
     grid:   occupancy grid of the key `map`; it becomes walls with the height `map_height`, and is the robot's map
     base:   world of the key `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
-    notes:  messages of the map's loader, appended to those of `base`
+    notes:  notes of the map's loader, appended to the notes of `base`
     """
     base = base or World(name, ())
     solids = [*base.solids]
@@ -72,7 +72,8 @@ def world_from_spec(
 def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
     """Return the poses of a door's panel when closed and when open.
 
-    A swinging panel turns counterclockwise by 90° about its hinge; a sliding panel moves past the first door post.
+    A swinging panel turns counterclockwise by 90° about the hinge, the first of `door.points`. A sliding panel moves
+    past this point.
     """
     (hx, hy), (px, py) = door.points
     closed = Pose2(hx, hy, math.atan2(py - hy, px - hx))
@@ -118,7 +119,7 @@ def _bounds(
     grid: OccupancyGrid | None,
     base: Bounds,
 ) -> Bounds:
-    """Return the bounds of all arguments; zeros for an empty world. `base` are the bounds of the imported world."""
+    """Return the bounds of all arguments; zeros for an empty world. `base` are the bounds of an imported world."""
     corners = [(place.x, place.y) for place in places]
     rectangles = [bounding_rectangle(solid) for solid in solids]
     rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
@@ -141,9 +142,9 @@ def _grid_corners(grid: OccupancyGrid) -> list[Point]:
 def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:
     """Return one prism for each straight part of a wall with the center line `points`; thickness and height in m.
 
-    The wall is closed if the last point equals the first. Turns up to 120° are mitered, so that the prisms neither
-    overlap nor leave a notch. At sharper turns, and for parts that are too short for a miter, the prisms are extended
-    by half the thickness and overlap. Repeated points are skipped.
+    The wall is closed if the last point equals the first. Turns up to 120° are mitered. At sharper turns, and for parts
+    that are too short for a miter, the prisms are extended by half the thickness and overlap. Repeated points are
+    skipped.
     """
     corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
     if len(corners) < 2:

@@ -37,7 +37,7 @@ from simscen.run.simulate import execute_run
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene import walls
 from simscen.spec.base import Component
-from simscen.worlds.raycasting import ray_scene
+from simscen.worlds.raycasting.mesh_scene import cached_mesh_scene
 
 
 def import_components(prepared: PreparedScenario) -> None:
@@ -56,7 +56,7 @@ def precompute(prepared: PreparedScenario) -> None:
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import layered_costmap
 
-    ray_scene.build_mesh_scene(prepared.built.mesh)
+    cached_mesh_scene(prepared.built.mesh)
     walls.prepare_walls(prepared.built.mesh)
     for part in prepared.by_robot.values():
         walls.prepare_walls(part.obstacles)

@@ -1,7 +1,4 @@
-"""Horizontal cross sections of meshes, their conversion to polygons, and the horizontal distance to a mesh.
-
-The cross section at a height is what a level lidar at that height can see.
-"""
+"""Horizontal cross sections of meshes, their conversion to polygons, and the horizontal distance to a mesh."""
 
 import math
 from dataclasses import dataclass
@@ -46,11 +43,10 @@ def section_segments(mesh: TriangleMesh, height: float) -> Array:
 
 
 def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
-    """Cut the mesh at `height` m; the segments form closed loops wherever the mesh is closed.
+    """Return the cross section of a mesh at `height` m. The segments form closed loops if the mesh is closed.
 
     A vertex at exactly `height` counts as above it. A box is therefore cut from its underside (excluded) to its top
-    (included), and no cut is a single point or an entire face. Two triangles with a common edge compute exactly the
-    same point, because both follow the edge upwards.
+    (included).
     """
     above = mesh.vertices[:, 2] >= height
     count_above = above[mesh.faces].sum(axis=1)
@@ -66,7 +62,10 @@ def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
 
 
 def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDArray[np.bool_]) -> Array:
-    """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) cross `height`."""
+    """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) cross `height`.
+
+    The computation always follows the edge upwards, so that both triangles of an edge get exactly the same point.
+    """
     low, high = np.where(is_tip_above[:, None], base, tip), np.where(is_tip_above[:, None], tip, base)
     fraction = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
     point: Array = low[:, :2] + fraction[:, None] * (high - low)[:, :2]
@@ -78,8 +77,7 @@ def horizontal_distance(
 ) -> float:
     """Return the horizontal distance in m from a point to the part of the mesh between two heights; 0 inside.
 
-    Returns inf if the mesh has no part between the heights `z_range`. May return inf if the distance is greater than
-    `within` m, because triangles that are farther away are not examined.
+    Returns inf if the mesh has no part between the heights `z_range`, and maybe for distances greater than `within` m.
     """
     low, high = z_range
     bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
@@ -96,7 +94,7 @@ def horizontal_distance(
 
 
 def _triangles_near(mesh: TriangleMesh, point: Point, distance: float) -> Array:
-    """Return the triangles (m, 3, 3) whose bounding rectangle is at most `distance` away from the point."""
+    """Return the triangles (m, 3, 3) whose bounding rectangle is at most `distance` m away from the point."""
     triangles = mesh.vertices[mesh.faces]
     corners = triangles[:, :, :2] - point
     is_near = np.all((corners.min(axis=1) <= distance) & (corners.max(axis=1) >= -distance), axis=1)
@@ -105,10 +103,10 @@ def _triangles_near(mesh: TriangleMesh, point: Point, distance: float) -> Array:
 
 
 def winds_around(segments: Array, point: Point) -> bool:
-    """Return whether segments (n, 2, 2) wind counterclockwise around a point, so that it is inside a solid.
+    """Return whether segments (n, 2, 2) wind counterclockwise around a point, so that the point is inside a solid.
 
-    The crossings are counted on two rays from the point, towards +x and towards -x. Closed outlines give the same
-    result on both. For meshes with holes, a single ray would report points outside as inside.
+    The crossings of two rays from the point, towards +x and -x, are counted. For meshes with holes, a single ray could
+    report points outside as inside.
     """
     (x0, y0), (x1, y1) = segments[:, 0].T - np.array(point)[:, None], segments[:, 1].T - np.array(point)[:, None]
     crosses = (y0 > 0) != (y1 > 0)
@@ -121,9 +119,8 @@ def winds_around(segments: Array, point: Point) -> bool:
 def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Clip triangles (m, 3, 3) to the slab between two heights.
 
-    Returns corners (m, 9, 2), seen from above, and the flags (m, 9) of those that are valid. A clipped triangle is the
-    convex hull of its valid corners: its own corners in the slab, and the points where its edges cross the two faces of
-    the slab.
+    Returns corners (m, 9, 2), seen from above, and the mask (m, 9) of valid corners. A clipped triangle is the convex
+    hull of its valid corners: those of the triangle in the slab, and the crossings of its edges with both heights.
     """
     z = triangles[:, :, 2]
     corners, valid = [triangles[:, :, :2]], [(z >= low) & (z <= high)]
@@ -137,9 +134,9 @@ def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, 
 
 
 def _contains_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return for each convex hull of valid corners (m, 9, 2) whether it contains the origin.
+    """Return which convex hulls of valid corners (m, 9, 2) contain the origin.
 
-    It does if no angle between neighboring corners, seen from the origin, reaches 180°.
+    A hull contains the origin if no angle between neighboring corners, seen from the origin, reaches 180°.
     """
     angles = np.where(valid, np.arctan2(corners[:, :, 1], corners[:, :, 0]), np.nan)
     angles = np.sort(angles, axis=1)
@@ -152,7 +149,7 @@ def _contains_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArra
 def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float:
     """Return the distance from the origin to the nearest convex hull of valid corners (m, 9, 2).
 
-    None of the hulls contains the origin, so the nearest point is on a line between two corners.
+    No hull may contain the origin.
     """
     first, second = np.triu_indices(corners.shape[1])
     both_valid = valid[:, first] & valid[:, second]
@@ -166,8 +163,8 @@ def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float
 def rings_from_segments(segments: Array) -> list[Ring]:
     """Join directed segments (n, 2, 2) to closed rings: counterclockwise outlines of solids, and clockwise holes.
 
-    Segments of a closed mesh meet in exactly equal points. Where rings touch at a corner, they are separated, so that
-    no ring visits a point twice. Raises OpenCrossSection if a ring is not closed.
+    Rings that touch at a corner are separated, so that no ring visits a point twice. Raises OpenCrossSection if a ring
+    is not closed.
     """
     next_points: dict[Point, list[Point]] = {}
     for (ax, ay), (bx, by) in segments.tolist():
@@ -230,10 +227,8 @@ def _triangles(rings: list[Ring]) -> list[Ring]:
 
 
 def _without_straight_corners(ring: Ring) -> Ring:
-    """Return the ring without the corners on straight edges, where two triangles of the mesh meet.
-
-    Each corner is compared with the last corner that was kept, so that a round ring of short chords keeps its shape.
-    """
+    """Return the ring without the corners on straight edges, where two triangles of the mesh meet."""
+    # Each corner is compared with the last kept one, so that a round ring of short chords keeps its shape.
     kept: Ring = [ring[0]]
     for point, following in zip(ring[1:], [*ring[2:], ring[0]], strict=True):
         if _is_corner(kept[-1], point, following):

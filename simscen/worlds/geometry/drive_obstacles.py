@@ -1,7 +1,7 @@
-"""Find the obstacles of a robot that can climb: the static solids without the ground that its wheels can drive on.
+"""Find the obstacles of a robot that can drive on ramps and steps: the static solids without the drivable ground.
 
-A ramp is no obstacle for such a robot. Its sides are obstacles where they are higher than the robot's maximum step. The
-line that an upright face of the ground forms, seen from above, is called an edge here.
+Edges and steep slopes of the ground are obstacles as well. An edge is an upright face of the ground, seen from above as
+a line.
 """
 
 import math
@@ -19,14 +19,13 @@ from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 
 EDGE_PIECE_M = 0.1
-"""Maximum length of the pieces into which edges are divided. The height of the step is measured once per piece."""
+"""Maximum length of the pieces into which edges are divided. The height of an edge is measured once per piece."""
 SAMPLE_OFFSET_M = 0.01
 """Distance to both sides of an edge at which the ground height is measured."""
 WALL_THICKNESS_M = 0.01
-"""Thickness of the walls and prisms that stand for edges and steep faces."""
+"""Thickness of the walls and prisms that replace edges and steep slopes."""
 MAX_WALL_NORMAL_Z = 0.5
-"""Vertical component of the unit normal up to which a face counts as a wall: steeper than 60°. Others are slopes."""
-
+"""Vertical component of the unit normal up to which a face is upright (steeper than 60°). Others are slopes."""
 _PRISM_FACES = np.array(
     [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]], dtype=np.int32
 )
@@ -38,9 +37,9 @@ def drive_obstacles(
 ) -> tuple[Solid, ...]:
     """Return the solids that block a robot. If no solid is drivable ground, returns `solids` itself.
 
-    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid can only be ground if it has an
-    upward face at most `wheel_radius` m above the floor or above other ground. The sides and the steep faces of ground
-    are returned as thin solids.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid is ground if it has an upward
+    face at most `wheel_radius` m above the floor or above other ground. Edges and steep slopes of the ground are
+    returned as thin solids.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
@@ -54,13 +53,13 @@ def drive_obstacles(
 
 
 def _is_convex_or_height_field(mesh: TriangleMesh, owner: int) -> bool:
-    """Return whether the solid with index `owner` is convex or a height field; other shapes may overhang the ground."""
+    """Return whether the solid with the index `owner` is convex or a height field, which has no overhangs."""
     is_own = mesh.owners == owner
     return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
 
 
 def _steep_faces(mesh: TriangleMesh, ground: SolidIndices, max_slope: float) -> Iterator[Solid]:
-    """Yield a prism for each slope of the ground that is steeper than `max_slope` rad, down to its lowest corner."""
+    """Yield a prism below each face of a slope of the ground that is steeper than `max_slope` rad."""
     normal_z = face_normals(mesh)[:, 2]
     is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
     for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():
@@ -71,12 +70,12 @@ def _steep_faces(mesh: TriangleMesh, ground: SolidIndices, max_slope: float) -> 
 
 
 def _is_ground_face(mesh: TriangleMesh, ground: SolidIndices) -> npt.NDArray[np.bool_]:
-    """Return for each face whether it belongs to a solid in `ground`."""
+    """Return the mask of the faces that belong to solids in `ground`."""
     return np.isin(mesh.owners, sorted(ground))
 
 
 def _walls_at_edges(mesh: TriangleMesh, ground: SolidIndices, max_step: float) -> Iterator[Solid]:
-    """Yield thin walls for the upright faces of the ground, where it drops by more than `max_step` m."""
+    """Yield thin walls at the edges of the ground where it drops by more than `max_step` m."""
     is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
     pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
     if not pieces:
@@ -102,7 +101,7 @@ class _EdgePiece(NamedTuple):
     start, end (2,):  ends of the piece in m
     outward (2,):     unit vector away from the solid
     owner:            index of the solid
-    depth:            distance in m that the face covers inwards of the line from `start` to `end`; 0 if it is vertical
+    depth:            horizontal extent in m of the face at right angles to the edge; 0 if the face is vertical
     """
 
     start: Array
@@ -124,7 +123,7 @@ class _EdgePiece(NamedTuple):
 
 
 def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_EdgePiece]:
-    """Divide the edges of upright `faces` (indices) into pieces; an edge that several faces form counts once."""
+    """Divide the edges of upright `faces` (indices) into pieces. An edge of several faces counts once."""
     seen = set()
     horizontal_normals = face_normals(mesh)[:, :2]
     for face in faces.tolist():

@@ -1,6 +1,6 @@
 """Find the first solid that a disc or a footprint overlaps, and test whether two polygons overlap.
 
-Upright prisms are tested in plain Python, so that `validate` needs neither triangles nor SciPy for most scenarios.
+Upright prisms are tested in plain Python, without triangles and SciPy.
 """
 
 import math
@@ -23,7 +23,7 @@ SHRINK_FRACTION = 1e-3
 def first_solid_in_disc(
     solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange
 ) -> str | None:
-    """Return the name of the first of the solids that a disc at `point` overlaps, or None.
+    """Return the name of the first solid that a disc at `point` overlaps, or None.
 
     The disc is a cylinder of `radius` m between the heights `z_range`. Touching is not overlapping.
     """
@@ -34,9 +34,9 @@ def first_solid_in_disc(
 
 
 def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Return the horizontal distance in m to the part of a solid between two heights; 0 inside, inf without a part.
+    """Return the horizontal distance in m to the part of a solid between two heights; 0 inside.
 
-    A distance greater than `within` m may be returned as inf.
+    Returns inf without such a part, and maybe for distances greater than `within` m.
     """
     prism = upright_prism(solid)
     if prism is not None:
@@ -91,11 +91,8 @@ def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Po
 
 
 def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> bool:
-    """Return whether the interiors of two polygons have a point in common.
-
-    Tests corners, crossings of edges, and also the centers: the corners of equal polygons are on the border of the
-    other polygon and not inside, and their edges do not cross.
-    """
+    """Return whether the interiors of two polygons have a point in common. Tests corners, edges, and centers."""
+    # The centers are needed for equal polygons, whose corners are not inside each other.
     if polygon_contains(first, second[0]) or polygon_contains(second, first[0]):
         return True
     centers = [(sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)) for ring in (first, second)]
@@ -106,7 +103,7 @@ def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tupl
 
 
 def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:
-    """Return whether a solid overlaps a polygon in its frame between two heights."""
+    """Return whether a solid overlaps a polygon in the same frame between two heights."""
     prism = upright_prism(solid)
     if prism is not None:
         low, high = z_range

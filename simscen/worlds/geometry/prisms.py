@@ -1,6 +1,6 @@
 """Upright prisms over convex bases, computed in plain Python without triangulation, and bounding rectangles of solids.
 
-Commands that must be fast use prisms. Their bases have the same corners as those of `triangulation.triangulate`.
+The bases of prisms have the same corners as the meshes of `triangulation.triangulate`.
 """
 
 from __future__ import annotations
@@ -91,10 +91,9 @@ def _is_convex_and_counterclockwise(base: Polygon) -> bool:
 
 
 def has_no_drivable_solids(solids: Iterable[Solid], max_height: float) -> bool:
-    """Return whether all solids are upright prisms that are too high to drive on, or not above the floor.
+    """Return whether all solids are upright prisms that end above `max_height` m, so that wheels cannot drive on them.
 
-    Wheels cannot drive onto a solid whose top is higher than `max_height` m. False means that the triangles of the
-    solids must be examined.
+    Prisms that end at the floor are ignored. False means that the triangles of the solids must be examined.
     """
     prisms = [upright_prism(solid) for solid in solids]
     return all(prism is not None and (prism.top > max_height or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)
@@ -112,7 +111,7 @@ def bounding_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float,
 
 
 def mesh_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
-    """Return the same as `bounding_rectangle`, always computed from the triangles of the solid."""
+    """Return the bounding rectangle as `bounding_rectangle` does, but always from the triangles of the solid."""
     from simscen.worlds.geometry.triangulation import triangulate
 
     pose = frame.compose(solid.pose) if frame else solid.pose

@@ -1,7 +1,4 @@
-"""Triangulate shapes: closed surfaces with outward normals, always in the same order of vertices and faces.
-
-Physics, ray casting and maps use the same triangles, so that they agree on the position of every wall.
-"""
+"""Triangulate shapes: closed surfaces with outward normals, always in the same order of vertices and faces."""
 
 import math
 from collections.abc import Iterable
@@ -128,14 +125,14 @@ def _capsule(radius: float, length: float) -> Mesh:
 
 
 def _arc(angles: Array, radius: float, z: float) -> Profile:
-    """Return the points of an arc; poles lie exactly on the axis, so that `_revolve` closes the surface."""
+    """Return the points of an arc in the x-z plane. Poles lie exactly on the axis, so that `_revolve` closes there."""
     is_pole = np.abs(np.abs(angles) - math.pi / 2) < 1e-12
     distances = np.where(is_pole, 0.0, radius * np.cos(angles))
     return list(zip(distances.tolist(), (z + radius * np.sin(angles)).tolist(), strict=True))
 
 
 def _revolve(profile: Profile, count: int) -> Mesh:
-    """Return the surface of revolution of a profile about z, with `count` facets around."""
+    """Return the surface of revolution of a profile about z, with `count` facets around the axis."""
     angles = np.arange(count) * (2 * math.pi / count)
     circle = np.column_stack((np.cos(angles), np.sin(angles), np.ones(count)))
     rings = [circle[: count if r > 0 else 1] * (r, r, z) for r, z in profile]
@@ -171,7 +168,7 @@ def _extrude(polygon: Array, height: float) -> Mesh:
 
 
 def _counterclockwise(triangles: Faces, points: Array) -> Faces:
-    """Return the triangles with those reversed that run clockwise through the points (n, 2)."""
+    """Return the triangles, with clockwise ones reversed; `points` (n, 2) are the vertices."""
     a, b, c = points[triangles].swapaxes(0, 1)
     is_clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     result: Faces = np.where(is_clockwise[:, None], triangles[:, ::-1], triangles)

@@ -4,11 +4,11 @@ import math
 from typing import NamedTuple
 
 MAP_MARGIN_M = 1.0
-"""Width of the map's border around the world, so that a robot outside the outermost wall is still on the map."""
+"""Width of the border of a map around the bounds of the world."""
 MAX_MAP_CELLS = 16_000_000
 """Maximum number of cells of a map: 200 x 200 m at 5 cm."""
 MAP_RESOLUTION_M = 0.05
-"""Default edge length of a cell, as is usual with SLAM."""
+"""Default edge length of a cell."""
 
 Bounds = tuple[float, float, float, float]
 """Rectangle (min x, min y, max x, max y) in meters."""

@@ -14,18 +14,17 @@ from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, Bounds, map_size, map
 from simscen.worlds.maps.rasterization import CellMask, filled_cells, touched_cells
 
 MIN_OCCUPIED_VALUE = 65
-"""Cells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
+"""Minimum value of an occupied cell, for maps in mode scale or raw: Nav2's occupied_thresh in percent."""
 MAX_EDGES = 500_000
-"""Maximum number of straight edges of walls. A building of 16 million cells has about 10 000, noise one per cell."""
+"""Maximum number of straight edges of walls. A building of 16 million cells has about 10 000."""
 
 
 def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float = MAP_RESOLUTION_M) -> OccupancyGrid:
     """Draw the map of a world with cells of `resolution` m, from the cross section of `mesh` at `height` m.
 
-    `mesh` consists of the static solids of the world. A cell is occupied if any part of a solid, hollow or not, lies in
-    the cell at that height. A cell is unknown if it lies outside the building (see `_cells_outside_building`). All
-    other cells are free. If the world has its own map, the solids are drawn into a copy of that map, which keeps its
-    resolution. Raises InvalidInput if the map would have more than MAX_MAP_CELLS cells.
+    `mesh` consists of the static solids of the world. A cell is occupied if a solid overlaps the cell at `height`, and
+    unknown if it is outside the building (see `_cells_outside_building`). If the world has its own map, the solids are
+    drawn into a copy of that map, which keeps its resolution. Raises InvalidInput for more than MAX_MAP_CELLS cells.
     """
     section = cross_section(mesh, height)
     if world.grid is not None:
@@ -43,7 +42,7 @@ def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float 
 
 
 def occupied_cells(grid: OccupancyGrid, section: CrossSection) -> CellMask:
-    """Return the mask of the cells of `grid` that overlap the solids of a cross section, which is in m."""
+    """Return the mask of the cells of `grid` that overlap the solids of a cross section in the world frame."""
     points_in_cells = grid.origin.inverse().apply(section.segments.reshape(-1, 2)) / grid.resolution
     return touched_cells(CrossSection(points_in_cells.reshape(-1, 2, 2), section.owners), grid.shape)
 
@@ -81,9 +80,9 @@ def _cells_of_places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]
 def _cells_outside_building(occupied: CellMask, places: npt.NDArray[np.int64]) -> CellMask:
     """Return the mask of the free cells outside the building; all False if the world is not a building.
 
-    Free cells are outside if they are connected to the edge of the map. A world is a building if the enclosed free area
-    is larger than the outside area within the convex hull of all walls, and none of the `places` (row, column) lies
-    outside. A field of obstacles encloses hardly any area, so all of its free cells stay free.
+    Free cells are outside if they are connected to the edge of the map, otherwise enclosed. A world is a building if
+    the enclosed area is larger than the outside area within the convex hull of all walls, and none of the `places`
+    (row, column) is outside.
     """
     from scipy import ndimage
 
@@ -120,8 +119,7 @@ def _cells_in_convex_hull(occupied: CellMask) -> CellMask:
 def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
     """Return the occupied cells of a map as one closed mesh, `height` m tall; [] if no cell is occupied.
 
-    A straight edge of any length becomes one rectangle, and there are no faces between cells, so that no object can
-    catch on a seam. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
+    Each straight edge becomes one rectangle. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
     """
     occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():
@@ -173,9 +171,9 @@ def _caps(occupied: CellMask, name: str) -> Array:
 
 
 def _runs(lines: CellMask, name: str) -> npt.NDArray[np.int64]:
-    """Return the runs of True in the rows of a mask, as (n, 3): row, first column, column after the last.
+    """Return the runs of True in the rows of a mask, as (n, 3): row, first column, column after the run.
 
-    Raises InvalidInput with `name` as the name of the map if there are more than MAX_EDGES.
+    Raises InvalidInput for the map `name` if there are more than MAX_EDGES runs.
     """
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))

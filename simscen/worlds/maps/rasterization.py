@@ -1,7 +1,6 @@
-"""Rasterize the outlines of solids: find the grid cells that the solids touch or fill.
+"""Rasterize cross sections of solids: find the grid cells that the solids touch or fill.
 
-All coordinates are in cells: the cell in row r and column c covers c ≤ x < c + 1 and r ≤ y < r + 1. The functions
-process all segments of a cross section at once.
+All coordinates are in cells: the cell in row r and column c covers c ≤ x < c + 1 and r ≤ y < r + 1.
 """
 
 import numpy as np
@@ -16,14 +15,11 @@ Flags = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
 
 INWARD_OFFSET_CELLS = 1e-6
-"""Distance by which outlines are moved inwards, so that a wall that ends at the edge of a cell does not touch it."""
+"""Distance by which outlines are moved inwards, so that a solid does not touch a cell at whose edge it ends."""
 
 
 def touched_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
-    """Return the mask of `shape` (rows, columns) of the cells that overlap solids in any part.
-
-    `section` contains the outlines of the solids, in cells. Compare `filled_cells`, which only tests centers of cells.
-    """
+    """Return the mask of `shape` (rows, columns) of the cells of which any part overlaps a solid."""
     cells = filled_cells(section, shape)
     rows, columns = _outline_cells(section.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
@@ -32,10 +28,8 @@ def touched_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
 
 
 def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
-    """Return the rows (k,) and columns (k,) of the cells that segments (n, 2, 2) cross, possibly outside the grid.
-
-    The segments are split at the grid lines, so that each piece lies in one cell.
-    """
+    """Return the rows (k,) and columns (k,) of the cells that segments (n, 2, 2) cross, possibly outside the grid."""
+    # The segments are split at the grid lines, so that each piece lies in one cell.
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     owner = [np.arange(len(segments)), np.arange(len(segments))]
     along = [np.zeros(len(segments)), np.ones(len(segments))]
@@ -63,9 +57,8 @@ def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
 def filled_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
     """Return the mask of `shape` (rows, columns) of the cells whose center is inside a solid.
 
-    A center is inside if the winding number of the outlines around it is positive. Rows in which the outline of a solid
-    is not closed (a mesh with holes) are not filled, nor are solids with inverted faces, e.g. a room that is modeled as
-    a box seen from inside.
+    A center is inside if the winding number of the outlines around it is positive. Solids with inverted faces are not
+    filled. Nor are rows in which the outline of a solid is not closed, because the mesh has holes.
     """
     rows, columns, signs, owners = _crossings(section, shape)
     keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(section)[owners]
@@ -81,8 +74,8 @@ def _crossings(
 ) -> tuple[Integers, Integers, Array, npt.NDArray[np.int32]]:
     """Return row, column, sign, and owner (n,) of each crossing of an outline with the center line of a row.
 
-    The column is the first one whose center is at the crossing or at larger x. The sign is 1 if the solid begins there
-    and continues towards larger x, and -1 if the solid ends there. The owner is the index of the solid.
+    The column is the first one whose center is not left of the crossing. The sign is 1 if the solid is to the right of
+    the crossing, and -1 if the solid is to the left. The owner is the index of the solid.
     """
     (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
@@ -98,7 +91,7 @@ def _crossings(
 def _is_balanced(keys: Integers, signs: Array) -> Flags:
     """Return for each crossing whether the signs of all crossings with the same key have the sum 0.
 
-    The key stands for a row and a solid. If the sum is not 0, the outline of the solid is not closed in this row.
+    A key is a number for a row and a solid. If the sum is not 0, the outline of the solid is not closed in this row.
     """
     _, group = np.unique(keys, return_inverse=True)
     balanced: Flags = (np.bincount(group, weights=signs) == 0)[group]

@@ -28,11 +28,11 @@ Grays16 = npt.NDArray[np.uint16]
 """Gray values of pixels (rows, columns), 0 (black) to 65535."""
 
 MAX_PIXELS, MAX_BYTES = 16 * 2**20, 64 * 2**20
-"""Maximum number of pixels of an image, and of bytes of its file."""
+"""Maximum number of pixels of an image, and maximum size of the image file."""
 PROBLEM_CODE = "SC320"
-"""Code of all problems with the image of a map."""
+"""Error code of all problems with the image of a map."""
 UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
-"""Gray values of trinary maps written by map_saver."""
+"""Gray values in trinary maps by Nav2's map_saver."""
 MAX_DISTANCE_M = 1e4
 """Maximum distance of map cells from the origin of the map frame, as for coordinates in all files."""
 
@@ -172,11 +172,11 @@ def _to_8_bits(quanta: Grays16) -> Grays8:
 
 
 def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """Return the map that a YAML file (its content is `spec`) and an image describe, and warnings for the user.
+    """Return the map of a YAML file with the content `spec` and of its image, and warnings for the user.
 
-    As in map_server, only the 8-bit gray of a pixel counts, and the occupancy is computed in single precision. In the
-    modes trinary and scale, pixels that are not opaque are unknown. Raises InvalidInput for an image that cannot be
-    read, and for a map that extends farther than MAX_DISTANCE_M.
+    As in map_server, the occupancy depends on the 8-bit gray of a pixel. In the modes trinary and scale, pixels that
+    are not opaque are unknown. Raises InvalidInput for an image that cannot be read, and for a map that extends farther
+    than MAX_DISTANCE_M.
     """
     image = read_image(image_path)
     _check_distance(spec, image.gray.shape[::-1], image_path)
@@ -189,10 +189,7 @@ def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[s
 
 
 def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
-    """Raise InvalidInput for a map that is too large, e.g. because its resolution is in the wrong unit.
-
-    `pixels` are the width and the height of the image.
-    """
+    """Raise InvalidInput for a map that extends farther than MAX_DISTANCE_M. `pixels` are width and height."""
     distance = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
     if distance > MAX_DISTANCE_M:
         size = " x ".join(str(count) for count in pixels)
@@ -202,7 +199,7 @@ def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path)
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
-    """Return a table (256,) with the cell value in nav_msgs/OccupancyGrid for each gray value."""
+    """Return a table (256,) with the cell value, as in nav_msgs/OccupancyGrid, for each gray value."""
     grays = np.arange(256)
     if spec.mode == "raw":
         return np.where(grays <= OCCUPIED, grays, UNKNOWN).astype(np.int8)
@@ -220,7 +217,7 @@ def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
 
 
 def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_gray_count: int) -> tuple[str, ...]:
-    """Return a warning if pixels that map_saver wrote for unknown are read as free."""
+    """Return a warning if pixels with map_saver's gray for unknown cells are read as free."""
     if spec.mode == "raw" or spec.negate or not unknown_gray_count or table[UNKNOWN_GRAY] != FREE:
         return ()
     return (
@@ -230,10 +227,9 @@ def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_gray_count:
 
 
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
-    """Write a map as the file `yaml_path` and a PGM file of the same name, from which `load_map` reads the same grid.
+    """Write a map to the file `yaml_path` and to a PGM file of the same name. Raises OSError.
 
-    The mode is trinary, with map_saver's grays and thresholds, or raw if there are other values than free, occupied and
-    unknown. Raises OSError.
+    The mode is trinary, with map_saver's grays and thresholds, or raw if a cell is not free, occupied or unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
     require_regular_file(image_path)

@@ -34,7 +34,7 @@ MARKER_COLOR = (200, 24, 40, 255)
 MAX_SIDE_PIXELS = 1200
 """Length of the longer side of the picture."""
 SUPERSAMPLING = 2
-"""Factor by which the canvas is larger than the picture. It is scaled down at the end, for smooth lines."""
+"""Size of the canvas relative to the picture. The canvas is scaled down at the end, for smooth lines."""
 GAP_RING_RADIUS_PIXELS = 18 * SUPERSAMPLING
 """Radius of the ring around a gap, in canvas pixels."""
 
@@ -67,9 +67,9 @@ def draw_world(
 ) -> "Image.Image":
     """Return an RGB image of a world with y upwards, at most MAX_SIDE_PIXELS wide and tall.
 
-    Dark lines are the cross section of the world at `height` m. Occupied cells of the map are light blue, and unknown
-    cells gray. Bodies at their initial poses are orange, places green, and regions violet. The outlines `footprints`
-    and rings around the points `gaps`, both in the world frame, are red.
+    Dark lines are the cross section of the static solids at `height` m. Occupied cells of the map are light blue, and
+    unknown cells gray. Bodies at their initial poses are orange, places green, and regions violet. The outlines
+    `footprints` and rings around the points `gaps`, both in the world frame, are red.
     """
     from PIL import Image, ImageDraw
 

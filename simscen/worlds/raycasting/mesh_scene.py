@@ -1,10 +1,9 @@
 """Cast rays against one mesh, static or moving, by direct calls of the Embree library in packets of 16 rays.
 
-The embreex package contains the library, but its own Python functions are slow: they copy triangles number by number,
-and cast rays one by one.
+The embreex package contains the library, but its own Python functions are slow.
 
 A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened
-to end at the first triangle that it hits. Several scenes can therefore be swept one after another.
+to end at the first triangle that it hits. Several scenes can be swept one after another.
 """
 
 import ctypes
@@ -32,7 +31,7 @@ _INDICES, _VERTICES, _THREE_WORDS, _THREE_FLOATS = 0, 1, 0x5003, 0x9003
 _NO_ERROR, _OUT_OF_MEMORY = 0, 4
 """RTC_ERROR_NONE, RTC_ERROR_OUT_OF_MEMORY."""
 _ALIGNMENT_BYTES = 64
-"""Required alignment of the mask of a packet."""
+"""Required alignment of the mask of valid rays of a packet."""
 
 for _name, _result, _arguments in (
     ("rtcNewDevice", c_void_p, (ctypes.c_char_p,)),
@@ -76,10 +75,10 @@ def _device() -> c_void_p:
 
 
 class EmbreeScene:
-    """Thin wrapper of an `RTCScene` of triangles. Does not know frames; see `MeshScene`."""
+    """Thin wrapper of an `RTCScene` of triangles, in the frame of the vertices."""
 
     def __init__(self, vertices: Array, mesh: TriangleMesh | Mesh) -> None:
-        """Build the scene from the faces of `mesh`, but with `vertices` (n, 3) instead of the mesh's own.
+        """Build the scene from the faces of `mesh`, with `vertices` (n, 3) instead of those of `mesh`.
 
         Raises MemoryError, or RuntimeError if Embree refuses the triangles.
         """
@@ -108,7 +107,7 @@ class EmbreeScene:
             raise RuntimeError(f"Embree cannot take {count} triangles (error {error})")
 
     def shorten(self, rays: RayPackets, packets: slice = ALL_PACKETS) -> None:
-        """End the rays in the packets of this range at the first triangle that they hit."""
+        """Shorten the rays in a range of packets to the first triangle that they hit."""
         intersect, scene = _LIBRARY.rtcIntersect16, self._scene
         for packet in rays.addresses[packets]:
             intersect(_ALL_VALID_ADDRESS, scene, packet, _QUERY_ADDRESS)
@@ -117,11 +116,11 @@ class EmbreeScene:
 class MeshScene:
     """Triangles of a mesh to cast rays at, in the frame of the mesh.
 
-    Embree works in single precision. It therefore receives all positions relative to `center`.
+    Embree works in single precision and therefore receives all positions relative to `center`.
 
     center:  point near the mesh in m, by default the center of its bounding box
     radius:  radius in m of a sphere around `center` that contains the mesh
-    extent:  upper bound in m of the distance of the mesh from the origin of its frame
+    extent:  radius in m of a sphere around the origin of the frame that contains the mesh
     """
 
     def __init__(self, mesh: TriangleMesh | Mesh, center: Vector | None = None) -> None:
@@ -143,9 +142,9 @@ class MeshScene:
         return rays.distances()
 
     def sweep(self, fan: RayFan, position: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Shorten the rays of a fan at `position`; only those in the packets of this range.
+        """Shorten the rays of a fan at `position` in a range of packets.
 
-        The directions of the fan must be set already, in the frame of the mesh.
+        The directions of the fan must be set before, in the frame of the mesh.
         """
         (x, y, z), (mx, my, mz) = position, self.center
         fan.set_origin(x - mx, y - my, z - mz, packets)
@@ -154,18 +153,15 @@ class MeshScene:
 
 @cached_on_instance
 def cached_mesh_scene(mesh: TriangleMesh) -> MeshScene:
-    """Return the scene of a mesh. It is built once and kept with the mesh, also for processes that are forked later."""
+    """Return the scene of a mesh, which is built once and kept with the mesh. Forked processes share it."""
     return MeshScene(mesh)
 
 
 class MovingMesh:
-    """A mesh at a pose in the world. Rays are transformed to the frame of the mesh, so that its scene need not change.
-
-    Center and rotation are computed only when rays come near.
-    """
+    """A mesh at a pose in the world. Rays are transformed to the frame of the mesh, whose scene never changes."""
 
     def __init__(self, mesh: TriangleMesh, scene: MeshScene, pose: Pose3) -> None:
-        """Put a mesh, whose scene is `scene`, at `pose`: the pose of its frame in the world."""
+        """Place a mesh with its `scene` at a `pose` in the world."""
         self.mesh, self.scene, self.pose = mesh, scene, pose
         self._center: Vector | None = None
         self._rotation: Array | None = None
@@ -191,20 +187,20 @@ class MovingMesh:
         return math.dist(self.pose[:3], position) - self.scene.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
-        """Return the same as `MeshScene.distances`, for rays in the world frame."""
+        """Return the distances as `MeshScene.distances` does, but for rays in the world frame."""
         rotation = self._world_rotation
         return self.scene.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
 
     def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
-        """Shorten the rays of a fan at `pose`. `axes` are the x and y axis of that pose, all in the world frame.
+        """Shorten the rays of a fan at `pose` in the world, in the packets that may hit the mesh.
 
-        Only rays that may hit the bounding sphere of the mesh are cast.
+        `axes` are the unit vectors of the x-axis and the y-axis of `pose`, in the world frame.
         """
         for packets in packets_towards_sphere(fan, pose, self.center, self.scene.radius):
             self._sweep_packets(fan, packets, pose, axes)
 
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
-        """Transform the rays in the packets of this range to the frame of the mesh, and shorten them."""
+        """Transform the rays in a range of packets to the frame of the mesh, and shorten them."""
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
         fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
@@ -212,7 +208,7 @@ class MovingMesh:
 
 
 def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: float) -> list[slice]:
-    """Return the ranges of packets of a fan at `pose` with rays that may hit the sphere around `center`."""
+    """Return the ranges of packets of a fan at `pose` that contain rays that may hit a sphere."""
     (x, y, z), (px, py, pz, i, j, k, w) = center, pose
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)
@@ -229,7 +225,7 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
 def rays_hitting_sphere(
     center: Vector, radius: float, origins: Array, directions: Array, ends: Singles
 ) -> npt.NDArray[np.int64]:
-    """Return the indices of single rays that may hit the sphere around `center`; rays as in `MeshScene.distances`."""
+    """Return the indices of single rays that may hit a sphere. Rays are given as in `MeshScene.distances`."""
     offsets = center - origins
     ahead = (offsets * directions).sum(axis=1)
     lateral_squared = (offsets * offsets).sum(axis=1) - ahead**2

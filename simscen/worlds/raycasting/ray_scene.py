@@ -1,4 +1,8 @@
-"""Cast rays in a world: against one scene of the static world, a few of resting bodies, and one of each moving body."""
+"""Cast rays in a world that consists of static solids, resting bodies, and moving bodies.
+
+A scene is a set of triangles that rays are cast at (see `mesh_scene.MeshScene`). To sweep a fan means to cast the rays
+of a planar lidar: each ray is shortened to end at the first triangle that it hits.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Set
@@ -21,26 +25,27 @@ from simscen.worlds.raycasting.mesh_scene import (
 PlacedMesh = tuple[TriangleMesh, Pose3]
 """A mesh in the frame of a body, and the pose of that frame in the world."""
 HeightRange = tuple[float, float]
-"""Minimum and maximum height in m of the rays, and of the triangles that they need."""
+"""Minimum and maximum height in m. Rays between these heights need only triangles between them."""
 
 MAX_GROUP_TRIANGLES = 20_000
-"""Maximum number of triangles of a group of several bodies, so that building its scene takes about 10 ms."""
+"""Maximum number of triangles of a group of several bodies. Building the scene takes about 10 ms."""
 MAX_GROUPS = 16
-"""Number of groups from which on all groups are merged and divided anew when another body comes to rest."""
+"""Number of groups at which all bodies are grouped anew when another body comes to rest."""
 NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
+"""Default of `rest_poses`: all bodies are moving."""
 _MAX_RANGE_M = 1e30
-"""Maximum length of a ray: an infinite one would overflow in single precision."""
+"""Maximum length of a ray, because infinity would overflow in single precision."""
 _END_FACTOR = 1.001
-"""Initial length of a ray as a multiple of its range: a ray that is longer than its range at the end has no hit."""
+"""Initial length of a ray relative to its range. A ray that is still longer than its range has no hit."""
 _HEIGHT_MARGIN_M, _ROUNDING_MARGIN_M = 0.1, 0.01
-"""Minimum margin of the height range from which triangles are taken, and upper bound of rounding errors."""
+"""Minimum margin of a height range around the rays, and upper bound of rounding errors."""
 
 
 class RestingBodies:
-    """All resting bodies of a world, in groups with one scene each. A group is split when one of its bodies leaves."""
+    """All resting bodies of a world, in groups with one scene each. A group is split when one of the bodies leaves."""
 
     def __init__(self, center: Vector) -> None:
-        """Create an empty set. `center` is the center of the world, to which all scenes are relative."""
+        """Create an empty set. All scenes are relative to `center`, the center of the world."""
         self._center = center
         self._bodies: Mapping[str, PlacedMesh] = {}
         self._groups: list[RestingGroup] = []
@@ -63,18 +68,18 @@ class RestingBodies:
             self._groups += RestingGroup(self._center, meshes).split_to_limit()
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float, heights: HeightRange) -> None:
-        """Shorten the rays of a fan at `pose`, which are at most `reach` m long and have these heights.
+        """Shorten the rays of a fan at `pose`. Rays are at most `reach` m long, and between the `heights`.
 
-        The directions of the fan must be set already.
+        The directions of the fan must be set before.
         """
         for group in self._groups:
             if group.min_distance(pose[:3]) <= reach:
                 group.sweep(fan, pose, heights)
 
     def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
-        """Shorten single rays in place: set their lengths `ends` (n,) in m to their first hits.
+        """Shorten single rays in place: reduce their lengths `ends` (n,) in m to the first hits.
 
-        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and have these heights.
+        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are between the `heights`.
         """
         for group in self._groups:
             group.cast(origins, directions, heights, ends)
@@ -85,15 +90,12 @@ def _is_same(one: PlacedMesh, other: PlacedMesh) -> bool:
 
 
 class RestingGroup:
-    """Resting bodies with a common scene, which is built when rays come near.
-
-    The hits of a ray do not depend on other bodies of the scene, so the grouping does not affect results.
-    """
+    """Resting bodies with a common scene, which is built when rays come near. The grouping does not affect results."""
 
     def __init__(self, world_center: Vector, meshes: Mapping[str, Mesh]) -> None:
-        """Create a group of bodies from their meshes in the world frame, by name.
+        """Create a group from the meshes of the bodies in the world frame, by name.
 
-        The scene is relative to `world_center`, whatever the group is, so that the grouping does not affect rounding.
+        The scene is relative to `world_center`, so that rounding is the same in all groups.
         """
         self._world_center, self._meshes = world_center, meshes
         corners = np.concatenate([mesh.vertices for mesh in meshes.values()])
@@ -113,9 +115,9 @@ class RestingGroup:
                 yield from half.split_to_limit()
 
     def split_without(self, removed: Set[str]) -> Iterator["RestingGroup"]:
-        """Yield this group if it has none of the `removed` bodies, otherwise smaller groups of its other bodies.
+        """Yield this group if it has none of the `removed` bodies, otherwise smaller groups of the other bodies.
 
-        The group is halved repeatedly, so that the next body that leaves causes a smaller group to be rebuilt.
+        The group is halved repeatedly, so that the next removal affects a smaller group.
         """
         if removed.isdisjoint(self._meshes):
             yield self
@@ -131,7 +133,7 @@ class RestingGroup:
             yield RestingGroup(self._world_center, {name: self._meshes[name] for name in half_names})
 
     def _scene_between(self, heights: HeightRange) -> MeshScene:
-        """Return the scene of the triangles in a range of heights; it is kept until the range changes."""
+        """Return the scene of the triangles between two heights. It is kept until the heights change."""
         if self._scene is None or heights != self._heights:
             merged = _merge(list(self._meshes.values()))
             self._scene = MeshScene(submesh_between_heights(merged.vertices, merged.faces, heights), self._world_center)
@@ -164,17 +166,12 @@ def _merge(meshes: list[Mesh]) -> Mesh:
 class RayScene(RayCaster):
     """A `core.geometry.ray_fans.RayCaster` over the triangles of a world and of the bodies in it.
 
-    The scene of a moving body is built once in its own frame, and the few rays that come near it are transformed to
-    that frame. The triangles of resting bodies are transformed once to the world frame, so that many bodies form one
-    scene. The frame affects the last bits of distances. Whether a body counts as resting therefore depends only on the
-    current poses, not on earlier calls.
-
-    Distances agree with PyBullet's rays within 1 mm. Embree works in single precision. Each scene is therefore relative
-    to its own center: a world that is 10 km from the origin loses no precision, a world that is 10 km wide 0.5 mm.
+    For moving bodies, rays are transformed to the frame of the body. For resting bodies, triangles are transformed to
+    the world frame. Distances agree with PyBullet's rays within 1 mm.
     """
 
     def __init__(self, static: "TriangleMesh | RayScene") -> None:
-        """Create a scene with the static mesh of a world, or with the same static mesh as another scene."""
+        """Create a scene with the static mesh of a world, or with the static mesh of another scene."""
         self._static: MeshScene = static._static if isinstance(static, RayScene) else cached_mesh_scene(static)
         self._movers: dict[str, MovingMesh] = {}
         self._resting = RestingBodies(self._static.center)
@@ -211,10 +208,7 @@ class RayScene(RayCaster):
         return result
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """Return the distances (n,) in m of a fan with its frame at `pose`; values beyond `reach` mean no hit.
-
-        This method runs once per scan, so that each NumPy call counts.
-        """
+        """Return the distances (n,) in m of a fan with its frame at `pose`. Values beyond `reach` mean no hit."""
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.set_directions(ahead, left)
         fan.set_length(min(reach, _MAX_RANGE_M) * _END_FACTOR)
@@ -245,9 +239,9 @@ class RayScene(RayCaster):
         return ends
 
     def _height_range(self, low: float, high: float) -> HeightRange:
-        """Return the range from which triangles are needed for rays between two heights in m.
+        """Return a range that contains the heights of rays in m: the previous range if it contains them.
 
-        The last range is returned again as long as it contains the rays, because a new range requires new scenes.
+        A new range requires new scenes.
         """
         below, above = self._heights
         if not (below <= low - _ROUNDING_MARGIN_M and high + _ROUNDING_MARGIN_M <= above):
@@ -260,8 +254,3 @@ class RayScene(RayCaster):
 def _max_rise(slope: float, reach: float) -> float:
     """Return the height in m that a ray of `reach` m gains at most; `slope` is the z component of its unit vector."""
     return slope * reach if slope > 0 else 0.0
-
-
-def build_mesh_scene(mesh: TriangleMesh) -> None:
-    """Build the scene of a static mesh, so that processes that are forked later need not build it again."""
-    cached_mesh_scene(mesh)

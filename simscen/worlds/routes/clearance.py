@@ -1,4 +1,4 @@
-"""Compute the clearance from static solids, exactly where necessary, and test footprints for overlaps with a solid."""
+"""Compute the clearance from static solids, and test footprints for overlaps with a solid."""
 
 import math
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 MIN_RESOLUTION_M = 0.05
-"""Size of the cells of a grid on which paths or gaps are searched."""
+"""Minimum size of the cells of a grid on which paths or gaps are searched."""
 MAX_CELLS = 1_000_000
-"""Maximum number of cells of such a grid; the cells of larger worlds are larger."""
+"""Approximate maximum number of cells of a grid. The cells of larger worlds are larger."""
 MAX_LEVELS = 12
 """Maximum number of cross sections over the height of the robot. Walls and boxes need only one."""
 SPACING_M = 0.02
@@ -37,14 +37,13 @@ HALF_DIAGONAL_CELLS = 0.7072
 
 @dataclass(frozen=True, eq=False)
 class ClearanceField:
-    """Distance to the nearest solid: approximate for each cell of a grid, exact (see SPACING_M) for single points.
+    """Clearance (distance to the nearest solid): approximate for each cell of a grid, exact for single points.
 
     grid:                   grid without yaw; only its size, resolution, and origin are used
-    rough (rows, columns):  distance in m from the center of a cell to the center of the nearest cell that a solid
-                            touches, 0 for such cells; differs from the exact clearance of the center by at most
-                            HALF_DIAGONAL_CELLS
+    rough (rows, columns):  distance in m between the centers of a cell and of the nearest cell that a solid touches; at
+                            most HALF_DIAGONAL_CELLS from the exact clearance
     inside:                 mask of the cells whose center is in a solid
-    outline:                points of the outlines of all solids; None without solids
+    outline:                points on the outlines of all solids, SPACING_M apart; None without solids
     owners (n,):            index in `names` of the solid that each point of `outline` belongs to
     names:                  names of the solids
     """
@@ -104,10 +103,9 @@ class ClearanceField:
 
 
 def search_grid(bounds: Bounds, radius: float, min_resolution: float = MIN_RESOLUTION_M) -> OccupancyGrid:
-    """Return the grid for a search of paths of a disc of `radius` m.
+    """Return the grid for a search of paths of a disc of `radius` m, with room for a path around the world.
 
-    The grid extends beyond the `bounds` of the world by the diameter of the disc, so that a path can lead around the
-    world. Its cells are `min_resolution` m wide, or wider in a large world.
+    `bounds` are the bounds of the world. Cells are `min_resolution` m wide, or wider in a large world.
     """
     x0, y0, x1, y1 = bounds
     margin = 2 * radius
@@ -136,10 +134,9 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
 
 
 def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[CrossSection]:
-    """Return cross sections of a mesh between two heights, at most MAX_LEVELS.
+    """Return at most MAX_LEVELS cross sections of a mesh between two heights.
 
-    There is one between any two neighboring heights of vertices, which is exact for upright solids. If these are too
-    many, the heights of the cross sections are evenly spaced.
+    There is one between any two neighboring heights of vertices. If these are too many, the heights are evenly spaced.
     """
     low, high = z_range
     z = np.unique(np.round(mesh.vertices[:, 2], 3))
@@ -188,7 +185,7 @@ def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
 
 
 def _starts_inside(segments: Array, corners: Polygon) -> bool:
-    """Return whether a segment starts inside the footprint, because a small object may be completely inside."""
+    """Return whether a segment starts inside the footprint, as all segments of a small object do."""
     (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
     x, y = segments[:, 0].T
     starts = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]

@@ -15,11 +15,11 @@ from simscen.worlds.maps.map_size import Bounds
 from simscen.worlds.routes.clearance import ClearanceField, clearance_field, search_grid
 
 MIN_CLEARANCE_CELLS = 0.71
-"""Clearance below which a gap cannot be distinguished from a thin wall: half of a cell's diagonal."""
+"""Clearance below which a gap cannot be distinguished from a thin wall: half of the diagonal of a cell."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference up to which walls count as equally thin. Then the wall nearest to the middle of both ends is used."""
+"""Difference below which walls count as equally thin. Of these, the wall nearest to the middle of both ends is used."""
 OPPOSITE_COSINE = -0.5
-"""Cosine of the angle (120°), seen from the gap, beyond which two points are on different sides of the gap."""
+"""Cosine of the minimum angle (120°), seen from the gap, between points on different sides of the gap."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Gap:
     """Narrowest point of the widest path between two positions.
 
     x, y:   center in m
-    width:  width in m; 0 if every path leads through a wall: then the center is in the thinnest wall
-    sides:  nearest points of the solids on both sides; () if there is only one side or a wall
+    width:  width in m; 0 if every path leads through a wall (the center is then in the thinnest wall)
+    sides:  nearest points of the solids on both sides; () for a wall, or if there is a solid on one side only
     """
 
     x: float
@@ -44,16 +44,16 @@ def narrowest_gap(
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """Return the gap that blocks a disc of `radius` m on its way from one of the two `ends` to the other.
+    """Return the gap that blocks a disc of `radius` m between two `ends`.
 
     The width of the gap is exact to about 2 cm. Only the part of `mesh` between the heights `z_range` counts. `bounds`
-    are those of the world.
+    are the bounds of the world.
     """
     return narrowest_gap_in(clearance_field(mesh, search_grid(bounds, radius), z_range), ends, radius)
 
 
 def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float) -> Gap:
-    """Return the same as `narrowest_gap`, from a clearance field that was computed before."""
+    """Return the gap as `narrowest_gap` does, but from an existing clearance field."""
     grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
@@ -75,7 +75,8 @@ def _clearances(field: ClearanceField, max_clearance: float) -> Array:
 def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Return the cell (row, column) with the least clearance on the widest path between two cells.
 
-    `clearance` (rows, columns) is in m, and `ends` (2, 2) are the cells as (row, column).
+    `clearance` (rows, columns) is in m. `ends` (2, 2) are the two cells as (row, column). The search is a bisection of
+    the clearance.
     """
     from scipy import ndimage
 
@@ -93,9 +94,9 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
 def _connecting_cell(
     clearance: Array, level: float, first: tuple[int, ...], last: tuple[int, ...]
 ) -> npt.NDArray[np.int64]:
-    """Return a cell with clearance `level` that connects the region of greater clearance around `first` with another.
+    """Return a cell with the clearance `level` that connects two regions of greater clearance.
 
-    If possible, the other region is that around `last`. All cells are (row, column).
+    One region contains the cell `first`. The other one contains `last`, if possible. All cells are (row, column).
     """
     from scipy import ndimage
 
@@ -114,10 +115,7 @@ def _connecting_cell(
 
 
 def _thinnest_wall(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pose2]) -> tuple[float, float]:
-    """Return the point (x, y) at the center of the thinnest wall between the regions that contain the two ends.
-
-    Walls that do not adjoin both regions do not count, because a path through them would cross two walls.
-    """
+    """Return the center (x, y) of the thinnest wall between the regions that contain the two ends."""
     from scipy import ndimage
 
     points = np.array([end[:2] for end in ends])
@@ -135,9 +133,9 @@ def _thinnest_wall(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pos
 
 
 def _measure_gap(field: ClearanceField, position: Array, search_radius: float) -> Gap:
-    """Return the gap at a position (2,): between the two nearest points of solids on opposite sides.
+    """Return the gap at a position (2,), between the two nearest points of solids on opposite sides.
 
-    Only points of solids within `search_radius` m of the position are considered.
+    Only points within `search_radius` m of the position are considered.
     """
     assert field.outline is not None
     points = field.outline.data[field.outline.query_ball_point(position, search_radius)]

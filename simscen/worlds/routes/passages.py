@@ -1,6 +1,6 @@
 """Find the passages of a path: gaps between two solids that a robot has to cross, such as doors.
 
-The sides of a passage are points of the outline: the points on all solids that a `ClearanceField` contains.
+The two sides of a passage are points of `ClearanceField.outline`, which are points on the surfaces of all solids.
 """
 
 import math
@@ -19,22 +19,19 @@ MAX_WIDTH_M = 4.0
 SPACING_M, MAX_PROBES = 0.25, 80
 """Distance between the points of the path at which passages are searched, and maximum number of these points."""
 NARROW_WIDTH_M = 2.0
-"""Width up to which a passage is measured at its narrowest point instead of where the path crosses it."""
+"""Width up to which a passage is measured at its narrowest point. Wider ones are measured where the path crosses."""
 RAY_ROTATIONS = np.array(
     [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
 )
-"""Rotations (n, 2, 2) of the rays from a point of the path towards the other side of a passage: -60° to 60°.
-
-There are several rays because at an oblique door, the other door post is not exactly opposite.
-"""
+"""Rotation matrices (n, 2, 2) of the rays that search the other side of a passage: -60° to 60°."""
 MAX_POINTS = 400
-"""Maximum number of points of the outline on each side of a passage that are compared, to limit memory."""
+"""Approximate maximum number of points of the outline that are compared on each side of a passage."""
 
 
 def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
-    """Return the passages of a path (n, 2) to `goal`, in the order in which the path crosses them.
+    """Return the passages of a path (n, 2) to the goal named `goal`, in the order in which the path crosses them.
 
-    The widths of passages are exact to about 2 cm. `goal` is the name of the goal.
+    The widths of passages are exact to about 2 cm.
     """
     if field.outline is None:
         return ()
@@ -51,7 +48,7 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
 
 
 def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
-    """Return the passage between the two points of the outline that are nearest to the two `sides`."""
+    """Return the passage whose sides are the points of the outline that are nearest to the two points `sides`."""
     assert field.outline is not None
     one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
     return _passage(goal, (one, other), field)
@@ -68,7 +65,7 @@ def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage
 
 
 def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
-    """Yield pairs of points of the outline, by index, that may be the two sides of a passage at a point of the path.
+    """Yield pairs of outline points, by index, that may be the two sides of a passage at a point of the path.
 
     The pair that is nearest to the point comes first.
     """
@@ -91,7 +88,7 @@ def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int,
 def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
     """Return for each of the RAY_ROTATIONS the point (n, 2) where a ray from `point` hits a solid; nan without a hit.
 
-    The rays point away from `side`, which is `distance` m from `point`. Passages are at most MAX_WIDTH_M wide.
+    The rays point away from `side`, which is `distance` m from `point`.
     """
     steps = np.arange(0.0, MAX_WIDTH_M - distance, field.grid.resolution / 2)
     rays = point + steps[None, :, None] * (RAY_ROTATIONS @ ((point - side) / distance))[:, None]
@@ -122,9 +119,9 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
 
 
 def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
-    """Return the two sides of a passage where it is narrowest near `one` and `other`; all are indices of the outline.
+    """Return the sides of a passage at its narrowest point near the sides `one` and `other`.
 
-    If `one` and `other` are more than NARROW_WIDTH_M apart, returns them unchanged.
+    Sides are indices of outline points. If they are more than NARROW_WIDTH_M apart, they are returned unchanged.
     """
     assert field.outline is not None
     data = field.outline.data
@@ -142,7 +139,7 @@ def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, i
 
 
 def _subsample(indices: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
-    """Return at most MAX_POINTS of the indices, evenly spaced, and the index `required`."""
+    """Return about MAX_POINTS of the indices, evenly spaced, and the index `required`."""
     return np.append(indices[:: 1 + len(indices) // MAX_POINTS], required)
 
 
@@ -153,7 +150,7 @@ def _name_of_solid(index: int, field: ClearanceField) -> str:
 
 
 def _outline_point(index: int, field: ClearanceField) -> Point:
-    """Return a point of the outline, rounded to 1 mm to keep logs small."""
+    """Return a point of the outline, rounded to 1 mm."""
     assert field.outline is not None
     x, y = field.outline.data[index].tolist()
     return round(x, 3), round(y, 3)

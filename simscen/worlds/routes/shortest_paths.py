@@ -26,14 +26,13 @@ from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
 from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE_M = (0.03, 0.4)
-"""Heights in m between which solids block a robot: lower ones are sills to drive over, higher ones leave room below."""
-
+"""Heights in m between which solids block a robot. Lower solids are sills to drive over."""
 MIN_SHORTENING = 0.001
-"""Fraction of the length; a round that shortens the path by less is the last. Most paths need two to five rounds."""
+"""Minimum decrease of the length of a path, relative to its length, for another round."""
 MAX_ROUNDS = 12
 """Maximum number of rounds in which a path is straightened and smoothed."""
 SMOOTHING_STEPS = 24
-"""Smoothing steps in each round; they affect about five points on either side of a corner."""
+"""Number of smoothing steps in each round."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +51,7 @@ class ShortestPaths:
     """Finds the shortest paths of a disc of one radius in one world.
 
     Lengths are exact to about 1 %. If the paths around both sides of an obstacle differ by less than 3 %, the longer
-    one may be chosen. A radius smaller than 0.71 grid cells counts as 0.71 cells. A cell is 5 cm wide in worlds of up
-    to 50 x 50 m.
+    one may be chosen. A radius smaller than 0.71 grid cells counts as 0.71 cells.
     """
 
     def __init__(
@@ -104,7 +102,7 @@ class ShortestPaths:
         return (passage_between(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
 
     def path(self, start: Pose2, goal: Pose2) -> Array | None:
-        """Return the corners (n, 2) of the shortest path, with arcs as short chords; None if there is no path."""
+        """Return the points (n, 2) of the shortest path, with arcs as short chords; None if there is no path."""
         ends = np.array([start[:2], goal[:2]])
         if not self._field.has_clearance(ends, self._min_clearance).all():
             return None
@@ -138,12 +136,12 @@ class ShortestPaths:
 
     @cached_property
     def _optimistic_graph(self) -> GridGraph:
-        """Graph of all cells in which the center of the disc may be: no gap is missed, but some may be too narrow."""
+        """Graph of all cells in which the center of the disc may be. Some gaps in it may be too narrow."""
         return GridGraph(self._field.free_cells(self._radius - HALF_DIAGONAL_CELLS * self._field.grid.resolution))
 
     @cached_property
     def _strict_graph(self) -> GridGraph:
-        """Graph of the cells on whose center the disc has room: gaps hardly wider than the disc may be missed."""
+        """Graph of the cells at whose center the disc has room. Gaps hardly wider than the disc may be missed."""
         return GridGraph(self._field.free_cells(self._radius))
 
     def _search(self, graph: GridGraph, ends: Array) -> Array | None:
@@ -185,7 +183,7 @@ def shortest_paths_in(
 def legs_between(
     built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE_M
 ) -> list[Leg]:
-    """Return the shortest path of a disc for each pair (start, goal) of `ends`. Repeated pairs are searched once."""
+    """Return the shortest path of a disc for each pair (start, goal) of `ends`."""
     stops = [pose for start, goal in ends for pose in (start, goal.pose)]
     paths = shortest_paths_in(built, stops, radius, z_range) if stops else None
     found: dict[tuple[Pose2, Pose2], Leg] = {}
@@ -211,10 +209,10 @@ def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> Bounds:
 
 
 def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:
-    """Return a path (n, 2) shortened as far as it keeps `radius` m away from solids, with a tolerance of 0.1 cells.
+    """Return a path (n, 2) that is shortened, but keeps `radius` m away from solids (tolerance: 0.1 cells).
 
-    String pulling creates the straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path
-    onto arcs with `radius` around obstacles.
+    String pulling creates straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path onto
+    arcs around obstacles.
     """
     min_clearance = radius - 0.1 * field.grid.resolution
     for _ in range(MAX_ROUNDS):
@@ -233,10 +231,8 @@ def is_line_clear(a: Array, b: Array, field: ClearanceField, min_clearance: floa
 
 
 def _straighten(path: Array, field: ClearanceField, min_clearance: float) -> Array:
-    """Return only the corners of a path that are needed so that straight lines between them are clear (string pulling).
-
-    From each corner, the farthest point with a clear line is searched by doubling the step and bisection.
-    """
+    """Return a path of the fewest points of `path` (n, 2) with clear straight lines between them (string pulling)."""
+    # From each corner, the farthest point with a clear line is searched by doubling the step and bisection.
     kept, last = [0], len(path) - 1
     while kept[-1] < last:
         here = kept[-1]

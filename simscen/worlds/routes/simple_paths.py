@@ -1,7 +1,6 @@
-"""Find out fast whether a disc-shaped robot can reach a goal between upright solids.
+"""Fast search for a path of a disc-shaped robot between upright solids, without NumPy and SciPy.
 
-If no path is found here, there may still be one, and `shortest_paths` must be used. That module needs NumPy and SciPy,
-whose import takes longer than an entire search here.
+If no path is found here, there may still be one, and `shortest_paths` must be used.
 """
 
 import heapq
@@ -18,22 +17,22 @@ Point = tuple[float, float]
 Cell = tuple[int, int]
 """Point of the search grid: steps along x and y from the start."""
 Bucket = tuple[int, int]
-"""Square of 1 x 1 m in which the prisms nearby are listed: its lower left corner in m."""
+"""Square of 1 x 1 m, for which the prisms nearby are listed: lower left corner in m."""
 
 STEP_M = 0.2
 """Distance between neighboring points of the search grid, along x and y."""
 HALF_DIAGONAL_STEP_M = STEP_M * math.sqrt(0.5)
-"""Half of the length of a diagonal move. Every point of a move is at most this far from one end of the move."""
+"""Half of the length of a diagonal move. Each point of a move is at most this far from one end of the move."""
 SAMPLING_MARGIN_M = 0.02
-"""Additional clearance, because straight lines are checked at single points."""
+"""Additional clearance, because straight lines are checked only at single points."""
 MAX_POINTS = 4000
-"""Maximum number of grid points that a search visits. Beyond it, the search with SciPy is faster."""
+"""Maximum number of grid points that a search visits."""
 MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
 """Steps to the eight neighbors of a grid point."""
 
 
 class SimplePaths:
-    """Finds paths of a disc of `radius` m that avoid upright prisms with convex bases, whatever their height."""
+    """Finds paths of a disc of `radius` m around upright prisms with convex bases. Heights are ignored."""
 
     def __init__(self, prisms: Iterable[UprightPrism], radius: float) -> None:
         self._radius = radius
@@ -48,7 +47,7 @@ class SimplePaths:
                 self._near.setdefault(bucket, []).append(prism)
 
     def length(self, start: Point, goal: Point) -> float:
-        """Return the length in m of a path from start to goal, not always the shortest one; inf if none was found."""
+        """Return the length in m of a path from start to goal, maybe not the shortest one; inf if none was found."""
         if (start, goal) not in self._lengths:
             self._lengths[start, goal] = self._length(start, goal)
         return self._lengths[start, goal]
@@ -74,9 +73,9 @@ class SimplePaths:
         )
 
     def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
-        """Return the length in m of a path found by A* over a grid around the start; inf if none was found.
+        """Return the length in m of a path by A* over a grid around the start; inf if none was found.
 
-        `last_leg` returns the length of the rest of the path from a point; inf if the search must go on from there.
+        `last_leg` returns the length of the rest of the path from a grid point; inf if the search must continue.
         """
         lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
@@ -98,10 +97,8 @@ class SimplePaths:
         return math.inf
 
     def _can_move(self, here: Point, there: Point, is_from_start: bool) -> bool:
-        """Return whether the disc can move to a neighbor on the grid.
-
-        Every grid point except the start has so much clearance that the lines to its neighbors are clear.
-        """
+        """Return whether the disc can move from a grid point to a neighbor."""
+        # Every grid point except the start has so much clearance that the lines to its neighbors are clear.
         return self._has_clearance(there, HALF_DIAGONAL_STEP_M) and (not is_from_start or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
@@ -113,7 +110,7 @@ class SimplePaths:
         )
 
     def _has_clearance(self, point: Point, margin: float) -> bool:
-        """Return whether all solids are farther away than the radius plus `margin` m."""
+        """Return whether all prisms are at least the radius plus `margin` m away."""
         near = self._near.get((math.floor(point[0]), math.floor(point[1])), ())
         return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + margin for prism in near)
 

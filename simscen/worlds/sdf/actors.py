@@ -1,8 +1,7 @@
 """Convert `<actor>` elements to bodies that follow a scripted trajectory and cannot be pushed.
 
 As in Gazebo Classic (Actor::LoadScript), waypoints are world poses, trajectories follow each other by id, and an actor
-waits at its first waypoint until the time of that waypoint. simscen interpolates linearly between waypoints; Gazebo
-uses a spline through the same points.
+waits at the first waypoint until the time of this waypoint. The interpolation is linear; Gazebo uses a spline.
 """
 
 import math
@@ -27,7 +26,7 @@ Waypoint = tuple[float, Pose3]
 def read_actor(actor: ModelNode, world: ModelNode, reader: ShapeReader, report: ImportReport) -> Body | None:
     """Return the body of an actor, or None with a note in the report if the actor has no geometry.
 
-    `world` is the root of the tree that contains the actor. Raises UnusableElement for invalid values.
+    `world` is the node that contains the actor. Raises UnusableElement for invalid values.
     """
     element = actor.element
     script = element.child("script")
@@ -47,9 +46,9 @@ def read_actor(actor: ModelNode, world: ModelNode, reader: ShapeReader, report: 
 def _actor_solids(
     actor: ModelNode, start: Pose3, ground_pose: Pose3, reader: ShapeReader, report: ImportReport
 ) -> tuple[Solid, ...]:
-    """Return the solids of an actor in the planar frame `ground_pose` below it, so that they keep height and tilt.
+    """Return the solids of an actor in the frame at `ground_pose`; () for an actor without any geometry.
 
-    `start` is the initial pose of the actor in the world. Returns () for an actor without any geometry.
+    `start` is the initial pose of the actor in the world. `ground_pose` is the planar part of `start`.
     """
     links = [read_link(link, reader, report) for link in place_links(actor, start, report)]
     solids = [solid for link in links for solid in link.solids]
@@ -68,9 +67,9 @@ def _actor_solids(
 
 
 def _read_waypoints(script: Element) -> list[Waypoint]:
-    """Return the waypoints of all trajectories by time, which counts from the start of the script.
+    """Return the waypoints of all trajectories in the order of time. Time counts from the start of the script.
 
-    The trajectories follow each other in the order of their ids.
+    Trajectories follow each other in the order of their ids.
     """
     waypoints: list[Waypoint] = []
     offset = 0.0
@@ -86,7 +85,7 @@ def _read_waypoints(script: Element) -> list[Waypoint]:
 
 
 def _without_repetitions(waypoints: list[Waypoint]) -> list[Waypoint]:
-    """Return the waypoints without repeated ones; two different poses at the same time remain and form a jump."""
+    """Return the waypoints without repeated ones. Two different poses at the same time remain as a jump."""
     result = waypoints[:1]
     for time, pose in waypoints[1:]:
         if time > result[-1][0] or pose != result[-1][1]:
@@ -110,7 +109,7 @@ def _read_waypoint(element: Element) -> Waypoint:
 
 
 def _motion_path(script: Element, waypoints: list[Waypoint], report: ImportReport) -> MotionPath | None:
-    """Return the planar path of an actor; None with a note if its script is never started."""
+    """Return the planar path of an actor; None with a note in the report if its script is never started."""
     if not read_bool(script.child("auto_start"), default=True):
         report.note(script.location, "auto_start is off and no plugin will start it")
         return None
@@ -128,6 +127,6 @@ def _motion_path(script: Element, waypoints: list[Waypoint], report: ImportRepor
 
 
 def _height_and_tilt(pose: Pose3) -> tuple[float, ...]:
-    """Return z rounded to 1 mm, and the tilt about two axes rounded to 1°, to find out whether they change."""
+    """Return z rounded to 1 mm, and the tilt about two axes rounded to 1°."""
     up = pose.rotation()[2]
     return round(pose.z, 3), *(round(math.degrees(math.asin(max(-1.0, min(1.0, float(part)))))) for part in up[:2])

@@ -1,8 +1,7 @@
 """Read the collision geometry and the mass of links, and group links into static solids and movable bodies.
 
-Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and the physics
-would push apart separate bodies that overlap at a joint. A joint to the world or to a static model makes the whole
-group static. Links that no joint connects are separate bodies, as in Gazebo.
+Links that are connected by a joint of any type form one rigid body, because simscen has no jointed obstacles. A joint
+to the world or to a static model makes the whole group static. Links without joints are separate bodies.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,13 +43,13 @@ from simscen.worlds.sdf.shapes import ShapeReader
 DEFAULT_FRICTION = 1.0
 """Coefficient of friction without `<mu>`: that of rubber wheels on dry concrete."""
 DEFAULT_DENSITY_KG_M3 = 1000.0
-"""Density that SDF assumes for `<inertial auto="true">`: that of water."""
+"""SDF's default density for `<inertial auto="true">`."""
 DEFAULT_MASS_KG = 1.0
 """SDF's default mass of a link."""
 MAX_BODIES = 2000
 """Maximum number of bodies of a world, including actors."""
 MAX_MOVABLE_MASS_KG = 1e6
-"""Heavier bodies do not move. Physics is stable up to a thousand times this mass, and fails from 1e12 kg on."""
+"""Maximum mass of a body that can move. Heavier bodies are an error."""
 _WORLD = -1
 """Number that stands for the world in LinkGroups."""
 
@@ -67,7 +66,7 @@ class LinkContent:
 
 
 def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> LinkContent:
-    """Read the collisions and the mass of a link; unusable collisions are added to the report and left out."""
+    """Return the collisions and the mass of a link. Unusable collisions are added to the report and left out."""
     element = link.frame.element
     collisions: list[tuple[Element, list[Solid]]] = []
     for child in element.children:
@@ -101,10 +100,8 @@ def _collision_solids(
 
 
 def _friction(collision: Element, report: ImportReport) -> float:
-    """Return the coefficient of friction `<mu>` of ODE's surface, limited to DEFAULT_FRICTION.
-
-    In a contact, ODE and Gazebo use the lower friction of the two surfaces, and one of them is a rubber wheel.
-    """
+    """Return the coefficient of friction `<mu>` of ODE's surface, at most DEFAULT_FRICTION."""
+    # In a contact, ODE and Gazebo use the lower friction of the two surfaces, and one of them is a rubber wheel.
     mu_element: Element | None = collision
     for tag in ("surface", "friction", "ode", "mu"):
         mu_element = mu_element.child(tag) if mu_element is not None else None
@@ -121,7 +118,7 @@ def _friction(collision: Element, report: ImportReport) -> float:
 
 
 def _pose_in_link(pose: Element | None, link: PlacedLink) -> Pose3:
-    """Return the pose of a collision in the frame of its link; `<pose>` may refer to another frame of the model."""
+    """Return the pose of a collision in the frame of the link. `<pose>` may refer to another frame of the model."""
     frame, scope = reference_frame(pose), link.model.scope
     if pose is None or frame in ("", link.frame.name):
         return read_pose(pose)
@@ -137,7 +134,7 @@ def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:
-    """Return a shape with its sizes multiplied by `scale`; a radius by its x component, as in Gazebo Classic."""
+    """Return a shape with sizes multiplied by `scale`, and radii by its x component, as in Gazebo Classic."""
     if scale == (1.0, 1.0, 1.0):
         return shape
     x, y, z = scale
@@ -178,8 +175,7 @@ def _density(collision: Element, inertial: Element) -> float:
 def _volume(shape: Shape) -> float:
     """Return the volume in m³ that the triangles of a shape enclose.
 
-    It is the sum of the signed tetrahedra between the origin and each triangle, as in sdformat. For a mesh that is not
-    closed, the result depends on the origin.
+    For a mesh that is not closed, the result depends on the origin, as in sdformat.
     """
     mesh = triangulate(shape)
     a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
@@ -187,7 +183,7 @@ def _volume(shape: Shape) -> float:
 
 
 class LinkGroups:
-    """Disjoint sets (union-find) of links, which are given by numbers from 0; the set with _WORLD is static."""
+    """Disjoint sets (union-find) of links, which are numbers from 0. The set with _WORLD is static."""
 
     def __init__(self) -> None:
         self._parents: dict[int, int] = {_WORLD: _WORLD}
@@ -210,8 +206,8 @@ def split_model(
 ) -> tuple[list[Solid], list[Body]]:
     """Return the static solids and the movable bodies of a top-level model at `pose`, in document order.
 
-    `contents` are all links of the model and of the models in it. If there is only one movable body, it has the name
-    and the frame of the model, as in Gazebo. Otherwise each body has the name and the frame of its first link.
+    `contents` are all links of the model and of nested models. A single movable body has the name and the frame of the
+    model. If there are several, each has the name and the frame of its first link.
     """
     groups = _link_groups(model, [content.link for content in contents], report)
     members: dict[int, list[LinkContent]] = {}
@@ -225,7 +221,7 @@ def split_model(
 
 
 def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport) -> LinkGroups:
-    """Return the groups of links, by their index in `links`: joined by joints, or with _WORLD if static."""
+    """Return the groups of links, which are indices of `links`: joined by joints, or with _WORLD if static."""
     groups = LinkGroups()
     numbers = {id(link.frame): number for number, link in enumerate(links)}
     for number, link in enumerate(links):
@@ -268,7 +264,7 @@ def _body(name: str, pose: Pose3, group: list[LinkContent], report: ImportReport
 
 
 def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
-    """Return the total mass of a group in kg; 0 with an error in the report if the group is too heavy to move."""
+    """Return the total mass of a group in kg; 0 with an error in the report above MAX_MOVABLE_MASS_KG."""
     mass = sum(content.mass for content in group)
     if mass <= MAX_MOVABLE_MASS_KG:
         return mass
@@ -279,7 +275,7 @@ def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
 
 
 def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
-    """Return whether any link of the group is `<kinematic>`: contacts do not move it."""
+    """Return whether any link of the group is `<kinematic>`, so that contacts do not move the body."""
     is_kinematic = False
     for content in group:
         element = content.link.frame.element
@@ -291,7 +287,7 @@ def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
 
 
 def with_unique_names(bodies: list[Body], report: ImportReport, world: Element) -> tuple[Body, ...]:
-    """Return the bodies, with a number appended to every repeated name, and a note at the `world` element.
+    """Return the bodies, with a number appended to each repeated name, and a note at the `world` element.
 
     Raises UnusableElement for more than MAX_BODIES.
     """

@@ -1,6 +1,6 @@
 """Read values from the XML elements of SDF files, and report elements that the importer does not read.
 
-All functions that read a value raise UnusableElement at the element that holds an invalid value.
+Functions that read a value raise UnusableElement if the value is invalid.
 """
 
 import difflib
@@ -16,7 +16,7 @@ from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.report import ImportReport, OutOfReach, SourceLocation, UnusableElement
 
 MAX_SHOWN_NAME_LENGTH = 120
-"""Number of characters to which tags and names are cut in messages."""
+"""Maximum number of characters of tags and names in messages; the rest is cut off."""
 MAX_NAME_LENGTH = 120
 """Maximum number of characters of the name of a model, link or frame."""
 MAX_COORDINATE_M = 1e4
@@ -50,7 +50,7 @@ class Element(markup.Element):
             yield from child.descendants()
 
     def unusable(self, message: str, hint: str = "") -> UnusableElement:
-        """Return an error about this element, to be raised."""
+        """Return an error about this element."""
         return UnusableElement(self.location, message, hint)
 
 
@@ -73,7 +73,7 @@ def _printable(name: str) -> str:
 
 
 def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
-    """Return the finite numbers in an element's text; their number must be one of `counts`."""
+    """Return the finite numbers in the text of an element. There must be as many as one of `counts`."""
     words = element.text.split()
     if len(words) not in counts:
         raise element.unusable(f"expected {' or '.join(map(str, counts))} numbers, got {len(words)}")
@@ -136,12 +136,12 @@ def read_positive(parent: Element, tag: str) -> float:
 
 
 def read_bool(element: Element | None, default: bool = False) -> bool:
-    """Return the boolean in an element's text: 1, true, True, TRUE, or 0, false, …; `default` without an element."""
+    """Return the boolean in the text of an element, see `parse_bool`; `default` without an element."""
     return default if element is None else parse_bool(element.text, element)
 
 
 def parse_bool(word: str, element: Element) -> bool:
-    """Return the boolean that a text or attribute of `element` means; the case of `word` does not matter."""
+    """Return the boolean in the text or an attribute of `element`: 1, 0, true, or false in any capitalization."""
     word = word.strip().lower()
     if word not in ("0", "1", "true", "false"):
         raise element.unusable(f"expected true or false, got {word[:40]!r}")
@@ -149,7 +149,7 @@ def parse_bool(word: str, element: Element) -> bool:
 
 
 def checked_name(element: Element, name: str | None = None) -> str:
-    """Return the `name` attribute of an element, or `name` if given; raises UnusableElement if the name is invalid."""
+    """Return the `name` attribute of an element, or `name` if given. Raises UnusableElement for an invalid name."""
     name = element.name if name is None else name
     if not name:
         raise element.unusable(f"<{element.tag}> has no name")
@@ -161,10 +161,7 @@ def checked_name(element: Element, name: str | None = None) -> str:
 
 
 def reference_frame(pose: Element | None) -> str:
-    """Return the name of the frame that a `<pose>` is relative to; "" if it states none.
-
-    The attribute is `relative_to`. Before SDF 1.7, it was `frame`.
-    """
+    """Return the attribute `relative_to` (before SDF 1.7: `frame`) of a `<pose>`; "" without one."""
     if pose is None:
         return ""
     return pose.attributes.get("relative_to", pose.attributes.get("frame", ""))
@@ -173,8 +170,8 @@ def reference_frame(pose: Element | None) -> str:
 def read_pose(element: Element | None) -> Pose3:
     """Return the pose in a `<pose>`: x y z and either roll pitch yaw or a quaternion x y z w; identity without one.
 
-    Source: SDF specification, "Specifying pose in SDFormat"; `rotation_format` and `degrees` were added in 1.9. Raises
-    OutOfReach if a coordinate exceeds MAX_COORDINATE_M.
+    Source: SDF specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds
+    MAX_COORDINATE_M.
     """
     if element is None or not element.text:
         return Pose3()
@@ -224,7 +221,7 @@ HARMLESS = {
     "heightmap": {"texture", "blend", "use_terrain_paging", "sampling", "use_terrain_splatting"},
     "mesh": {"convex_decomposition"},
 }  # fmt: skip
-"""Elements that are ignored because they add no solids, by parent. Source: SDF specification 1.4 to 1.12, examples."""
+"""Elements that are ignored because they add no solids, by parent. Source: SDF specification 1.4 to 1.12."""
 
 SHAPES: dict[str, set[str]] = {
     "box": {"size"},
@@ -239,7 +236,7 @@ SHAPES: dict[str, set[str]] = {
     "mesh": {"uri", "scale", "submesh"},
     "empty": set(),
 }
-"""Shapes and the children that are read from each of them."""
+"""Shapes and the children that are read."""
 
 GEOMETRIC = SHAPES | {
     "world": {"model", "include", "actor", "population", "joint", "frame", "state"},
@@ -261,10 +258,9 @@ _XACRO_CONDITIONALS = ("xacro:if", "xacro:unless")
 def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
     """Report an element that the importer does not read, unless it is harmless. `parent` is a key of GEOMETRIC.
 
-    Raises UnusableElement if the unknown element could change the geometry: if it contains solids, if its parent is a
-    shape, or if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note to the report. Elements
-    with a namespace prefix are ignored as extensions, which SDF allows. Exceptions are xacro elements and
-    `experimental:params`, which must be expanded first.
+    Raises UnusableElement if the element could change the geometry: if it contains solids, if its parent is a shape, or
+    if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note to the report. Elements with a
+    namespace prefix are ignored, except xacro elements and `experimental:params`, which must be expanded first.
     """
     tag = element.tag
     harmless = HARMLESS.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)

@@ -1,4 +1,4 @@
-"""Find the files that an SDF world refers to by URI, read them, and open included models."""
+"""Find and read the files that an SDF world refers to by URI, and parse included models."""
 
 import os
 from pathlib import Path
@@ -13,7 +13,7 @@ MAX_WORLD_BYTES = 20 * 2**20
 MAX_MESH_BYTES = 64 * 2**20
 """Maximum size of a mesh or image file."""
 MAX_SHOWN_URI_LENGTH = 1000
-"""Number of characters up to which messages contain the URI."""
+"""Maximum length of a URI that messages contain."""
 OLDEST_VERSION, NEWEST_VERSION = (1, 3), (1, 12)
 """Oldest and newest version of SDF that is read."""
 _NEWEST_PATCH = (*NEWEST_VERSION, 99)
@@ -24,11 +24,11 @@ BUILT_IN_MODELS = {
     "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
     "</collision></link></model></sdf>",
 }
-"""SDF of models that Gazebo installs and nearly every world includes. The user's folders need not contain them."""
+"""SDF of models that Gazebo installs, used if they are not in the allowed folders."""
 
 
 class WorldFiles(AllowedFolders):
-    """Allowed folders of an SDF world. Errors are raised as UnusableElement with the position of the element."""
+    """Allowed folders of an SDF world, with methods that raise UnusableElement with the position of the element."""
 
     def locate(self, element: Element) -> Path:
         """Return the real path of the file or folder that a `<uri>` refers to.
@@ -60,7 +60,7 @@ class WorldFiles(AllowedFolders):
 
 
 class IncludedFiles:
-    """Parses the world file and the files that `<include>` refers to, each once, and rejects include cycles."""
+    """Parses the world file and, once each, the files that `<include>` refers to. Rejects include cycles."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report
@@ -68,7 +68,7 @@ class IncludedFiles:
         self._open_paths: list[str] = []
 
     def open_world(self, path: Path) -> Element:
-        """Return the root element of the world file."""
+        """Return the root element of the world file. Raises UnusableElement."""
         real_path, data = self._files.read_world(path)
         self._open_paths = [str(real_path)]
         root = parse(data, self._files.display_path(real_path), str(real_path.parent))
@@ -118,7 +118,7 @@ class IncludedFiles:
         return str(self._model_in_folder(found, uri) if found.is_dir() else found)
 
     def _model_in_folder(self, folder: Path, uri: Element) -> Path:
-        """Return the SDF file that model.config names, or model.sdf if model.config is missing or unusable."""
+        """Return the SDF file named in model.config, or model.sdf if model.config is missing or unusable."""
         config, model = folder / "model.config", folder / "model.sdf"
         if not os.path.lexists(config):
             if os.path.lexists(model):
@@ -135,7 +135,7 @@ class IncludedFiles:
 
 
 def _newest_model(config: Element) -> Element:
-    """Return the `<sdf>` of a model.config with the newest supported version, as sdformat does."""
+    """Return the `<sdf>` with the newest supported version in a model.config."""
     supported = [sdf for sdf in config.all("sdf") if sdf.text and _version(sdf) <= _NEWEST_PATCH]
     if not supported:
         raise config.unusable("no <sdf> of version 1.12 or older in this model.config")
@@ -143,7 +143,7 @@ def _newest_model(config: Element) -> Element:
 
 
 def _check_root(root: Element) -> None:
-    """Raise UnusableElement if this is not the root of an SDF file of a supported version."""
+    """Raise UnusableElement if `root` is not the root element of an SDF file of a supported version."""
     if root.tag == "robot":
         raise root.unusable("this is a URDF, not an SDF", "use it as the model of a robot")
     if root.tag != "sdf":

@@ -1,4 +1,4 @@
-"""Find the floor of a world that models its floor as geometry: a level slab near z = 0 on which robots drive."""
+"""Find the floor of a world that has a slab as its floor, on which robots drive."""
 
 from collections.abc import Sequence
 
@@ -20,15 +20,15 @@ MAX_FLOOR_HEIGHT_M = 0.3
 MAX_COVERING_HEIGHT_M = 0.05
 """Maximum height of the top of a floor covering: a thin slab that is a floor even if it lies on a ground plane."""
 MIN_FLOOR_HEIGHT_M = 0.001
-"""Height of the top up to which a floor is treated as lying at z = 0."""
+"""Height of the top of a floor up to which the floor is at z = 0."""
 MIN_FLOOR_WIDTH_M = 1.0
-"""Minimum width of a floor that carries other geometry; narrower slabs are steps or curbs."""
+"""Minimum width of a floor that carries other geometry. Narrower slabs are steps or curbs."""
 MIN_COVERING_WIDTH_M = 4.0
-"""Minimum width of a floor covering; smaller slabs are platforms."""
+"""Minimum width of a floor covering. Smaller slabs are platforms."""
 MIN_COVERED_FRACTION = 0.8
-"""Fraction of the world's area that a floor must cover."""
+"""Minimum fraction of the area of the world that a floor covers."""
 MAX_UNCOVERED_WIDTH_M = 1.0
-"""Maximum width of ground plane beside a floor: a wall can stand there, but no robot drives there."""
+"""Maximum width of the ground plane beside a floor covering. Walls can stand there."""
 SAMPLES = 64
 """Number of rows and columns of the grid on which the covered area is measured."""
 
@@ -45,8 +45,7 @@ def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has
     has_ground:    whether the world has a ground plane at z = 0
 
     A static level slab is the floor if it covers nearly all of `bounds`, and is either thin and wide, or carries other
-    geometry in a world without a ground plane. A block that stands on a ground plane is therefore never the floor. For
-    example, the floor of AWS's small_warehouse is a plate whose top is 3.4 cm above z = 0.
+    geometry in a world without a ground plane.
     """
     mesh = merge_solids(placed)
     top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), _level_faces(mesh)
@@ -75,7 +74,7 @@ def _level_faces(mesh: TriangleMesh) -> FaceMask:
 
 
 def _is_floor(mesh: TriangleMesh, faces: FaceMask, bounds: Bounds, has_ground: bool) -> bool:
-    """Return whether these level faces, which are at one height, are the floor of the world; see `floor_height`."""
+    """Return whether the level faces in a mask, all at one height, are the floor of the world; see `floor_height`."""
     corners: Array = mesh.vertices[mesh.faces[faces]]
     height = corners[..., 2].max()
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
@@ -90,9 +89,9 @@ def _is_floor(mesh: TriangleMesh, faces: FaceMask, bounds: Bounds, has_ground: b
 
 
 def _carries_geometry(mesh: TriangleMesh, height: float) -> bool:
-    """Return whether any solid begins at most MAX_COVERING_HEIGHT_M above `height` m, and ends higher than that.
+    """Return whether a solid stands on a floor at `height` m, or contains the floor and extends above it.
 
-    Such a solid stands on a floor at this height, or contains the floor.
+    The solid begins below `height` plus MAX_COVERING_HEIGHT_M, and ends above this height.
     """
     heights = mesh.vertices[mesh.faces, 2]
     lowest, highest = np.full(len(mesh.names), np.inf), np.full(len(mesh.names), -np.inf)

@@ -1,8 +1,7 @@
 """Compute the poses of links in the world, from the poses of models and the `<state>` that Gazebo Classic saved.
 
-Gazebo Classic applies the first `<state>` of a world after it loads the world (World::Load, Model::SetState). A state
-contains poses of models, nested models and links. These are world poses, and override those in the models. The new
-Gazebo ignores `<state>`, but worlds that have one were made with Classic.
+Like Gazebo Classic, the importer applies the first `<state>` of a world. A state contains world poses of models, nested
+models and links, which override the poses in the models.
 """
 
 from collections.abc import Iterator
@@ -82,7 +81,7 @@ def read_state(world: Element, report: ImportReport) -> WorldState:
 
 
 def _read_model_state(element: Element, report: ImportReport) -> ModelState:
-    """Read a `<model>` of a `<state>`; unusable values are added to the report and left out."""
+    """Return the state in a `<model>` of a `<state>`. Unusable values are added to the report and left out."""
     links: dict[str, Pose3] = {}
     models: dict[str, ModelState] = {}
     pose, scale = None, (1.0, 1.0, 1.0)
@@ -102,7 +101,7 @@ def _read_model_state(element: Element, report: ImportReport) -> ModelState:
 
 
 def _read_scale(element: Element) -> Scale:
-    """Return the factor for the sizes of collisions: Classic saves the sizes divided by this scale."""
+    """Return the factors for the sizes of collisions."""
     x, y, z = read_numbers(element, 3)
     if min(x, y, z) <= 0:
         raise element.unusable(f"a scale must be positive, got {element.text}")
@@ -124,7 +123,7 @@ def place_links(
 def _place_links_below(
     model: ModelNode, pose: Pose3, scoped_name: str, report: ImportReport, state: ModelState
 ) -> Iterator[PlacedLink]:
-    """Yield the links of `place_links`; `scoped_name` is the name of the model with the models around it."""
+    """Yield the links of `place_links`; `scoped_name` is the name of the model, for example outer::nested."""
     model_pose = state.pose if state.pose is not None else pose
     for part in model.parts:
         with report.skip_unusable():

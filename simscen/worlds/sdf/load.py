@@ -24,7 +24,7 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_FRACTION = 0.05
-"""Outliers may be this fraction of the models, plus one model. With more outliers, the world is regarded as large."""
+"""Maximum fraction of the models that are outliers; one more model is allowed."""
 
 Placed = TypeVar("Placed", Solid, Body)
 """A solid or a body: both have a pose."""
@@ -34,12 +34,12 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     """Load the world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
     Only collision geometry is used. Static models become solids, other models bodies with their mass, and actors
-    bodies of mass 0 with a path. Poses are in the world frame, and the order is that of the document. A world whose
-    floor is above z = 0 is lowered, because robots drive at z = 0. Files that the world refers to are searched in its
-    folder and in the folders `search`, and must lie inside `root` or `search`.
+    bodies of mass 0 with a path. A world whose floor is above z = 0 is lowered, because robots drive at z = 0. Files
+    that the world refers to are searched in its folder and in the folders `search`, and must be inside `root` or
+    `search`.
 
-    Raises InvalidInput with all elements that would change the geometry but cannot be used. With `lenient`, such
-    elements are left out with a note in `World.notes`, and only an unreadable world file is an error.
+    Raises InvalidInput for elements that affect the geometry but cannot be used. With `lenient`, such elements are left
+    out with a note in `World.notes`, and only an unreadable world file is an error.
     """
     report, files = ImportReport(lenient=lenient), WorldFiles.of([root, *search])
     try:
@@ -83,7 +83,7 @@ class _WorldImporter:
         self._bodies: list[Body] = []
 
     def build(self, state: WorldState, tree: TreeReader) -> World:
-        """Return the world with the saved `state` applied; `tree` reads the models that the state inserts."""
+        """Return the world after applying the saved `state`; `tree` reads the models that the state inserts."""
         for element in state.inserted:
             with self._report.skip_unusable():
                 tree.add_model(self._root, tree.read_model(element, is_parent_static=False))
@@ -178,8 +178,8 @@ def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
     """Return the models to leave out so that the others fit on a map, with their distances in m.
 
     Distances are from the median of the centers of all models. `extents` are the bounding rectangles of the models by
-    name. The result is empty if all models fit, or if more than MAX_OUTLIER_FRACTION would have to be left out. It is
-    also empty if one of the models to leave out overlaps the area of the others: it is then large, not far away.
+    name. The result is empty if all models fit, if more than MAX_OUTLIER_FRACTION would be outliers, or if an outlier
+    overlaps the area of the other models, because it is then large and not far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:

@@ -1,7 +1,6 @@
 """Parse COLLADA (DAE), STL and OBJ mesh files into named parts with vertices in m.
 
-COLLADA is read with pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh's
-exchange functions without creating `Trimesh` objects, which would compute normals of degenerate triangles.
+COLLADA is parsed by pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh.
 """
 
 import io
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 MAX_FACES = 1_000_000
 """Maximum number of triangles of a file."""
 MAX_NODES = 10_000
-"""Maximum number of nodes of a COLLADA scene, in which a node may be instantiated repeatedly."""
+"""Maximum number of nodes of a COLLADA scene, including repeated instances of a node."""
 STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50
 """Size of the header and of each triangle of a binary STL file."""
 MATERIAL_ELEMENTS = {"library_materials", "library_effects", "library_images", "bind_material"}
@@ -33,7 +32,7 @@ MATERIAL_ELEMENTS = {"library_materials", "library_effects", "library_images", "
 INSTANCE_ELEMENTS = {"instance_geometry", "instance_controller", "instance_node"}
 """COLLADA elements that add geometry to a scene node."""
 UNSUPPORTED_ELEMENTS = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
-"""COLLADA geometry that is not read, and is an error."""
+"""COLLADA geometry that is an error, because it cannot be read."""
 
 # trimesh logs tracebacks of formats that it tries; without any handler, Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
@@ -82,7 +81,7 @@ def _check_face_count(count: int) -> None:
 
 
 def _without_unused_vertices(part: MeshPart) -> MeshPart:
-    """Return the part without the vertices that no triangle uses, which would shift its center and its extent."""
+    """Return the part without the vertices that no triangle uses."""
     used, faces = np.unique(part.faces, return_inverse=True)
     return MeshPart(part.names, part.vertices[used], faces.reshape(-1, 3))
 
@@ -97,7 +96,7 @@ def _read_stl(data: bytes) -> Iterator[MeshPart]:
 
 
 def _check_stl_header(data: bytes) -> None:
-    """Raise UnusableMesh if the number of triangles does not match the file size: PyBullet would read past the end."""
+    """Raise UnusableMesh if the number of triangles does not match the file size of a binary STL."""
     if len(data) < STL_HEADER_BYTES:
         raise UnusableMesh("too short for an STL file")
     stated = int.from_bytes(data[80:84], "little")
@@ -116,7 +115,7 @@ def _read_obj(data: bytes) -> Iterator[MeshPart]:
 
 
 def _parts_from_trimesh(load: Callable[[], Mapping[str, Any]], file_format: str) -> Iterator[MeshPart]:
-    """Call a loader of trimesh, and yield the parts in its result: keyword arguments of a Trimesh or of a Scene."""
+    """Call a loader of trimesh, and yield the parts in the result: keyword arguments of a Trimesh or of a Scene."""
     from trimesh.geometry import triangulate_quads
 
     try:
@@ -164,8 +163,7 @@ def _read_dae(data: bytes) -> Iterator[MeshPart]:
 def _geometry_only(data: bytes) -> bytes:
     """Return the content of a COLLADA file without materials and without scene nodes that have no geometry.
 
-    pycollada drops every geometry whose material or image is missing. Nodes without geometry are lights and cameras,
-    for which exporters write invalid matrices.
+    pycollada would drop geometry with missing materials or images. Lights and cameras often have invalid matrices.
     """
     root = ET.fromstring(data)
     with_geometry: set[ET.Element] = set()
@@ -199,7 +197,7 @@ def _local_name(element: "ET.Element") -> str:
 def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
     """Yield the parts of a COLLADA scene in the unit of the file.
 
-    The first name of a part is that of the nearest node above it that has a name.
+    The first name of a part is the name of the nearest node that has a name, from the part upward.
     """
     from collada.scene import GeometryNode, Node
 

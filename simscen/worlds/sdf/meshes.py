@@ -1,8 +1,6 @@
-"""Convert `<mesh>` and `<heightmap>` elements to triangle meshes; concave meshes stay concave.
+"""Convert `<mesh>` and `<heightmap>` elements to triangle meshes.
 
-A COLLADA `<unit>` is used; `<up_axis>` is not, because Gazebo ignores it as well: its ColladaLoader does not read the
-element, and its AssimpLoader undoes the rotation that assimp adds. Published worlds rely on this: meshes of Nav2's
-tb3_sandbox state Y_UP and stand upright along z.
+A COLLADA `<unit>` is used, but `<up_axis>` is ignored, as in Gazebo.
 """
 
 import hashlib
@@ -24,21 +22,19 @@ from simscen.worlds.sdf.mesh_files import MeshPart, UnusableMesh, read_parts
 from simscen.worlds.sdf.report import CODE, ImportReport
 
 MAX_CACHE_BYTES = 256 << 20
-"""Maximum size of all vertices and faces in the cache; the newest file is kept even if it is larger."""
+"""Maximum size of all vertices and faces in the cache. The newest file is kept even if it is larger."""
 MAX_HEIGHTMAP_PIXELS = 513
-"""Maximum number of pixels along an edge: Gazebo's heightmaps have 2^n + 1 pixels."""
+"""Maximum width and height of the image of a heightmap. Gazebo's heightmaps have 2^n + 1 pixels."""
 IMAGE_FORMATS = ("PNG", "BMP", "PPM", "JPEG", "TIFF")
-"""Formats of heightmaps, as Pillow calls them."""
+"""Pillow's names of the formats of heightmaps."""
 GRAY_MODES = ("L", "I", "I;16", "I;16B", "F")
-"""Pillow's single-channel modes, whose values are used as heights without conversion."""
+"""Pillow's single-channel modes. Images in other modes are converted to L."""
 
 
 class MeshCache:
-    """Cache of parsed mesh files by their content; the least recently used file is dropped first.
+    """Cache of parsed mesh files in memory, by their content. The least recently used file is dropped first.
 
-    The cache is in memory only, because a run must not write outside its output folder. The fork server fills the
-    cache, and the processes that it forks inherit the content. All callers receive the same arrays, which must not be
-    changed.
+    Forked processes inherit the cache. All callers receive the same arrays, which must not be changed.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -66,7 +62,7 @@ MESH_CACHE = MeshCache()
 
 @dataclass(frozen=True)
 class MeshRequest:
-    """What a `<mesh>` element asks for. Equal requests have the same mesh as result."""
+    """Content of a `<mesh>` element: a file, and how to use it."""
 
     path: Path
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
@@ -78,7 +74,7 @@ class MeshRequest:
 
 
 class MeshReader:
-    """Reads the meshes that the elements of one world refer to. Equal meshes are the same object, to save memory."""
+    """Reads the meshes that the elements of one world refer to. Equal meshes are the same object."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report
@@ -122,7 +118,7 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def _mesh_request(element: Element, path: Path) -> MeshRequest:
-    """Read scale and submesh from a `<mesh>` whose file is `path`. Raises UnusableElement."""
+    """Return the content of a `<mesh>` element that refers to the file `path`. Raises UnusableElement."""
     scale_element, submesh = element.child("scale"), element.child("submesh")
     scale = read_numbers(scale_element, 3) if scale_element else (1.0, 1.0, 1.0)
     if scale_element and 0.0 in scale:
@@ -146,10 +142,8 @@ def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: 
 
 
 def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
-    """Return the largest absolute coordinate in m of the requested mesh.
-
-    It is computed with Python floats: huge coordinates and scales overflow to infinity without a warning of NumPy.
-    """
+    """Return the largest absolute coordinate in m of the requested mesh."""
+    # With Python floats, huge coordinates and scales overflow to infinity without a warning of NumPy.
     reach = 0.0
     for axis, factor in enumerate(request.scale):
         low = min(float(part.vertices[:, axis].min()) for part in parts)
@@ -177,7 +171,7 @@ def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
 def read_heightmap(element: Element, files: WorldFiles) -> Solid:
     """Return the terrain of a `<heightmap>` as a solid, centered on `<pos>`. Raises UnusableElement.
 
-    As in Gazebo (gz-common, ImageHeightmap.cc), the brightest pixel is as high as the z of `<size>`, and black is 0.
+    As in Gazebo, the height of the brightest pixel is the z of `<size>`, and the height of black pixels is 0.
     """
     uri = element.child("uri")
     if uri is None:
@@ -189,7 +183,7 @@ def read_heightmap(element: Element, files: WorldFiles) -> Solid:
 
 
 def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
-    """Return the heights (rows, columns) in an image, from 0 to 1 for the brightest pixel. The first row is the top."""
+    """Return the heights (rows, columns) in an image: 0 for black, 1 for the brightest pixel. Row 0 is the top."""
     from PIL import Image
 
     path = files.locate(uri)

@@ -1,9 +1,8 @@
 """Read the tree of models in a world, and compute the poses of their frames.
 
-Every `<include>` is replaced by the model that it refers to. Every model is a scope for names of frames, with the
-implicit frame `__model__`; the world is a scope with the frame `world`. Names with `::` refer to frames of nested
-models; a name cannot refer to an enclosing model. Source: SDF proposals "Pose Frame Semantics" (1.7, 1.8) and
-sdformat's FrameSemantics.cc.
+An `<include>` is replaced by the model that it refers to. A model is a scope for names of frames. Its own frame is
+`__model__`, and that of the world is `world`. Names with `::` refer to frames of nested models. Source: SDF proposals
+"Pose Frame Semantics" (1.7, 1.8) and sdformat's FrameSemantics.cc.
 """
 
 from collections.abc import Iterator
@@ -24,21 +23,21 @@ from simscen.worlds.sdf.files import IncludedFiles
 from simscen.worlds.sdf.report import ImportReport
 
 MODEL_FRAME, WORLD_FRAME = "__model__", "world"
-"""Names of the implicit frame of a model, and of the world."""
+"""Names of the own frame of a model, and of the world."""
 MAX_MODELS = 20_000
-"""Maximum number of models, against exponential growth: files that include ten others at every level."""
+"""Maximum number of models, because files that include each other can multiply models."""
 
 
 @dataclass(eq=False)
 class Frame:
     """A named frame: of a link, a nested model, a joint, or a `<frame>` element.
 
-    element:            the XML element; a file that is included twice yields two frames with the same element
-    pose:               the `<pose>` element, relative to the frame in its attribute `relative_to`; None for identity
-    default_reference:  name of the frame to which `pose` is relative if it does not state one; "" for the scope's own
+    element:            the XML element; several frames can have the same one if a file is included several times
+    pose:               the `<pose>` element; None for identity
+    default_reference:  name of the frame to which a `pose` without `relative_to` is relative; "" for the scope's own
     attached_to:        name of the link or frame with which a joint or a `<frame>` moves; "" for the scope's own frame
     model_scope:        the frames in a nested model; None if this is not the frame of a model
-    placement_frame:    name of a frame in the nested model: if set, `pose` is the pose of this frame, not of the model
+    placement_frame:    name of a frame in the nested model that `pose` places; "" if `pose` places the model itself
     """
 
     name: str
@@ -55,8 +54,8 @@ class FrameScope:
     """The frames of one model or of the world, by name.
 
     implicit_frame:  name of the scope's own frame
-    canonical_link:  name of the link, frame, or nested model with which this frame moves; "" in the world
-    merged_models:   models that were included with merge="true", whose frames are visible in this scope too
+    canonical_link:  name of the link, frame, or nested model with which the scope's own frame moves; "" in the world
+    merged_models:   models included with merge="true", whose frames are visible in this scope, too
     """
 
     implicit_frame: str = MODEL_FRAME
@@ -135,9 +134,9 @@ class FrameScope:
         return self.link_of_frame(frame.attached_to, referrer, (*visited, frame))
 
     def _model_with_frame(self, name: str) -> tuple[Frame | None, str]:
-        """Return the frame of the nested or merged model that has the frame `name`, and the frame's name in that model.
+        """Return the frame of the nested or merged model that contains the frame `name`, and the frame's name there.
 
-        The model is None if there is none.
+        Returns None instead of the frame if there is no such model.
         """
         head, _, rest = name.partition("::")
         nested = self.frames.get(head)
@@ -149,7 +148,7 @@ class FrameScope:
         return None, name
 
     def has_frame(self, name: str) -> bool:
-        """Return whether `name` is a frame of this scope or of a model in it."""
+        """Return whether `name` is a frame of this scope or of a model in this scope."""
         return name == self.implicit_frame or name in self.frames or self._model_with_frame(name)[0] is not None
 
 
@@ -157,10 +156,10 @@ class FrameScope:
 class ModelNode:
     """A model, an actor, or the world as the outermost model.
 
-    frame:      the model's own frame, in the scope of its parent
+    frame:      frame of the model in the scope of its parent
     scope:      the frames in the model
-    is_static:  True if the model or a model around it is static, as in Gazebo
-    parts:      links (their frames) and nested models, in document order; an actor has only links
+    is_static:  whether the model or a model around it is static
+    parts:      links (as frames) and nested models, in document order; an actor has only links
     joints:     `<joint>` elements
     actors:     actors of the world; empty for models
     """
@@ -183,24 +182,23 @@ class ModelNode:
 
 
 class TreeReader:
-    """Reads the trees of worlds and models; unusable elements are added to the report and left out."""
+    """Reads the trees of worlds and models. Unusable elements are added to the report and left out."""
 
     def __init__(self, included_files: IncludedFiles, report: ImportReport) -> None:
         self._included_files, self._report = included_files, report
         self._model_count = 0
 
     def read_world(self, element: Element) -> ModelNode:
-        """Read the models and actors of a `<world>`."""
+        """Return the node of a `<world>` with its models and actors."""
         scope = FrameScope(WORLD_FRAME)
         world = ModelNode(element.name, element, Frame(WORLD_FRAME, element, None), scope)
         self._read_children(world, "world")
         return world
 
     def read_model(self, element: Element, is_parent_static: bool, include: Element | None = None) -> ModelNode:
-        """Read a `<model>`, which is static if it or its parent is static.
+        """Return the node of a `<model>`. Raises UnusableElement.
 
-        The children name, pose, static and placement_frame of `include` override those of the model, as the
-        specification allows. Raises UnusableElement.
+        The children name, pose, static and placement_frame of an `include` override those of the model.
         """
         self._model_count += 1
         if self._model_count > MAX_MODELS:
@@ -220,7 +218,7 @@ class TreeReader:
         return model
 
     def add_model(self, owner: ModelNode, model: ModelNode, is_merged: bool = False) -> None:
-        """Add a nested model to its owner. The frames of a merged model are visible in the owner too."""
+        """Add a nested model to its owner. The frames of a merged model are visible in the scope of the owner, too."""
         owner.parts.append(model)
         name = f"_merged__{model.name}__model__" if is_merged else model.name
         owner.scope.frames.setdefault(name, model.frame)
@@ -229,7 +227,7 @@ class TreeReader:
             owner.scope.merged_models.append(model.frame)
 
     def _read_children(self, owner: ModelNode, kind: str) -> None:
-        """Read all children of a "world", "model" or "actor" (`kind`)."""
+        """Add the children of an element to the node `owner`; `kind` is "world", "model" or "actor"."""
         for child in owner.element.children:
             with self._report.skip_unusable():
                 self._read_child(owner, kind, child)
@@ -264,7 +262,7 @@ class TreeReader:
                 report_unknown(child, kind, self._report)
 
     def _read_actor(self, element: Element, include: Element | None = None) -> ModelNode:
-        """Read an `<actor>`; name and pose of `include` override those of the actor."""
+        """Return the node of an `<actor>`. Name and pose of an `include` override those of the actor."""
         name = _checked_name(element, include.child("name") if include else None)
         pose = (include.child("pose") if include else None) or element.child("pose")
         scope = FrameScope(MODEL_FRAME)
@@ -273,7 +271,7 @@ class TreeReader:
         return actor
 
     def _read_include(self, owner: ModelNode, include: Element) -> None:
-        """Add the first model or actor of another file to the owner; a light is ignored. Raises UnusableElement."""
+        """Add the first model or actor of another file to the owner. A light is ignored. Raises UnusableElement."""
         report_unknown_children(include, "include", self._report)
         root = self._included_files.enter(include)
         try:

@@ -1,4 +1,4 @@
-"""Collect the problems and notes of the SDF importer, each with its file, line and element."""
+"""Problems and notes of the SDF importer, with file, line and element."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,25 +12,25 @@ CODE = "SC310"
 
 @dataclass(frozen=True)
 class SourceLocation:
-    """Position of an element in a file, for messages."""
+    """Position of an element in a file, for messages.
+
+    line, col:  position from 1; 0 if unknown
+    element:    path of the element, for example world[default]/model[shelf]
+    source:     text of the line
+    """
 
     file: str
-    """Name of the file."""
     line: int = 0
-    """Line from 1; 0 if unknown."""
     col: int = 0
-    """Column from 1; 0 if unknown."""
     element: str = ""
-    """Path of the element, for example world[default]/model[shelf]."""
     source: str = ""
-    """Text of the line."""
 
 
 class UnusableElement(Exception):
-    """An element that cannot be used. Leaving it out would change the geometry, so that it is an error."""
+    """An element cannot be used, although it affects the geometry."""
 
     is_harmless = False
-    """True if the element is left out with a note instead, because it cannot affect a robot."""
+    """Whether the element is left out with a note, because it cannot affect a robot."""
 
     def __init__(self, location: SourceLocation, message: str, hint: str = "") -> None:
         self.location, self.message, self.hint = location, message, hint
@@ -54,7 +54,7 @@ class MissingAsset(UnusableElement):
 class ImportReport:
     """Collects problems and notes in the order in which they are found, without repetitions.
 
-    An unusable element is a problem. If `lenient`, it is a note, and `skipped_count` counts these elements.
+    An unusable element is a problem. If `lenient`, it is left out with a note, and counted in `skipped_count`.
     """
 
     def __init__(self, *, lenient: bool = False) -> None:
@@ -69,7 +69,7 @@ class ImportReport:
         return tuple(self._notes)
 
     def note(self, location: SourceLocation, message: str) -> None:
-        """Add a note about the element at `location`; it is not an error."""
+        """Add a note about the element at `location`."""
         self._notes[": ".join(part for part in (location.file, location.element, message) if part)] = None
 
     def add_error(self, error: UnusableElement) -> None:
@@ -86,7 +86,7 @@ class ImportReport:
 
     @contextmanager
     def skip_unusable(self) -> Iterator[None]:
-        """Catch an UnusableElement that is raised in the block and add it, so that one import finds all mistakes."""
+        """Catch an UnusableElement that is raised in the block, and add it to the report."""
         try:
             yield
         except UnusableElement as error:
@@ -94,7 +94,7 @@ class ImportReport:
 
     @property
     def has_problems(self) -> bool:
-        """True if the world cannot be loaded."""
+        """Whether there are problems, so that the world cannot be loaded."""
         return bool(self._problems or self._missing)
 
     def raise_problems(self) -> None:
@@ -103,7 +103,7 @@ class ImportReport:
             raise InvalidInput(self._all_problems())
 
     def fatal_error(self, error: UnusableElement) -> InvalidInput:
-        """Return an InvalidInput with all problems and this error, which ends even a lenient import."""
+        """Return an InvalidInput with all problems and this error, even if the import is lenient."""
         self.lenient = False
         self.add_error(error)
         return InvalidInput(self._all_problems())

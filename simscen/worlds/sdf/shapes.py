@@ -1,4 +1,4 @@
-"""Convert `<geometry>` elements to solids: primitives, planes and polylines here, meshes and heightmaps by `meshes`."""
+"""Convert `<geometry>` elements to solids."""
 
 import math
 
@@ -20,13 +20,13 @@ from simscen.worlds.sdf.meshes import MeshReader, read_heightmap
 from simscen.worlds.sdf.report import ImportReport
 
 PLANE_THICKNESS_M = 0.02
-"""Thickness of the slab that replaces a plane. Its upper face is the plane."""
+"""Thickness of the slab that replaces a plane. The upper face of the slab is the plane."""
 GROUND_TOLERANCE_M = 0.01
-"""Distance from z = 0 up to which a level plane is the ground, which the simulator provides itself."""
+"""Maximum distance from z = 0 of a level plane that is the ground plane."""
 MIN_LEVEL_NORMAL_Z = math.cos(math.radians(0.5))
-"""Vertical component of the unit normal from which a face counts as level: at most 0.5° of tilt."""
+"""Minimum vertical component of the unit normal of a level face, which is tilted by at most 0.5°."""
 MAX_POLYLINE_POINTS = 1000
-"""Maximum number of points of all outlines of a `<geometry>`."""
+"""Maximum number of points of all polylines of a `<geometry>`."""
 TOLERANCE_M = 1e-9
 """Distance up to which points, heights and crossings count as equal."""
 
@@ -40,10 +40,9 @@ class ShapeReader:
         self.has_ground = False
 
     def solids(self, geometry: Element, world_from_geometry: Pose3) -> tuple[Solid, ...]:
-        """Return the solids of one `<geometry>` in its own frame; () for a ground plane and for `<empty>`.
+        """Return the solids of one `<geometry>` in its own frame; () for the ground plane and for `<empty>`.
 
-        `world_from_geometry` is the pose of this frame in the world, to recognize the ground plane. Raises
-        UnusableElement for anything that is not a valid shape of SDF 1.12.
+        `world_from_geometry` is the pose of this frame in the world. Raises UnusableElement for an invalid shape.
         """
         shapes = [child for child in geometry.children if not child.tag.startswith("xacro:")]
         if not shapes:
@@ -76,7 +75,7 @@ class ShapeReader:
 
 
 def _read_primitive(element: Element) -> Shape | None:
-    """Return the shape of an element, or None if it is not a primitive."""
+    """Return the shape of an element, or None if the element is not a primitive."""
     match element.tag:
         case "box":
             x, y, z = read_sizes(element, "size", 3)
@@ -138,8 +137,7 @@ def _rotation_from_z(normal: Array) -> Pose3:
 def _read_polylines(polylines: list[Element]) -> tuple[Solid, ...]:
     """Return the extrusions of all `<polyline>`s of one `<geometry>`. Raises UnusableElement for invalid outlines.
 
-    As in Gazebo (MeshManager::CreateExtrudedPolyline), several outlines are filled by the even-odd rule, so that nested
-    outlines become holes.
+    Several outlines are filled by the even-odd rule, as in Gazebo. Nested outlines are therefore holes.
     """
     heights = [read_size(polyline, "height") for polyline in polylines]
     if max(heights) - min(heights) > TOLERANCE_M:
@@ -171,7 +169,7 @@ def trapezoids(outlines: list[Array]) -> list[Array]:
     """Divide the area that is inside an odd number of `outlines` (n, 2) into triangles and trapezoids.
 
     Returns the corners (3 or 4, 2) of each piece, counterclockwise. The area is cut along horizontal lines through all
-    corners and crossings, which is exact for straight edges.
+    corners and crossings of edges.
     """
     starts, ends = _edges(outlines)
     levels = np.unique(np.concatenate([starts[:, 1], _crossing_levels(outlines)]))
@@ -204,7 +202,7 @@ def _crossing_levels(outlines: list[Array]) -> list[float]:
 
 
 def _trapezoids_between(starts: Array, ends: Array, low: float, high: float) -> list[Array]:
-    """Return the pieces of `trapezoids` between y = `low` and y = `high`, between which edges neither end nor cross.
+    """Return the pieces of `trapezoids` between y = `low` and y = `high`, where edges neither end nor cross.
 
     `starts` (n, 2) and `ends` (n, 2) are the ends of all edges.
     """
