@@ -140,8 +140,9 @@ class ClearancePlan(FollowedPlan):
 class AdvancedPlanManager(PlanManager):
     """Plan manager that plans around moving obstacles.
 
-    With `replanning: on_invalid`, it replans if the plan is blocked, leaves the rolling window, meets a moving
-    obstacle, has lost clearance, or may be much too long.
+    With `replanning: on_invalid`, it replans if the plan is blocked, ends at the edge of a rolling costmap that moved,
+    meets a moving obstacle, has lost clearance, or may be unnecessarily long. Most private methods are hooks of
+    PlanManager.
     """
 
     plan: ClearancePlan | None
@@ -251,10 +252,7 @@ PROGRESS_M = 1.0
 
 
 class ClearingBackoff:
-    """Policy that clears the entire global costmap at increasing intervals, otherwise only the area around the robot.
-
-    A robot that clears everything whenever it finds no path would forget one end of a wall at the other end.
-    """
+    """Policy that clears the entire global costmap at increasing intervals, otherwise only the robot's surroundings."""
 
     def __init__(self) -> None:
         self.reset()

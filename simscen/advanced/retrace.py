@@ -26,8 +26,8 @@ MIN_LATERAL_SHARE = 0.1
 class Trail:
     """The robot's path in reverse: evenly spaced poses from the current one to the oldest one, without loops.
 
-    Beyond the oldest pose, the trail continues straight backward. `poses` (n, 3) are x, y, and yaw. `driven` and
-    `along` (n,) are the distances in m that the base and the footprint (`footprint_distance`) move to each pose.
+    Beyond the oldest pose, the trail continues straight backward. `poses` (n, 3) are x, y, and yaw. `driven` (n,) are
+    the distances in m along the trail; `along` (n,) are the same distances by `footprint_distance`.
     """
 
     def __init__(self, earlier: Sequence[Pose2], current: Pose2, radius: float, extension: float) -> None:
@@ -140,7 +140,7 @@ class TrailFollower:
         return [*(Pose2(*each) for each in remaining[::-1].tolist()), *poses[first_new:]]
 
     def locate(self, pose: Pose2) -> None:
-        """Update the robot's position on the trail, the pose nearest to `pose`. The position only moves onward."""
+        """Find the robot on the trail: the pose nearest to `pose`, at most WINDOW_M after the last position."""
         window, self._last = self._window(), pose
         self._index += int(self._trail.footprint_distance(self._trail.poses[window], np.array(pose)).argmin())
 
@@ -189,7 +189,7 @@ class TrailFollower:
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide with obstacle cells.
 
-        Cells that are about as near at the current pose, or were on the trail, are ignored: errors of the costmap.
+        Cells that are about as near to the current pose or to a pose of the trail are ignored as errors of the costmap.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():

@@ -38,7 +38,8 @@ class CovarianceEstimator:
     """Scales the covariance of the particles to the real errors of the estimated pose.
 
     A particle filter treats the errors of successive scans as independent. Moved furniture causes equal errors in many
-    scans, so that the covariance of the particles is too small. Two measurements show by which ratio:
+    scans, so that the covariance of the particles is too small. Two measurements show the ratio of real errors to
+    estimated standard deviations:
 
     - The scatter of the last WINDOW_SIZE poses, which scan matching without the map propagates to the present.
     - The residuals of the beams that the map explains. The ratio of pose errors to residuals is learned from the

@@ -28,16 +28,15 @@ SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
 """Minimum distance driven and minimum lead of the pose that a robot without initial pose gets."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
-"""Minimum difference to the score of the current pose, and minimum score, of a pose that replaces it. The lead must be
-MIN_LEAD, and two searches must agree."""
+"""A pose replaces the current one if its score is above MIN_SCORE and exceeds that of the current pose by MIN_GAIN, its
+lead is MIN_LEAD, and two searches agree."""
 CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
-"""Distance driven between two searches near the current pose, and the score of the current pose that makes a search
-unnecessary."""
+"""Distance driven between two searches near the current pose. They are skipped if its score is above CERTAIN_SCORE."""
 MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
-"""Minimum score of a nearby pose that replaces the current one. The lead must be MIN_LEAD, and the gain MIN_GAIN, or
-CERTAIN_GAIN above CERTAIN_SCORE."""
+"""A nearby pose replaces the current one if its score is at least MIN_NEAR_SCORE, its lead is MIN_LEAD, and its gain is
+MIN_GAIN. CERTAIN_GAIN suffices if its score is above CERTAIN_SCORE."""
 MAX_REDUCTION = 0.1
-"""Maximum reduction of the score of a pose to which the drift since the last certain pose would be unlikely."""
+"""Maximum reduction of the score of a pose, if the drift from the last certain pose to this pose is unlikely."""
 MIN_LOG_RATIO = 3.0
 """Minimum log-likelihood ratio of another pose to the current one in the first `settling` m of Relocalizer."""
 SAME_POSE = 0.7, 0.3

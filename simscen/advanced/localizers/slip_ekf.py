@@ -44,7 +44,7 @@ class ScanMatchingCorrection:
         self._dead_reckoning.add(tick, Pose2(pose.x - self._x, pose.y - self._y, pose.yaw))
 
     def correction(self, scan: Scan) -> tuple[float, float]:
-        """Return the error (x, y) of dead reckoning since the last scan, as a translation in the map frame to add.
+        """Return the translation (x, y) in m, in the map frame, that corrects dead reckoning since the last scan.
 
         The result is 0 if scan matching fails or differs too much from dead reckoning (`Step.agrees`).
         """

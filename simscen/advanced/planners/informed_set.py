@@ -21,10 +21,9 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
 BLOCK_M, COST_BLOCK_M = 0.2, 0.15
-"""Approximate side length of the blocks, if lengths are distances and if they are costs."""
+"""Approximate side length of the blocks for shortest paths, and for cheapest paths (`by_cost`)."""
 MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
-"""Number of blocks above which blocks become larger, but not wider than the robot. Dijkstra's algorithm takes 10 ms for
-40 000 blocks."""
+"""Approximate maximum number of blocks for both. Larger maps get larger blocks, but at most as wide as the robot."""
 PATH_SPACING_M = 0.45
 """Distance between the points of `InformedSet.path` where there is ample clearance."""
 MAX_LEG_M = 30.0
@@ -35,7 +34,7 @@ Mask = npt.NDArray[np.bool_]
 class InformedSet:
     """Points on near-shortest paths from start to goal. `length` is the length of the shortest path in m.
 
-    A path moves from block to block as a king or a knight in chess. It is therefore up to 2.8 % too long.
+    A path moves from block to block in 16 directions, as a king or a knight in chess. It is up to 2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
@@ -84,7 +83,7 @@ class InformedSet:
         return np.asarray(rows * self._width + columns)
 
     def path(self, costmap: CostmapView, ample_clearance: float) -> Array:
-        """Return points (n, 2) of the shortest path without start and goal: the one with the most clearance per block.
+        """Return for each block of the shortest path the point (n, 2) with the most clearance, without start and goal.
 
         Where the clearance is at least `ample_clearance` m, only points PATH_SPACING_M apart are returned.
         """

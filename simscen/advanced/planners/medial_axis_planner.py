@@ -227,7 +227,7 @@ class ConfinedPosePlanner(PosePlanner):
 
 
 MAX_COSTLY_RATIO = 0.5
-"""Maximum share of a straight path that is replaced by a detour."""
+"""Maximum share of a straight path that is replaced by a detour around costly cells (see `straight_path`)."""
 MARGIN_BEHIND_M, MARGIN_AROUND_M = 2.0, 2.0
 """Margins of the part of the costmap in which a detour is planned: behind the costly cells, and around both ends."""
 MAX_COST_RATIO = 1.01

@@ -122,8 +122,8 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
     """Yield the searches. A search is an iterator of successive legs from start to goal.
 
     The first search samples the region of near-cheapest paths over a coarse grid. If the entire costmap has more than
-    MAX_SAMPLES, searches in corridors of near-shortest paths follow. The last ones sample the entire costmap, with
-    increasing density.
+    MAX_SAMPLES samples, searches in corridors of near-shortest paths follow. The last ones sample the entire costmap,
+    with increasing density.
     """
     problem, samples = make_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
     yield iter((Leg(problem, _cheap_samples(costs, ends, samples), REACH_M),))

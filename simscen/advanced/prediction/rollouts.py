@@ -216,7 +216,7 @@ class FollowedPath:
         return points[after - 1] + part * (points[after] - points[after - 1])
 
     def _headings(self, arc_lengths: Array, nearest: int, backward: bool) -> Array:
-        """Return the headings (…,) of the path at arc lengths in m, without the part before the point `nearest`."""
+        """Return the headings (…,) of the robot at arc lengths in m. Path points before `nearest` are ignored."""
         along, x, y = self._along, self._x, self._y
         later = np.minimum(arc_lengths + 0.1, along[-1])
         before = np.maximum(later - 0.2, along[nearest])

@@ -30,7 +30,7 @@ from simscen.model.guards import Prediction
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
 
 CENTER_STD_M, CENTER_STD_PER_M, HIDDEN_STD_M = 0.02, 0.004, 0.10
-"""Standard deviation of a measured center: a constant, a part per meter of range, and a part if it is partly hidden."""
+"""Standard deviation of a measured center: a constant, a part per meter of range, and a part for hidden edges."""
 INITIAL_STD_M = 0.1
 """Additional standard deviation of the first measurement of a track."""
 GATE_M, GATE_SIGMAS = 0.25, 3.0
@@ -115,7 +115,7 @@ def _update(assigned: list[tuple[Track, int]], current: ScanClusters) -> None:
 def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> None:
     """Start tracks for clusters that are not in `used`, if they are in formerly free space.
 
-    While something moves, clusters with MIN_START_RADIUS_M start tracks elsewhere, too.
+    While something moves, clusters of at least MIN_START_RADIUS_M also start tracks outside formerly free space.
     """
     # While something moves, it may have hidden the free space in which another obstacle appears.
     min_radius = MIN_START_RADIUS_M if any(track.is_moving for track in tracks) else math.inf
@@ -134,7 +134,8 @@ def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> 
 
 
 CHECKED_BEAMS = 120
-"""Approximate number of beams that are checked while there are no tracks. If one has a new hit, all beams are used."""
+"""Approximate number of beams that are checked while there are no tracks. If one hits something in formerly free space,
+all beams are processed."""
 MIN_NEW_SHARE, MIN_NEW_HITS = 0.3, 3
 """Minimum share and number of a cluster's hits in formerly free space for `appeared`."""
 STATIC_SHARE = 0.5

@@ -26,7 +26,7 @@ class ConstantVelocityFilter:
     velocity_variance: float
 
     def predict(self, seconds: float, acceleration: float) -> None:
-        """Predict the state after `seconds`; `acceleration` is its standard deviation in m/s² along each axis."""
+        """Predict the state after `seconds`. `acceleration` is a standard deviation in m/s² along each axis."""
         noise, drift = (acceleration * seconds) ** 2, self.velocity_variance * seconds
         self.position += self.velocity * seconds
         self.variance += seconds * (2.0 * self.covariance + drift) + 0.25 * seconds * seconds * noise
@@ -140,8 +140,8 @@ OCCLUDED_SPEED_RATIO = 1.6
 OCCLUDED_MAX_OCCUPIED_SHARE = 0.2
 """Maximum share of the stored updates with `was_occupied` of a track that counts as moving."""
 FAR_TRAVEL_M = 0.5
-"""A partly hidden track counts as moving after twice the largest radius plus this distance. The visible part of a wall
-at the edge of the field of view grows by less."""
+"""A partly hidden track counts as moving after traveling twice the largest radius plus this distance. The visible part
+of a wall at the edge of the field of view grows by less."""
 MAX_UPDATES_OUTSIDE_FREE_SPACE = 5
 """Number of consecutive updates without `appeared` after which a track ends that has not moved."""
 STANDING_AFTER_S = 1.5

@@ -20,7 +20,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 
 MARGIN_M, MARGIN_RATIO = 0.25, 0.02
-"""Distance, a constant and a share of the range, by which an earlier beam must have passed beyond a free point."""
+"""Margin by which an earlier beam must have passed beyond a free point: a constant, and a share of the range."""
 SLIP_RATIOS = (0.05, 0.1, 0.15)
 """Assumed ratios of wheel slip between two scans. New points must have been free for each ratio. Otherwise, posts next
 to a fast robot would seem to jump to the next post."""
@@ -35,7 +35,7 @@ MIN_BEAMS = 3
 HEADING_ERROR_RAD = 0.02
 """Angle to both sides of a free point within which earlier beams must have passed, too."""
 SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
-"""Tolerance, a constant and a share of the range, for an earlier beam to have hit the same obstacle."""
+"""Maximum difference of the distances of the same obstacle in two scans: a constant, and a share of the range."""
 MAX_SCANS = 64
 """Maximum number of stored scans."""
 NO_HIT_RANGE_M = 1e5
@@ -84,7 +84,7 @@ class ScanGeometry:
     def padded_ranges(self, scan: Scan) -> Array:
         """Return the ranges of a scan with `padding` beams added at each end.
 
-        Their ranges are those of the other end if the field of view is a full circle, otherwise 0.
+        The added ranges are copies from the other end if the field of view is a full circle, otherwise 0.
         """
         padded = np.zeros(self.count + 2 * self.padding)
         measured = padded[self.padding : -self.padding]

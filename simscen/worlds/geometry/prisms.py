@@ -81,7 +81,7 @@ def _place(base: Polygon, pose: Pose3) -> Polygon:
 
 
 def _is_convex_and_counterclockwise(base: Polygon) -> bool:
-    """Return whether every corner turns left and the sum of turns is 360°; for a star it is 720°."""
+    """Return whether every corner turns left, and the sum of the turns is 360°."""
     edges = [(bx - ax, by - ay) for (ax, ay), (bx, by) in zip(base, (*base[1:], base[0]), strict=True)]
     turns = [
         math.atan2(ax * by - ay * bx, ax * bx + ay * by)

@@ -17,7 +17,7 @@ from simscen.worlds.routes.clearance import ClearanceField, clearance_field, sea
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall: half of the diagonal of a cell."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference below which walls count as equally thin. Of these, the wall nearest to the middle of both ends is used."""
+"""Difference below which walls count as equally thin. Of these, the wall nearest to the middle of the way is used."""
 OPPOSITE_COSINE = -0.5
 """Cosine of the minimum angle (120°), seen from the gap, between points on different sides of the gap."""
 

@@ -231,7 +231,7 @@ def is_line_clear(a: Array, b: Array, field: ClearanceField, min_clearance: floa
 
 
 def _straighten(path: Array, field: ClearanceField, min_clearance: float) -> Array:
-    """Return a path of the fewest points of `path` (n, 2) with clear straight lines between them (string pulling)."""
+    """Return few points of `path` (n, 2), with clear straight lines between them (string pulling)."""
     # From each corner, the farthest point with a clear line is searched by doubling the step and bisection.
     kept, last = [0], len(path) - 1
     while kept[-1] < last:
