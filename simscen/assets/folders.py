@@ -56,7 +56,7 @@ class AllowedFolders:
 
     @property
     def search_folders(self) -> tuple[Path, ...]:
-        """All `roots` except the first, which are searched for files."""
+        """The `roots` without the first one: folders that are searched for files."""
         return self.roots[1:]
 
     def display_path(self, path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Find the shortest paths of a disc-shaped robot through the static world, as a reference for driven paths."""
+"""Find the shortest paths of a disc-shaped robot through the static world."""
 
 import math
 from collections.abc import Callable, Sequence
