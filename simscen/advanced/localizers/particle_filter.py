@@ -22,7 +22,7 @@ from simscen.stack.localizers.particles import FreeSpace, Particles, are_compact
 from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
-UNINFORMATIVE_SHARE_OF_HIT = 0.4
+UNMAPPED_LIKELIHOOD_RATIO = 0.4
 """Likelihood of a beam that ends outside the map, relative to a hit: about the mean of a well localized robot."""
 MAX_WALL_THICKNESS_M = 1.0
 """Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
@@ -42,7 +42,7 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
     def _hit_likelihoods(self) -> Float32:
         likelihoods = super()._hit_likelihoods()
         if self._unmapped is not None:
-            floor = np.float32(UNINFORMATIVE_SHARE_OF_HIT * self._z_hit)
+            floor = np.float32(UNMAPPED_LIKELIHOOD_RATIO * self._z_hit)
             likelihoods[self._unmapped] = np.maximum(likelihoods[self._unmapped], floor)
         return likelihoods
 

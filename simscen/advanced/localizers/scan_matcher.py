@@ -25,7 +25,7 @@ MAX_LINE_M = 0.5
 """Maximum length of this line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
 MAX_RANGE_M = 20.0
 """Range beyond which points are ignored."""
-_NONE: Plane = np.empty(0, dtype=np.complex128)
+_NO_POINTS: Plane = np.empty(0, dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def extract_surface(scan: Scan) -> Surface:
     ranges = scan.ranges
     hit = ((ranges > scan.range_min) & (ranges < min(scan.range_max, MAX_RANGE_M))).nonzero()[0]
     if len(hit) < 3:
-        return Surface(_NONE, _NONE)
+        return Surface(_NO_POINTS, _NO_POINTS)
     ranges, gap = ranges.take(hit), abs(scan.angle_increment)
     points: Plane = ranges * directions(scan).take(hit)
     apart = np.ceil((BASELINE_M / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
@@ -109,7 +109,7 @@ Equations = tuple[tuple[float, float, float, float], ...]
 """Normal equations of x, y and yaw, right-hand side last, in units of 1 / POINT_STD_M²."""
 
 
-class _Reference:
+class _ReferenceScans:
     """Surfaces of earlier scans, with which a new scan is matched."""
 
     def __init__(self, surfaces: Iterable[Surface], middle: complex) -> None:
@@ -228,7 +228,7 @@ class ScanMatcher:
     def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
         """Return the pose in the frame of `self.pose`, and its covariance in units of POINT_STD_M²."""
         guessed = pose = self.pose.compose(guess)
-        reference, own = _Reference(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
+        reference, own = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
         (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
         for _ in range(MAX_ITERATIONS):
             if (equations := reference.equations(own, pose, GATES_M[gate])) is None:

@@ -19,7 +19,7 @@ from simscen.core.geometry.shapes import Mesh, Solid
 from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_bool, read_numbers, read_sizes
 from simscen.worlds.sdf.files import MAX_MESH_BYTES, WorldFiles
 from simscen.worlds.sdf.mesh_files import MeshPart, UnusableMesh, read_parts
-from simscen.worlds.sdf.report import CODE, ImportReport
+from simscen.worlds.sdf.report import PROBLEM_CODE, ImportReport
 
 MAX_CACHE_BYTES = 256 << 20
 """Maximum size of all vertices and faces in the cache. The newest file is kept even if it is larger."""
@@ -113,7 +113,7 @@ def read_mesh(path: Path) -> Mesh:
         data = WorldFiles.of([real_path.parent]).read_file(real_path, MAX_MESH_BYTES)[1]
         parts = MESH_CACHE.read(data, path.suffix.lower())
     except (UnusableFile, UnusableMesh) as error:
-        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
+        raise InvalidInput([Problem(str(path), 0, 0, PROBLEM_CODE, str(error))]) from error
     return _merge_parts(parts, MeshRequest(path))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from simscen.core.errors import InvalidInput, Problem
 
-CODE = "SC310"
+PROBLEM_CODE = "SC310"
 """Error code of all problems of the importer."""
 
 
@@ -115,7 +115,9 @@ class ImportReport:
 def _problem(error: UnusableElement, suffix: str = "") -> Problem:
     location = error.location
     message = f"{location.element}: {error.message}{suffix}" if location.element else f"{error.message}{suffix}"
-    return Problem(location.file, location.line, location.col, CODE, message, hint=error.hint, source=location.source)
+    return Problem(
+        location.file, location.line, location.col, PROBLEM_CODE, message, hint=error.hint, source=location.source
+    )
 
 
 def _missing_asset_problem(errors: list[MissingAsset]) -> Problem:

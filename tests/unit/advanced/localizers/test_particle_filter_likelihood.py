@@ -6,7 +6,7 @@ from scipy.ndimage import distance_transform_edt
 
 from simscen.advanced.localizers.particle_filter import (
     MAX_WALL_THICKNESS_M,
-    UNINFORMATIVE_SHARE_OF_HIT,
+    UNMAPPED_LIKELIHOOD_RATIO,
     TemperedLikelihoodField,
     unmapped_cells,
 )
@@ -50,5 +50,5 @@ def test_beams_that_end_in_unmapped_cells_all_have_the_same_likelihood() -> None
     model = TemperedLikelihoodField(field, Z_HIT, Z_RAND, SIGMA, unmapped=unmapped)
     beams = select_beams(scan(np.full(BEAMS, 1.5)), 60, -1, 100)
     logarithm = model.log_likelihood(np.array([[50.0, 50.0, 0.0]]), beams, False)[0]
-    expected = len(beams.ends) * np.log(UNINFORMATIVE_SHARE_OF_HIT * Z_HIT + Z_RAND / beams.range_max)
+    expected = len(beams.ends) * np.log(UNMAPPED_LIKELIHOOD_RATIO * Z_HIT + Z_RAND / beams.range_max)
     assert logarithm == pytest.approx(expected, rel=1e-5)
