@@ -79,6 +79,7 @@ class InformedSet:
         return np.asarray(self._through[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
+        """Return the indices (n,) of the blocks that contain points (n, 2)."""
         columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
         return np.asarray(rows * self._width + columns)
 
@@ -117,6 +118,7 @@ class InformedSet:
         return (x, self._origin[1] + (row + 0.5) * costmap.resolution), along
 
     def _best_cell(self, costmap: CostmapView, row: int, column: int) -> tuple[float, int, int]:
+        """Return the most clearance in a block, and the row and the column of the cell that has it."""
         top, left = row * self._factor, column * self._factor
         part = costmap.distance[top : top + self._factor, left : left + self._factor]
         best, width = int(part.argmax()), part.shape[1]
@@ -138,6 +140,7 @@ class InformedSet:
         return bool(self._inside[self._index(x, y)])
 
     def _index(self, x: float, y: float) -> int:
+        """Return the index of the block that contains a point, or of the nearest block."""
         column = min(self._width - 1, max(0, int((x - self._origin[0]) / self._size)))
         row = min(self._height - 1, max(0, int((y - self._origin[1]) / self._size)))
         return int(row * self._width + column)

@@ -166,6 +166,7 @@ class MedialAxisPlanner:
         return TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
 
     def _points(self, costs: TraversalCosts, start: Pose2, goal: Pose2, seed: int) -> Array:
+        """Return the points (n, 2) of a path, SPACING_M apart. Raises NavigationFailure."""
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         path = np.array([ends.start]) if ends.start == ends.goal else self._search(costs, ends, seed)
         return densify(np.vstack(((start.x, start.y), path)), SPACING_M)

@@ -92,6 +92,7 @@ class GyroOdometry:
 
 
 def _pose(entry: tuple[int, float, float, float]) -> Pose2:
+    """Return the pose in an entry (tick, x, y, yaw)."""
     return Pose2(entry[1], entry[2], wrap(entry[3]))
 
 
