@@ -1,6 +1,6 @@
-"""Base classes of actions, the choice of an action by its YAML key, and the check of actions from plugins.
+"""Base classes of actions, and AnyAction, an entry of `do` in YAML.
 
-A stage is the interface through which an action reads and changes the running simulation (simscen.core.stage).
+A Stage (simscen.core.stage) is the interface through which an action reads and changes the running simulation.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from simscen.spec.places import RobotName
 
 POSE_TOLERANCE_M_RAD = 1e-3
 """Difference in position (m) and heading (rad) below which two poses count as equal."""
-_QUERIES = frozenset({*dir(Situation), "has_room", "rng", "door", "motion", "mass"})
-"""Members of a stage that only return information; all others change the run."""
+_READ_ONLY_MEMBERS = frozenset({*dir(Situation), "has_room", "rng", "door", "motion", "mass"})
+"""Names of the members of Stage that return information and change nothing."""
 
 
 class Action(ABC):
@@ -27,16 +27,16 @@ class Action(ABC):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Whether the effect depends on which of several robots the action is for."""
+        """Whether a scenario with several robots must name the robot of this action (key `robot`)."""
         return True
 
     @abstractmethod
     def perform(self, stage: Stage) -> Effect:
-        """Perform the action and return its effect. Every change is made, and logged, through the stage."""
+        """Perform the action through `stage`. Return whether it changed anything, and a text about the change."""
 
 
 class WorldAction(Action):
-    """Action on the world, whose effect is the same for all robots."""
+    """Action on the world instead of one robot."""
 
     @property
     def is_robot_specific(self) -> bool:
@@ -45,10 +45,12 @@ class WorldAction(Action):
 
 
 class AnyAction(Choice):
-    """One action, chosen by its YAML key."""
+    """One action, chosen by its YAML key, such as `spawn`."""
 
     group: ClassVar[str] = "action"
+    """Group of the plugin registry in which packages add actions."""
     modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
+    """Keys that can be combined with any action."""
 
     spawn: Annotated[Action | None, LazySpec("simscen.actions.objects", "Spawn")] = None
     pedestrian: Annotated[Action | None, LazySpec("simscen.actions.pedestrian", "Pedestrian")] = None
@@ -72,25 +74,16 @@ class AnyAction(Choice):
     """The robot that the action is for, if there are several; default: the only one."""
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether the action is of one of these `kinds` or from a plugin, which may do anything.
-
-        Without `kinds`, returns whether the action is from a plugin.
-        """
+        """Return whether the action has one of the YAML keys `kinds`, or comes from a plugin (effects unknown)."""
         return self.kind in kinds or self.original_class is not None
 
     def perform(self, stage: Stage) -> Effect:
-        """Perform the action and return its effect, which starts with the name of the robot if one is given."""
-        if self.robot is None:
-            return self._perform_chosen(stage)
-        effect = self._perform_chosen(stage.of(self.robot))
-        return replace(effect, what=f"{self.robot}: {effect.what}")
-
-    def _perform_chosen(self, stage: Stage) -> Effect:
-        action = self.chosen
+        """Perform the chosen action and return its effect. If `robot` is set, the text of the effect starts with it."""
+        action, stage = self.chosen, stage if self.robot is None else stage.of(self.robot)
         assert isinstance(action, Action)
-        if self.original_class is None:
-            return action.perform(stage)
-        return perform_checked(action, stage, self.plugin_suffix)
+        is_from_plugin = self.original_class is not None
+        effect = _perform_plugin_action(action, stage, self.plugin_suffix) if is_from_plugin else action.perform(stage)
+        return effect if self.robot is None else replace(effect, what=f"{self.robot}: {effect.what}")
 
 
 def is_same_pose(first: Pose2, second: Pose2) -> bool:
@@ -99,11 +92,11 @@ def is_same_pose(first: Pose2, second: Pose2) -> bool:
     return is_same_position and abs(wrap(first.yaw - second.yaw)) < POSE_TOLERANCE_M_RAD
 
 
-def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
+def _perform_plugin_action(action: Action, stage: Stage, origin: str) -> Effect:
     """Perform an action of a plugin and return its effect.
 
-    Raises RunError if the effect is not valid, or states a change although the action changed nothing. `origin` names
-    the plugin at the end of the message.
+    Raises RunError if the effect is not valid, or if it states a change but the action changed nothing. `origin` is
+    the end of the message, which names the plugin.
     """
     observed = _ObservedStage(stage)
     effect: object = action.perform(cast(Stage, observed))
@@ -115,11 +108,11 @@ def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
 
 
 class _ObservedStage:
-    """A stage that records whether a member that changes the run was used."""
+    """Wrapper of a stage. `changed` becomes true when a member that is not read-only is used."""
 
     def __init__(self, stage: Stage) -> None:
         self._stage, self.changed = stage, False
 
     def __getattr__(self, name: str) -> Any:
-        self.changed = self.changed or name not in _QUERIES
+        self.changed = self.changed or name not in _READ_ONLY_MEMBERS
         return getattr(self._stage, name)

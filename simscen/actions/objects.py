@@ -19,15 +19,15 @@ from simscen.spec.places import DoorName, MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration, Ratio
 
 SWING_SEGMENTS = 16
-"""Straight segments of a swing. The edge of the panel then deviates from its arc by less than 0.2 %."""
+"""Number of straight segments that approximate the arc of a swinging door."""
 TRAVEL_TOLERANCE = 1e-6
-"""Fraction of its full travel within which a door has reached its target."""
+"""Remaining fraction of a door's full travel below which the door counts as at its target."""
 
 
 class Spawn(ShapedObject, Action):
-    """Add an object to the world: at a pose, relative to the robot, or on its current plan.
+    """Add an object to the world: at a pose, relative to the robot, or on the robot's plan.
 
-    The robot can push an object that has a `mass`; other objects are only moved by the scenario.
+    The robot can push an object that has a `mass`. Only the scenario moves other objects.
 
     Example: `do: {spawn: {name: pallet, box: [1.2, 0.8, 0.3], on_plan: 1.5 m}}`
     """
@@ -39,10 +39,10 @@ class Spawn(ShapedObject, Action):
     ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
     """Position in the robot's frame: [meters forward, meters to the left]."""
     on_plan: NonNegativeLength | None = None
-    """Distance ahead of the robot along its plan, at most to the end of the plan; the object lies across the plan.
-    Without a plan, the object is placed at this distance straight ahead, and the event counts as failed."""
+    """Distance ahead of the robot along its plan, at most to the end of the plan. Without a plan, the object is placed
+    at this distance straight ahead, and the event counts as failed."""
     yaw: Angle = 0.0
-    """Rotation relative to the heading of the robot or the direction of the plan."""
+    """Rotation relative to the heading of the robot (`ahead`) or the direction of the plan (`on_plan`)."""
     mass: Mass = 0.0
     """Mass in kg; 0 = cannot be pushed."""
 
@@ -54,11 +54,11 @@ class Spawn(ShapedObject, Action):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Whether the place depends on the robot."""
+        """Whether the pose depends on the robot."""
         return self.pose is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the object; without a plan for `on_plan`, straight ahead of the robot, which counts as failed."""
+        """Add the object. The effect counts as failed if `on_plan` is set and the robot has no plan."""
         is_as_requested = self.on_plan is None or _has_plan(stage)
         pose = self._spawn_pose(stage)
         stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
@@ -81,9 +81,9 @@ def _has_plan(stage: Stage) -> bool:
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
-    """Return the pose on `plan` that is `distance` m along the plan beyond the point that is nearest to the robot.
+    """Return the pose that is `distance` m ahead along `plan`, counted from the plan's point nearest to the robot.
 
-    The heading is the direction of the plan. The pose is at the end of the plan if the plan is shorter.
+    The heading is the direction of the plan. If the plan is shorter, the pose is at its end.
     """
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
@@ -117,9 +117,8 @@ class Remove(Spec, WorldAction):
 class Move(Motion, WorldAction):
     """Move an object through waypoints at a speed, or along timed keyframes.
 
-    The object does not stop for the robot, and nothing can push it from then on. Use this action for a cart, a
-    forklift, or a person on a fixed course, and for worlds with moving obstacles like DynaBARN (Nair et al., 2022),
-    which give the pose of each obstacle over time.
+    The object does not stop for the robot, and nothing can push it from then on. Use this action for a cart or a person
+    on a fixed course. Use `keyframes` for recorded motions, such as the obstacles of DynaBARN (Nair et al., 2022).
 
     Example: `do: {move: {name: cart, keyframes: [[0, 4, 1, 0], [3, 4, 5, 90 deg], [6, 4, 1, 0]], repeat: loop}}`
     """
@@ -128,7 +127,7 @@ class Move(Motion, WorldAction):
     """The object to move."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion; has no effect if the object does not exist, or is already at its only waypoint."""
+        """Start the motion. Has no effect if the object does not exist or is already at its only waypoint."""
         pose = stage.object(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
@@ -142,8 +141,8 @@ class Move(Motion, WorldAction):
 class Teleport(Spec, WorldAction):
     """Move an object to another pose, at once and at rest. For the robot, use `kidnap`.
 
-    A scripted motion of the object ends. Use this action for changes that the robot does not see, for example a pallet
-    that is now in the next aisle while the costmap still shows it at its old position.
+    The object's scripted motion ends. Use this action for changes that the robot does not see, for example a pallet
+    that the costmap still shows at its old position.
 
     Example: `do: {teleport: {name: pallet, pose: {x: 4, y: 2, yaw: 90 deg}}}`
     """
@@ -195,7 +194,7 @@ class Stop(Spec, WorldAction):
 
 
 class OpenDoor(Spec, WorldAction):
-    """Open a door of the world from its current position; it swings or slides.
+    """Swing or slide a door of the world open, from its current position.
 
     Example: `do: {open: {name: door meeting room}}`
     """
@@ -203,12 +202,12 @@ class OpenDoor(Spec, WorldAction):
     name: DoorName
     """A door of the world."""
     duration: PositiveDuration = 1.5
-    """Time from fully closed to fully open; proportionally less for a shorter travel."""
+    """Time from fully closed to fully open. A partial motion takes proportionally less time."""
     to: Annotated[Ratio, Field(gt=0, le=1)] = 1.0
     """Fraction of the full travel: 100 % is fully open, 30 % ajar."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion; has no effect if the door is already there or on its way there."""
+        """Start the motion. Has no effect if the door is at the target or already moves to it."""
         closed, opened = stage.door(self.name)
         target = opened if self.to == 1 else _interpolate(closed, opened, self.to)
         state = "open" if self.to == 1 else f"{self.to:.0%} open"
@@ -216,7 +215,7 @@ class OpenDoor(Spec, WorldAction):
 
 
 class CloseDoor(Spec, WorldAction):
-    """Close a door of the world from its current position; it does not stop for the robot.
+    """Close a door of the world from its current position. The door does not stop for the robot.
 
     Example: `do: {close: {name: door meeting room}}`
     """
@@ -224,17 +223,17 @@ class CloseDoor(Spec, WorldAction):
     name: DoorName
     """A door of the world."""
     duration: PositiveDuration = 1.5
-    """Time from fully open to fully closed; proportionally less for a shorter travel."""
+    """Time from fully open to fully closed. A partial motion takes proportionally less time."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion; has no effect if the door is already closed or on its way there."""
+        """Start the motion. Has no effect if the door is closed or already closing."""
         return _move_door(stage, self.name, stage.door(self.name)[0], self.duration, "shut")
 
 
 def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, state: str) -> Effect:
     """Start the motion of a door to `target` and return the effect.
 
-    `full_duration` is the time in s for the full travel; `state` describes the target in messages, e.g. "open".
+    `full_duration` is the time in s for the full travel. `state` is the name of the target in messages, e.g. "open".
     """
     pose = stage.object(name)
     if pose is None:
@@ -252,7 +251,7 @@ def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, sta
 
 
 def panel_path(start: Pose2, target: Pose2, duration: float) -> MotionPath:
-    """Return the path of a door panel from one pose to another within `duration` seconds."""
+    """Return the path of a door panel from `start` to `target` in `duration` seconds."""
     segments = SWING_SEGMENTS if wrap(target.yaw - start.yaw) else 1
     fractions = [segment / segments for segment in range(segments + 1)]
     times = tuple(fraction * duration for fraction in fractions)
@@ -260,12 +259,12 @@ def panel_path(start: Pose2, target: Pose2, duration: float) -> MotionPath:
 
 
 def _travel_fraction(start: Pose2, end: Pose2, closed: Pose2, opened: Pose2) -> float:
-    """Return the travel between two poses of a panel as a fraction of the full travel from `closed` to `opened`."""
+    """Return the travel of a door from `start` to `end` as a fraction of the travel from `closed` to `opened`."""
     turn, slide = abs(wrap(opened.yaw - closed.yaw)), opened.distance(closed)
     return abs(wrap(end.yaw - start.yaw)) / turn if turn else start.distance(end) / slide
 
 
 def _interpolate(start: Pose2, end: Pose2, fraction: float) -> Pose2:
-    """Return the pose after a fraction of the way, with the shorter rotation."""
+    """Return the pose at `fraction` (0 to 1) of the straight way from `start` to `end`, with the shorter rotation."""
     x, y = start.x + fraction * (end.x - start.x), start.y + fraction * (end.y - start.y)
     return Pose2(x, y, wrap(start.yaw + fraction * wrap(end.yaw - start.yaw)))

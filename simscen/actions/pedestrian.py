@@ -1,4 +1,4 @@
-"""`pedestrian` and `crowd`: people who walk to goals on their own."""
+"""`pedestrian` and `crowd`: actions that add simulated people, who walk to goals and avoid obstacles."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ Point = tuple[float, float]
 MEAN_SPEED_M_S, SPEED_STD_M_S = 1.29, 0.19
 """Mean and standard deviation of preferred walking speeds (Moussaïd et al. 2009)."""
 MAX_SPEED_STDS = 2.0
-"""Preferred speeds deviate from the mean by at most this many standard deviations."""
+"""Maximum deviation of a preferred speed from the mean, in standard deviations."""
 REACTIONS: dict[str, tuple[float, float]] = {
     "surprised": (4.0, 30.0),
     "curious": (10.0, 30.0),
     "scared": (3.0, 40.0),
     "threatening": (4.0, 40.0),
 }
-"""Distance in m from the robot at which each reaction starts, and its duration in s (behavior trees of HuNavSim)."""
+"""Defaults of `reacts_within` (m) and `reacts_for` (s) by `behavior`, as in the behavior trees of HuNavSim."""
 MAX_DRAWS = 200
-"""Number of random positions that are tried for a pedestrian before the region counts as full."""
+"""Maximum number of random points to try in a region. If none is free, the region counts as full."""
 GROUP_HALF_WIDTH_M = 1.0
-"""Largest initial distance along x and y between the first pedestrian of a group and the others."""
+"""Maximum initial distance from the first member of a group to another member, along x and along y."""
 INITIAL_CLEARANCE_M = 0.1
-"""Initial clearance around each pedestrian of a crowd, in addition to its radius."""
+"""Minimum distance of the start and goals of a crowd's members from obstacles, in addition to their radius."""
 
 
 class _WalkSettings(Spec):
-    """Keys that `pedestrian` and `crowd` have in common."""
+    """Keys that the actions `pedestrian` and `crowd` have in common."""
 
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
     """After the last goal: stay (`once`), walk to the first goal again (`loop`), or walk back through the goals
@@ -64,7 +64,8 @@ class _WalkSettings(Spec):
     height: Annotated[PositiveLength, Field(ge=0.5, le=2.5)] = 1.7
     """Height of the cylinder."""
     blind_to: list[Ignorable] = []
-    """What the person does not notice, e.g. while looking at a phone; everybody notices walls."""
+    """Kinds of obstacles that the person does not notice, for example while looking at a phone. Everybody notices
+    walls."""
 
     @model_validator(mode="after")
     def _check_reaction(self) -> _WalkSettings:
@@ -80,7 +81,7 @@ class _WalkSettings(Spec):
     def to_pedestrian(
         self, stage: Stage, name: str, pose: Pose2, goals: tuple[Point, ...], group: str | None
     ) -> WalkingPedestrian:
-        """Return a pedestrian with these settings; members of a group have the same preferred speed."""
+        """Return a pedestrian with these settings. Members of a `group` (None: no group) have the same random speed."""
         reaction_distance, reaction_time = REACTIONS.get(self.behavior, (0.0, 0.0))
         return WalkingPedestrian(
             name=name,
@@ -99,12 +100,12 @@ class _WalkSettings(Spec):
 
 
 def _stream_owner(name: str, group: str | None) -> str:
-    """Return the prefix of the names of random streams: that of the group, or of the person without a group."""
+    """Return the prefix for names of random streams, from the group or, if `group` is None, from the person."""
     return f"person {name}" if group is None else f"group {group}"
 
 
 class Pedestrian(_WalkSettings, WorldAction):
-    """Add a person who walks to goals on their own, around walls, objects, other people, and robots.
+    """Add a person who walks to goals and avoids walls, objects, other people, and robots.
 
     Pedestrians walk by the social force model of Moussaïd et al. (2009) and react to the robot like the people of
     HuNavSim (Pérez-Higueras et al., 2023). They cannot be pushed and do not pass through anything.
@@ -120,10 +121,10 @@ class Pedestrian(_WalkSettings, WorldAction):
     """Goals in order: points [x, y] in the world frame, or places by name. Without goals, the person
     stands still, and returns to the initial position after stepping aside."""
     group: Name | None = None
-    """Members of the same group walk side by side."""
+    """Group of the pedestrian. Members of a group walk side by side."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the pedestrian; has no effect if there is no free space."""
+        """Add the pedestrian. Has no effect if its initial position is not free."""
         pose = self.pose.pose
         if not stage.has_room((pose.x, pose.y), self.radius):
             return Effect(False, f"there is no free space for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
@@ -135,8 +136,7 @@ class Pedestrian(_WalkSettings, WorldAction):
 class Crowd(_WalkSettings, WorldAction):
     """Add several people at once, with initial positions and goals drawn at random from regions.
 
-    They are named `<name>-1`, `<name>-2`, … Each has its own random streams, so that a larger `count` does not change
-    the others.
+    They are named `<name>-1`, `<name>-2`, … A larger `count` adds people without changing the others.
 
     Example: `do: {crowd: {name: visitor, count: 5, start: hall, goals: [hall], repeat: back_and_forth}}`
     """
@@ -146,9 +146,9 @@ class Crowd(_WalkSettings, WorldAction):
     count: Annotated[int, Field(ge=1, le=500)]
     """Number of people."""
     start: RegionName
-    """Region of the initial positions; each is drawn from its free space."""
+    """Region in whose free space the initial positions are drawn."""
     goals: Annotated[list[RegionName], Field(max_length=100)] = []
-    """Regions of the goals in order; each person has one goal in each. Without goals, all stand still."""
+    """Regions in order. Each person gets one random goal in each region. Without regions, all stand still."""
     group_size: Annotated[int, Field(ge=1, le=6)] = 1
     """Number of people who walk together to the same goals."""
 
@@ -158,7 +158,7 @@ class Crowd(_WalkSettings, WorldAction):
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the people; if there is not enough free space for all, add fewer, which counts as failed."""
+        """Add the people. If the free space is not enough for all, add fewer; the effect then counts as failed."""
         added, group_start = 0, None
         for index in range(self.count):
             is_follower = index % self.group_size > 0
@@ -172,9 +172,9 @@ class Crowd(_WalkSettings, WorldAction):
         return Effect(True, f"added {added} people in {self.start}")
 
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
-        """Return a free point of the start region; None if none was found.
+        """Return a random free point of the start region for the person with this index; None if none was found.
 
-        The point is near `group_start`, the position of the first member of the group, unless that is None.
+        The point is near `group_start`, the start of the group's first member. None: the person is the first member.
         """
         rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
         if group_start is None:
@@ -227,9 +227,9 @@ def _bounding_rectangle(corners: Polygon) -> _Rectangle:
 
 
 def _draw_goal(stage: Stage, rng: np.random.Generator, corners: Polygon, radius: float) -> Point | None:
-    """Return a random point of the region with these corners that is clear of walls; None if none was found.
+    """Return a random point inside the polygon `corners` that is clear of walls; None if none was found.
 
-    `radius` is that of the pedestrian in m.
+    `radius` is the radius of the pedestrian in m.
     """
     inside = (point for point in _bounding_rectangle(corners).random_points(rng) if polygon_contains(corners, point))
     return next(

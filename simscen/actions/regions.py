@@ -18,10 +18,10 @@ from simscen.spec.quantities import Friction, PositiveDuration, PositiveLength, 
 class FrictionPatch(Spec, WorldAction):
     """Change the friction of a region or disc of the floor, for example to make it slippery or dry again.
 
-    Typical values: oil 0.1, a wet or soapy floor 0.3, chips and dust 0.5. The friction force of a wheel is at most this
-    coefficient times its load (Coulomb), so that no robot accelerates or brakes faster than friction x 9.81 m/s², and
-    odometry also counts the turns of spinning wheels. Later patches cover earlier ones; the same region or name
-    replaces its patch, and `value: 1` restores a dry floor.
+    Typical values: oil 0.1, a wet or soapy floor 0.3, chips and dust 0.5. The friction force of a wheel is at most
+    `value` times its load (Coulomb). The robot therefore accelerates and brakes by at most `value` x 9.81 m/s², and
+    odometry is wrong while wheels spin. Where patches overlap, the latest counts. An action for the same region or name
+    replaces the earlier patch; `value: 1` restores a dry floor.
 
     Example: `do: {friction: {at: [3, 1], radius: 0.8 m, value: 0.1, for: 10 s}}`
     """
@@ -29,7 +29,7 @@ class FrictionPatch(Spec, WorldAction):
     region: RegionName | None = None
     """A region of the world."""
     at: PlaceOrPoint | None = None
-    """Alternatively: the center of a disc, [x, y] or a place."""
+    """Alternatively: the center of a disc, [x, y] in the world frame or a place by name."""
     radius: PositiveLength | None = None
     """Radius of the disc."""
     name: PlaceName = "patch"
@@ -37,7 +37,7 @@ class FrictionPatch(Spec, WorldAction):
     value: Friction
     """Coefficient of friction between the floor and rubber wheels; 1 is dry concrete."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """How long the patch lasts; default: until the end of the run."""
+    """Duration of the patch; default: until the end of the run."""
 
     @model_validator(mode="after")
     def _check_area(self) -> FrictionPatch:
@@ -63,39 +63,37 @@ class FrictionPatch(Spec, WorldAction):
 class SwitchKeepout(Spec, Action):
     """Enable or disable a keepout zone of the stack.
 
-    The stack receives the command as through Nav2's `keepout_filter/toggle_filter` and applies it at the next costmap
-    update: it replans if its path leads through a new zone. After a zone is lifted, paths through it are possible
-    again. For a zone that is disabled at first, omit it from `stack.keepout`. Use the action for a fleet manager that
-    closes an aisle, or an area scanner that opens one.
+    The stack receives the command as through Nav2's `keepout_filter/toggle_filter`, and applies it at the next costmap
+    update. The stack replans if its path leads through a new zone. If a zone is to be disabled at first, omit it from
+    `stack.keepout`. Use the action, for example, for a fleet manager that closes an aisle.
 
     Example: `do: {keepout: {region: wet floor, enabled: true}}`
     """
 
     region: RegionName | None = None
-    """A region of the world, in `stack.keepout` or not; default: the whole filter with its mask."""
+    """A region of the world, which need not be in `stack.keepout`; default: the whole filter with its mask."""
     enabled: bool = True
     """Whether the robot must keep out from now on."""
 
     def perform(self, stage: Stage) -> Effect:
         """Send the command; has no effect if nothing changes or the stack cannot receive it."""
-        order = ZoneSwitch("keepout", self.enabled, self.region)
-        return _switch_zone(stage, order, f"keepout of {self.region}" if self.region else "the keepout filter")
+        command = ZoneSwitch("keepout", self.enabled, self.region)
+        return _switch_zone(stage, command, f"keepout of {self.region}" if self.region else "the keepout filter")
 
 
 class SwitchSpeedZone(Spec, Action):
     """Set or lift a speed limit of the stack in a region.
 
-    The stack receives the command as through Nav2's `speed_filter/toggle_filter`. For a zone that is disabled at first,
-    omit it from `stack.speed_zones`. Use it for the start of a shift, people who enter an aisle, or a crossing that is
-    free at night.
+    The stack receives the command as through Nav2's `speed_filter/toggle_filter`. If a zone is to be disabled at first,
+    omit it from `stack.speed_zones`. Use the action, for example, for people who enter an aisle.
 
     Example: `do: {speed_zone: {region: crossing, speed_limit: 0.2 m/s}}`
     """
 
     region: RegionName | None = None
-    """A region of the world, in `stack.speed_zones` or not; default: the whole filter with its mask."""
+    """A region of the world, which need not be in `stack.speed_zones`; default: the whole filter with its mask."""
     speed_limit: PositiveSpeed | None = None
-    """Limit while the estimated pose is inside; default: that of `stack.speed_zones`."""
+    """Limit while the estimated pose is in the region; default: the limit of the region in `stack.speed_zones`."""
     enabled: bool = True
     """Whether the limit applies from now on."""
 
@@ -107,11 +105,11 @@ class SwitchSpeedZone(Spec, Action):
 
     def perform(self, stage: Stage) -> Effect:
         """Send the command; has no effect if nothing changes or the stack cannot receive it."""
-        order = ZoneSwitch("speed", self.enabled, self.region, self.speed_limit)
-        return _switch_zone(stage, order, f"the speed limit in {self.region}" if self.region else "the speed filter")
+        command = ZoneSwitch("speed", self.enabled, self.region, self.speed_limit)
+        return _switch_zone(stage, command, f"the speed limit in {self.region}" if self.region else "the speed filter")
 
 
-def _switch_zone(stage: Stage, order: ZoneSwitch, zone: str) -> Effect:
-    """Send a command to the stack and return the effect; `zone` describes the zone in the message."""
-    refusal = stage.switch_zone(order)
-    return Effect(not refusal, refusal or f"switched {zone} {'on' if order.enabled else 'off'}")
+def _switch_zone(stage: Stage, command: ZoneSwitch, zone: str) -> Effect:
+    """Send a command to the stack and return the effect. `zone` describes the zone in the message."""
+    refusal = stage.switch_zone(command)
+    return Effect(not refusal, refusal or f"switched {zone} {'on' if command.enabled else 'off'}")

@@ -36,10 +36,10 @@ class Kidnap(Spec, Action):
 
 
 class Push(Spec, Action):
-    """Push the robot, or an object with a mass, at its center: with an impulse, or with a force for a while.
+    """Push the robot, or an object with a mass, at its center: with an impulse, or with a force for a duration.
 
-    Use an `impulse` for a person who bumps into the robot, and a `force` for a person who leans on it, a slope, or a
-    gust of wind. A force of F newtons for t seconds gives a free mass an impulse of F t.
+    Use an `impulse` for a person who bumps into the robot. Use a `force` for a person who leans on it, a slope, or a
+    gust of wind.
 
     Example: `do: {push: {force: [0, 20], for: 1.5 s}}`
     """
@@ -67,7 +67,7 @@ class Push(Spec, Action):
         return self.name is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Push; has no effect if the push is zero, or the object does not exist or has no mass."""
+        """Push the robot or object. Has no effect for a push of zero, or for an object that is missing or massless."""
         target, duration = self.name or "the robot", self.for_ or 0.0
         x, y = self.impulse or self.force or (0.0, 0.0)
         if not math.hypot(x, y):
@@ -83,25 +83,24 @@ class Push(Spec, Action):
 
 
 class NewGoal(Spec, Action):
-    """Send another goal. The new goal preempts the current one; the remaining goals follow after the new one.
+    """Send another goal, which preempts the current one. The remaining goals follow after the new one.
 
-    Criteria judge the new goal like any other goal of the scenario. They neither require the preempted goal nor count
-    it as failed. The name must differ from the names of all other goals. If the event happens twice, the goal is sent
-    twice, and the robot must reach it twice.
+    Criteria judge the new goal like any other goal of the scenario. They ignore the preempted goal. If the event
+    happens twice, the robot must reach the new goal twice.
 
     Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
     """
 
     name: Name
-    """Name of the goal."""
+    """Name of the goal, which no other goal may have."""
     pose: PlaceOrPose
     """Pose in the map frame, or a place by name."""
     timeout: PositiveDuration | None = None
-    """Maximum simulated time to reach it."""
+    """Maximum simulated time to reach the goal; default: no limit."""
     xy_tolerance: PositiveLength | None = None
-    """Maximum distance from the position; default: that of the stack's goal checker."""
+    """Maximum distance from the position; default: the tolerance of the stack's goal checker."""
     yaw_tolerance: PositiveAngle | None = None
-    """Maximum heading error; default: that of the stack's goal checker."""
+    """Maximum heading error; default: the tolerance of the stack's goal checker."""
 
     def perform(self, stage: Stage) -> Effect:
         """Send the goal."""

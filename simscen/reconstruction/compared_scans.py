@@ -1,4 +1,4 @@
-"""Compares each range of a scan with the range that is expected in the static world."""
+"""Comparison of measured ranges with the ranges that are expected in the static world (without objects to find)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Sca
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
-"""Difference from the expected range that errors of true poses, or of estimated poses, explain."""
+"""Tolerated difference between measured and expected range, for true poses and for estimated poses."""
 BELIEVED_POSE_TOLERANCE_PER_M = 0.02
-"""Additional difference per meter of range that errors of an estimated heading explain."""
+"""Additional tolerance for estimated poses per meter of range."""
 NOISE_SIGMAS = 4.0
-"""Difference from the expected range that noise explains, in standard deviations of the noise."""
+"""Additional tolerance in standard deviations of the range noise."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
 SMOOTH_STEP_M = 0.1
-"""If the expected ranges of neighbor beams differ by less than this, both beams end at the same smooth surface."""
+"""Maximum difference between the expected ranges of neighbor beams that end at the same smooth surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,11 @@ class ComparedScans:
     """Measured scans with the ranges that are expected in the static world.
 
     Attributes:
+        scans: Measured scans.
         poses: Poses x, y, yaw (n, 3) of the lidar in the map frame.
         expected: Expected ranges (n, beams) in m; inf beyond the maximum range of the lidar.
         noise: Standard deviation (n,) of the range noise of each scan in m.
-        tolerance: Differences (n, beams) in m between measured and expected range that noise and pose errors explain.
+        tolerance: Tolerated differences (n, beams) in m between measured and expected ranges.
     """
 
     scans: Scans
@@ -42,18 +43,18 @@ class ComparedScans:
 
     @cached_property
     def is_hit(self) -> Mask:
-        """Which beams (n, beams) measured a range within the limits of the lidar."""
+        """Mask (n, beams) of beams with a measured range within the limits of the lidar."""
         return self.scans.is_hit()
 
     @cached_property
     def residuals(self) -> Array:
-        """Measured minus expected ranges (n, beams) in m; nan where one of them is missing."""
+        """Measured minus expected ranges (n, beams) in m; nan without a measured or an expected range."""
         with np.errstate(invalid="ignore"):
             return np.where(self.is_hit & np.isfinite(self.expected), self.scans.ranges - self.expected, np.nan)
 
     @cached_property
     def is_explained(self) -> Mask:
-        """Which beams (n, beams) end at the static world, within the tolerance."""
+        """Mask (n, beams) of beams that end at the static world, within the tolerance."""
         with np.errstate(invalid="ignore"):
             ranges = self.scans.ranges
             return (
@@ -62,20 +63,20 @@ class ComparedScans:
 
     @cached_property
     def is_short(self) -> Mask:
-        """Which beams (n, beams) end before the static world, by more than the tolerance."""
+        """Mask (n, beams) of beams that end before the static world, by more than the tolerance."""
         with np.errstate(invalid="ignore"):
             return self.is_hit & (self.scans.ranges < self._nearest - self.tolerance)
 
     @cached_property
     def passes_through(self) -> Mask:
-        """Which beams (n, beams) end behind the static world by more than the tolerance, or miss it within range."""
+        """Mask (n, beams) of beams that end behind the static world, or return nothing although it is in range."""
         with np.errstate(invalid="ignore"):
             behind = self.is_hit & (self.scans.ranges > self._farthest + self.tolerance)
         return behind | (self.is_missing & (self._farthest + self.tolerance < self.scans.range_max))
 
     @cached_property
     def is_missing(self) -> Mask:
-        """Which beams (n, beams) measured nothing up to the maximum range: inf, or a larger range."""
+        """Mask (n, beams) of beams without a return up to the maximum range."""
         with np.errstate(invalid="ignore"):
             missing: Mask = (self.scans.ranges == np.inf) | (self.scans.ranges > self.scans.range_max)
         return missing
@@ -87,15 +88,17 @@ class ComparedScans:
 
     @cached_property
     def _nearest(self) -> Array:
-        return _over_neighbors(self.expected, np.minimum)
+        """Smallest expected range of each beam and its two neighbors."""
+        return _reduce_neighbors(self.expected, np.minimum)
 
     @cached_property
     def _farthest(self) -> Array:
-        return _over_neighbors(self.expected, np.maximum)
+        """Largest expected range of each beam and its two neighbors."""
+        return _reduce_neighbors(self.expected, np.maximum)
 
 
-def _over_neighbors(values: Array, choose: np.ufunc) -> Array:
-    """Return for each beam `choose` (minimum or maximum) of it and its two neighbors: an edge can lie between beams."""
+def _reduce_neighbors(values: Array, choose: np.ufunc) -> Array:
+    """Return the minimum or maximum (`choose`) of each beam and its two neighbors."""
     result: Array = values.copy()
     choose(result[:, 1:], values[:, :-1], out=result[:, 1:])
     choose(result[:, :-1], values[:, 1:], out=result[:, :-1])
@@ -103,7 +106,7 @@ def _over_neighbors(values: Array, choose: np.ufunc) -> Array:
 
 
 def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> ComparedScans:
-    """Compare scans of a drive with the static world, from the poses of the drive."""
+    """Compare scans of a drive with the static world, from the poses of the drive at the times of the scans."""
     poses = lidar_poses(drive, scans)
     expected = world.ranges_from(poses, scans.angles, scans.range_max)
     with np.errstate(invalid="ignore"):
@@ -119,8 +122,8 @@ def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> Com
 def range_noise(residuals: Array, expected: Array) -> Array:
     """Return the standard deviation (n,) of the range noise of each scan in m, from residuals and expected ranges.
 
-    It is computed from differences between neighbor beams on smooth surfaces, to which errors of the pose add nothing.
-    Scans with too few of these beams have the median of the other scans.
+    The noise is estimated from second differences between neighbor beams on smooth surfaces. Scans with too few of
+    these beams get the median of the other scans.
     """
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(expected, axis=1))

@@ -1,7 +1,4 @@
-"""Runs all estimators on a drive: they find faults, objects, pedestrians, kidnappings, and incidents.
-
-The order counts: scans that one estimator explains as a fault must not look like an object to the next one.
-"""
+"""Runs all estimators on a recorded drive. They find faults, objects, pedestrians, kidnappings, and incidents."""
 
 from __future__ import annotations
 
@@ -38,13 +35,13 @@ from simscen.reconstruction.static_world import StaticWorld
 from simscen.run.live_world.pedestrians import PedestrianMap
 
 MAX_SCANS = 3000
-"""Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
+"""Maximum number of scans that are compared with the world. In longer drives, every second, third, … scan is used."""
 SENSORS = ("lidar", "odom", "imu")
-"""Targets of faults that are sensors. The robot file can give these sensors other names."""
+"""Sensor names that the estimators use as targets of faults. The names in the robot file can differ."""
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
-"""Disturbances that no estimator looks for; part of a message to the user."""
+"""Disturbances that no estimator looks for, as part of a message to the user."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
-"""A jump of the true pose is a kidnapping if it is longer than this distance and takes less than this time."""
+"""Minimum distance and maximum duration of a jump of the true pose that counts as a kidnapping."""
 
 
 def run_estimators(
@@ -56,12 +53,12 @@ def run_estimators(
 ) -> EstimatedParts:
     """Return all parts of a scenario that the estimators find in a drive.
 
-    `world` is the static world; with `is_map_built`, it was built from the scans of the drive itself. `other_robots`
-    have poses in the log; their traces in the scans are not taken for other objects.
+    `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are robots
+    whose poses are in the log. Their hits in the scans are not reported as objects.
     """
     unknowns = [NEVER_ESTIMATED]
     is_calibrated = drive.has_true_poses and not is_map_built
-    faults, objects = _from_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
+    faults, objects = _faults_and_objects_of_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
     kidnaps = list(_kidnaps(drive))
     faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
     faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
@@ -83,7 +80,7 @@ def run_estimators(
 def _with_sensor_names_of_robot(
     faults: list[FoundFault], robot: RobotProperties, unknowns: list[str]
 ) -> list[FoundFault]:
-    """Return the faults with the sensor names of the robot file. Faults of other sensors are moved to `unknowns`."""
+    """Return the faults with the sensor names of the robot file. Faults of missing sensors become `unknowns`."""
     if not robot.sensors:
         return faults
     found = []
@@ -95,7 +92,7 @@ def _with_sensor_names_of_robot(
     return found
 
 
-def _from_scans(
+def _faults_and_objects_of_scans(
     drive: RecordedDrive,
     world: StaticWorld,
     robot: RobotProperties,
@@ -103,9 +100,9 @@ def _from_scans(
     unknowns: list[str],
     is_calibrated: bool,
 ) -> tuple[list[FoundFault], list[FoundObject]]:
-    """Return the faults and objects that the scans show, and append to `unknowns` what they cannot show.
+    """Return the faults and objects that the scans show. Append phrases about missing information to `unknowns`.
 
-    Errors of the mount and of the ranges are estimated only if `is_calibrated`: both poses and walls must be exact.
+    Errors of the mount and of the ranges are estimated only if poses and walls are exact (`is_calibrated`).
     """
     scans = drive.scans
     if scans is None or len(scans) < 3:
@@ -141,7 +138,7 @@ def _from_scans(
 
 
 def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
-    """Yield phrases about reactions of the objects to the robot that the log does not show."""
+    """Yield phrases about reactions of objects to the robot that the log does not show."""
     if any(thing.is_moving and thing.pedestrian is None for thing in objects):
         yield "whether moving objects react to the robot; those that are no pedestrians follow their recorded tracks"
     apart = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]

@@ -1,4 +1,4 @@
-"""Faults found in a log, reasons for parts of the scenario, and time windows in which a condition holds."""
+"""Reasons for parts of a reconstructed scenario, faults found in a log, and time windows in which a condition holds."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Reason:
     """Reason for a part of the reconstructed scenario; a comment in the scenario file.
 
     Attributes:
-        text: What the log shows, as a phrase without a period.
-        begin: Time in s at which the log begins to show it; None if it has no time.
-        end: Time in s until which the log shows it; None for a single time.
+        text: Observation in the log, as a phrase without a period.
+        begin: Start of the observation in s; None if it has no time.
+        end: End of the observation in s; None for a single time.
         confidence: "high", "medium", or "low".
     """
 
@@ -40,12 +40,12 @@ class FoundFault:
     """Fault that an estimator found in a log.
 
     Attributes:
-        target: Name of the faulty sensor, such as "lidar", "odom", or "imu", or "wheels", "cmd_vel", or "localizer".
-        kind: Key of the fault in the scenario language, for example "off".
-        values: Parameters of the fault in the scenario language.
+        target: Faulty part: a sensor such as "lidar", "odom", or "imu", or "wheels", "cmd_vel", or "localizer".
+        kind: YAML key of the fault, for example "off".
+        values: Parameters of the fault by YAML key.
         begin: Start in s; None for the start of the drive.
         duration: Duration in s; None until the end of the drive.
-        reason: Reason for which the fault is in the scenario.
+        reason: Reason for the fault.
     """
 
     target: str
@@ -79,7 +79,7 @@ class Window:
 def windows(mask: Mask, times: Array, min_length: float = 0.0, max_gap: float = 0.0) -> list[Window]:
     """Return the time windows in which all samples of `mask` (n,) at the `times` (n,) are true.
 
-    Windows that are at most `max_gap` s apart become one. Windows shorter than `min_length` s are left out.
+    Windows that are at most `max_gap` s apart are merged. Windows shorter than `min_length` s are omitted.
     """
     indices = np.flatnonzero(mask)
     if not len(indices):

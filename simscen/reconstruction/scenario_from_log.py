@@ -1,4 +1,4 @@
-"""Reconstructs a scenario from a log and writes the scenario file; entry point of this package."""
+"""Reconstruction of a scenario from a log: entry point of this package, which writes the scenario file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,13 @@ from simscen.reconstruction.static_world import StaticWorld
 
 @dataclass(frozen=True)
 class ReconstructionOptions:
-    """How to read the log, files that replace those of the log, and the folder in which the files of the log are."""
+    """Options of a reconstruction.
+
+    Attributes:
+        drive: Options for reading the log.
+        files: World, map, and robot to use instead of those in the log.
+        root: Folder of the files that the recorded scenario refers to; None for the working folder.
+    """
 
     drive: DriveOptions = field(default_factory=DriveOptions)
     files: GivenFiles = field(default_factory=GivenFiles)
@@ -39,7 +45,7 @@ class ReconstructionOptions:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """Result of a reconstruction: written files (the scenario first), the recorded drive, and the scenario's parts."""
+    """Result of a reconstruction: the log, written files (the scenario first), the drive, and the scenario's parts."""
 
     log: Path
     files: tuple[Path, ...]
@@ -75,10 +81,10 @@ class Reconstruction:
 def _write_valid(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, log: Path, out: Path
 ) -> tuple[ScenarioContents, EstimatedParts]:
-    """Write the scenario, without objects and faults that make it invalid, such as an object inside the robot.
+    """Write the scenario without objects and faults that make it invalid, such as an object inside the robot.
 
-    A pedestrian that makes it invalid first becomes a scripted object. Other problems are added to the unknowns.
-    Returns the written contents and the parts that are left. Raises InvalidInput if the scenario cannot be loaded.
+    An invalid pedestrian first becomes a scripted object. Other problems are added to the unknowns. Return the written
+    contents and the remaining parts. Raise InvalidInput if the scenario cannot be loaded.
     """
     while True:
         contents = scenario_contents(drive, given, estimated, name, log.name)
@@ -111,7 +117,7 @@ def _write_valid(
 
 
 def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
-    """Return the parts without the faults that the problems refuse. Raises InvalidInput if they refuse no fault."""
+    """Return the parts without the faults that the problems are about. Raise InvalidInput if there are none."""
     refusals = "\n".join(problem.message for problem in problems)
     refused = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
     if not refused:
@@ -122,10 +128,10 @@ def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) 
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
-    """Write the scenario file `out`, and next to it the map and robot files that it needs.
+    """Reconstruct a log and write the scenario file `out`, and next to it the map and robot files that it needs.
 
-    In a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput for
-    an unusable log or file, and OSError if a file cannot be written.
+    For a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput
+    for an unusable log or file, and OSError if a file cannot be written.
     """
     robot_of_log = choose_robot(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files

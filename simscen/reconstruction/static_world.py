@@ -1,4 +1,4 @@
-"""Computes ranges and distances to walls in the static world of a drive, and builds a map from scans if it has none."""
+"""Static world of a recorded drive: expected ranges, distances to walls, and a map built from scans."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 MAP_WALL_HEIGHT_M = 1.0
 """Height of the walls that are made from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
-"""Distance to walls that is returned for points outside of the map."""
+"""Distance to walls of points outside of the map."""
 
 
 class StaticWorld:
-    """World without the objects that the reconstruction has to find, and its map at the height of the lidar in m."""
+    """World without the objects that the reconstruction has to find, with a map `grid` at the height of the lidar."""
 
     def __init__(self, world: World, height: float) -> None:
-        """Cut the world at `height` m. Its bodies, such as doors, count as walls at their initial poses."""
+        """Draw the map at `height` m. Bodies of the world, such as doors, are walls at their initial poses."""
         bodies = [replace(solid, pose=body.pose.compose(solid.pose)) for body in world.bodies for solid in body.solids]
         self.world, self.height = world, height
         mesh = merge_solids((*world.solids, *bodies))
@@ -66,7 +66,7 @@ def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
 
 
 def offset_poses(poses: Array, offset: Pose2) -> Array:
-    """Return the poses x, y, yaw (n, 3) that have the pose `offset` in the frame of each of `poses` (n, 3)."""
+    """Return the composition (n, 3) of each of `poses` x, y, yaw (n, 3) with the pose `offset`."""
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     x = poses[:, 0] + c * offset.x - s * offset.y
     y = poses[:, 1] + s * offset.x + c * offset.y
@@ -74,9 +74,9 @@ def offset_poses(poses: Array, offset: Pose2) -> Array:
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams in the frame in which the `poses` (n, 3) of the lidar are given.
+    """Return the ends (n, beams, 2) of beams in the frame of the lidar `poses` (n, 3), for `ranges` (n, beams) in m.
 
-    `angles` (beams,) are relative to the lidar. The ends of beams are not finite if their `ranges` (n, beams) are not.
+    `angles` (beams,) are in rad relative to the lidar. The end of a beam is not finite if its range is not.
     """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):
@@ -88,24 +88,24 @@ def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
 RESOLUTION_M = 0.05
 """Cell size of the map that is built from scans."""
 MARGIN_M = 1.0
-"""Distance between the border of the map and everything that was measured."""
+"""Distance between the border of the map and all hits and poses."""
 TARGET_SCANS = 1500
-"""The scans of a long drive are thinned out evenly to at least this number, and less than twice as many."""
+"""Minimum number of scans to use of a long drive. At most twice as many scans are used."""
 BODY_RADIUS_M = 0.15
-"""Cells that were closer to the path than this are free: every robot has at least this radius."""
+"""Assumed minimum radius of a robot. Cells at most this far from the driven path are free."""
 MAX_RANGE_M = 15.0
-"""Longer ranges are not used, because errors of the heading would blur the map."""
+"""Maximum range that is used to build the map."""
 HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
-"""Change of a cell's log odds by a beam that ends in it and by one that passes it, and largest magnitude of log odds.
+"""Change of a cell's log odds by a beam that ends in the cell, change by a passing beam, and limit of the magnitude.
 
 Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
 """
 MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
-"""Log odds above which a cell is occupied, and below which it is free."""
+"""Log odds above which a cell is occupied, and below which a cell is free."""
 
 
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
-    """Return a map built from the scans of a drive at its poses; without scans, a free map around the driven path."""
+    """Return a map built from the scans and poses of a drive; without scans, a free map around the driven path."""
     path = drive.poses.values[:, :2]
     if drive.scans is None or not len(drive.scans):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
@@ -120,13 +120,13 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
     for row in range(len(scans)):
         if hits[row].any():
             _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
-    odds[_driven_over(odds.shape, path - low)] = -MAX_LOG_ODDS
+    odds[_driven_cells(odds.shape, path - low)] = -MAX_LOG_ODDS
     cells = np.where(odds > MIN_OCCUPIED_LOG_ODDS, OCCUPIED, np.where(odds < MAX_FREE_LOG_ODDS, FREE, UNKNOWN))
     return OccupancyGrid(cells.astype(np.int8), RESOLUTION_M, Pose2(float(low[0]), float(low[1]), 0.0))
 
 
-def _driven_over(shape: tuple[int, ...], path: Array) -> Mask:
-    """Return which cells (rows, columns) are within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
+def _driven_cells(shape: tuple[int, ...], path: Array) -> Mask:
+    """Return a mask (rows, columns) of cells within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
     is_path = np.zeros(shape, dtype=bool)
     is_path.reshape(-1)[_index(path, shape)] = True
     driven: Mask = distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
@@ -134,14 +134,15 @@ def _driven_over(shape: tuple[int, ...], path: Array) -> Mask:
 
 
 def _shape(low: Array, high: Array) -> tuple[int, int]:
+    """Return the numbers of rows and columns of the map between two opposite corners (2,) in m."""
     columns, rows = np.ceil((high - low) / RESOLUTION_M).astype(int).tolist()
     return rows + 1, columns + 1
 
 
 def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
-    """Update the log odds of each cell that beams from `origin` (2,) to `ends` (n, 2) pass or hit, once per scan.
+    """Update the log odds of the cells that the beams of a scan from `origin` (2,) to `ends` (n, 2) pass or hit.
 
-    Coordinates are relative to the corner of the map.
+    Each cell is updated once. Coordinates are relative to the corner of the map.
     """
     reach = np.hypot(*(ends - origin).T)
     steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)
@@ -156,6 +157,7 @@ def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
 
 
 def _index(points: Array, shape: tuple[int, ...]) -> Indices:
+    """Return the indices (n,) of the cells of points (n, 2) in the flattened map."""
     cells = np.clip((points / RESOLUTION_M).astype(np.int64), 0, [shape[1] - 1, shape[0] - 1])
     result: Indices = cells[:, 1] * shape[1] + cells[:, 0]
     return result

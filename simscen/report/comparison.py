@@ -1,4 +1,4 @@
-"""Comparison of stacks or sessions as console lines, and the texts that HTML and Markdown use as well."""
+"""Comparison of stacks or sessions as console lines, and texts that the HTML and Markdown reports use as well."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -14,9 +14,9 @@ from simscen.judge.significance import PASS_RATE
 from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_FLIPS = 10
-"""Maximum number of listed flips. A flip is a scenario and seed that passes with only one of the two stacks."""
+"""Maximum number of listed flips: pairs of runs with the same scenario and seed of which only one passed."""
 MAX_CHANGES = 10
-"""Maximum number of listed significant changes."""
+"""Maximum number of listed scenarios with a significant change of a metric or of the pass rate."""
 MIN_NAME_COLUMNS = 24
 """Minimum width of the column of scenario names, in characters."""
 MAX_STACK_NAME_COLUMNS = 16
@@ -24,18 +24,14 @@ MAX_STACK_NAME_COLUMNS = 16
 
 
 Links = Mapping[tuple[str, str, int], str]
-"""Path of the replay or log of a failed run, or the command that repeats it.
-
-The key consists of the name of the stack or session, the scenario ID, and the seed.
-"""
+"""For a failed run (stack or session name, scenario ID, seed): path of its replay or log, or command to repeat it."""
 NO_LINKS: Links = {}
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
     """Yield a table of outcomes by scenario and stack, then the comparison of each stack with the first one.
 
-    `prefix` is removed from scenario IDs. `columns` is the width of the terminal, for which scenario names are
-    shortened; None for no limit.
+    `prefix` is removed from scenario IDs. Scenario IDs are shortened to a terminal of width `columns`; None: no limit.
     """
     yield ()
     yield from _outcome_table(comparison, prefix, columns)
@@ -46,9 +42,9 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 
 
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
-    """Yield the comparison of one session with the baseline: changed outcomes first, and the verdict last.
+    """Yield the comparison of one session with the baseline, a table of changed outcomes, and the verdict.
 
-    `is_worse` is the verdict: the session is significantly worse than the baseline.
+    The verdict is `is_worse`: whether the session is significantly worse than the baseline.
     """
     (against,) = comparison.against
     yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
@@ -59,7 +55,7 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
 
 
 def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
-    """Return the comparison without metrics that are equal in all pairs."""
+    """Return the comparison without metrics that are equal in all pairs of runs."""
     return replace(
         against,
         differences=tuple(difference for difference in against.differences if difference.equal < difference.pairs),
@@ -67,7 +63,7 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
 
 
 def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
-    """Return the verdict in one sentence. If `is_worse` is false, it contains the number of runs that newly fail."""
+    """Return whether a session is significantly worse than the baseline, and how many runs newly fail, as text."""
     newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
@@ -77,13 +73,13 @@ def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
-    """Return the passed and the completed runs such as "3/5", or "3/5 1!" if one more run ended with an error."""
+    """Return the numbers of passed and completed runs, such as "3/5", or "3/5 1!" with one run that had an error."""
     errors = f" {outcomes.errors}!" if outcomes.errors else ""
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
 def excluded_text(against: BaselineComparison) -> str:
-    """Return a note on the runs that are not compared, with the reason; "" if all runs are compared."""
+    """Return the numbers of runs that are not compared, with the reasons; "" if all runs are compared."""
     parts = []
     if against.error_pairs:
         parts.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
@@ -93,7 +89,7 @@ def excluded_text(against: BaselineComparison) -> str:
 
 
 def unequal_progress_text(against: BaselineComparison) -> str:
-    """Return a note with the number of pairs in which only one run reached its goals; "" if there are none."""
+    """Return the number of pairs in which only one run reached its goals, as text; "" if there are none."""
     if not against.pairs_with_one_arrival:
         return ""
     pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
@@ -127,32 +123,26 @@ def change_text(change: ScenarioChange, prefix: str = "") -> str:
 
 
 def change_verdict(change: ScenarioChange) -> str:
-    """Return "worse" or "better"; "other" for a metric of which neither a larger nor a smaller value is better."""
+    """Return "worse" or "better", or "other" for a metric that is neither better if larger nor better if smaller."""
     return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
 
 
 def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str]:
-    """Return four table cells: mean of the baseline, mean of the other stack, difference, and 95 % interval.
-
-    The interval is "" if there are too few pairs.
-    """
+    """Return the baseline's mean, the other stack's mean, the difference, and its 95 % interval ("" if unknown)."""
     digits = 3 if metric.unit and max(abs(metric.baseline), abs(metric.value)) < 1 else 2
     interval = "" if metric.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in metric.interval)
     return f"{metric.baseline:.{digits}f}", f"{metric.value:.{digits}f}", f"{metric.difference:+.{digits}f}", interval
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
-    """Return the outcomes by scenario and stack.
-
-    With `changed_only`, return only scenarios whose numbers of outcomes differ between the stacks or sessions.
-    """
+    """Return the outcomes by scenario ID and stack. `changed_only`: only scenarios whose outcomes differ by stack."""
     return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
 
 
 def _outcome_table(
     comparison: Comparison, prefix: str, columns: int | None, changed_only: bool = False
 ) -> Iterator[StyledLine]:
-    """Yield a heading, a row for each scenario, and a row for all scenarios. Arguments are as in `comparison_lines`."""
+    """Yield a heading, a row for each scenario, and a row with the totals."""
     rows = [
         (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
         for scenario, row in listed_outcomes(comparison, changed_only).items()
@@ -178,7 +168,7 @@ def _outcome_table(
 def _comparison_section(
     baseline: str, against: BaselineComparison, prefix: str, links: Links = NO_LINKS
 ) -> Iterator[StyledLine]:
-    """Yield the headline, flips, metrics, significant changes, and notes of one comparison with the baseline."""
+    """Yield the headline, flips, metrics, and significant changes of one comparison, and notes on excluded runs."""
     yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
     for flip in against.flips[:MAX_FLIPS]:
         better = flip.passed == against.stack
@@ -238,5 +228,5 @@ def _metric_table(baseline: str, against: BaselineComparison) -> Iterator[Styled
 
 
 def shorten(text: str, max_length: int = MAX_STACK_NAME_COLUMNS) -> str:
-    """Shorten text to `max_length` characters by removing its middle."""
+    """Shorten text to `max_length` characters by replacing its middle with "…"."""
     return text if len(text) <= max_length else f"{text[: (max_length - 1) // 2]}…{text[-(max_length // 2) :]}"

@@ -1,6 +1,6 @@
 """Comparison of stacks or sessions as a section of an HTML page, and as Markdown for GitHub.
 
-A flip is a pair of runs of which only one passed. `links` lead to the replays or logs of failed runs.
+A flip is a pair of runs (same scenario and seed) of which only one passed. `Links` has a link for each failed run.
 """
 
 from dataclasses import replace
@@ -29,9 +29,9 @@ EXPLANATION = (
     "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
     "test for metrics, for significant changes with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
 )
-"""Text next to the tables that explains their columns. -/=/+ are numbers of pairs: lower, equal, higher value."""
+"""Explanation of the columns of the tables, printed next to them."""
 _HEADINGS = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
-"""Headings of the table of metrics: {0} is the baseline, {1} the stack compared with it; see EXPLANATION."""
+"""Headings of the table of metrics. {0} is the name of the baseline, {1} the name of the other stack."""
 
 
 def comparison_html(comparison: Comparison) -> str:
@@ -49,14 +49,14 @@ def comparison_html(comparison: Comparison) -> str:
     return (
         f'<section class="in"><h2>{html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
         f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
-        f"{''.join(_against_baseline_html(comparison.baseline, against) for against in comparison.against)}</section>"
+        f"{''.join(_comparison_section_html(comparison.baseline, against) for against in comparison.against)}</section>"
     )
 
 
 def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
     """Return the comparison of one session with the baseline as lines of Markdown, for a pull request.
 
-    `is_worse` is the verdict: the session is significantly worse than the baseline.
+    `is_worse` states whether the session is significantly worse than the baseline.
     """
     (against,) = comparison.against
     reduced = replace(comparison, against=(with_changed_metrics(against),))
@@ -69,7 +69,7 @@ def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: 
 def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
     """Return the comparison as lines of Markdown.
 
-    `changed_only` omits scenarios whose numbers of outcomes are equal for all stacks or sessions.
+    `changed_only` omits scenarios whose outcomes are equal for all stacks or sessions.
     """
     cell = markdown_cell
     names = [cell(name) for name in comparison.stacks]
@@ -102,7 +102,7 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
 
 
 def _link_markdown(flip: Flip, links: Links) -> str:
-    """Return the link to the failed one of the two runs of a flip, in parentheses; "" if there is none."""
+    """Return the link to the failed run of a flip, in parentheses; "" if there is none."""
     link = links.get((flip.failed, flip.scenario, flip.seed))
     return f" (`{link}`)" if link else ""
 
@@ -120,8 +120,8 @@ def _outcome_cell(outcomes: OutcomeCounts) -> str:
     return f'<td class="count {css_class}">{outcome_text(outcomes)}</td>'
 
 
-def _against_baseline_html(baseline: str, against: BaselineComparison) -> str:
-    """Return flips, metrics, significant changes, and notes of one comparison with the baseline as HTML."""
+def _comparison_section_html(baseline: str, against: BaselineComparison) -> str:
+    """Return the flips, metrics, significant changes, and notes on excluded runs of one comparison."""
     flips = "".join(
         f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
         f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{html_text(flip.scenario)}</td>"

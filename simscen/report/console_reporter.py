@@ -1,7 +1,4 @@
-"""Choice of the reporter for the console: with live progress, with color, or plain; and printing of single lines.
-
-Reporters with color are imported only when they are used, because rich is slow to import.
-"""
+"""Choice of the reporter for the console (with live progress, with color, or plain), and printing of single lines."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -16,21 +13,21 @@ def text_reporter(
 ) -> Reporter:
     """Return a reporter with live progress on a terminal, plain lines elsewhere, and color where it is supported.
 
-    `live` overrides the detection of a terminal. `slow` is the number of slowest runs to list at the end; 0 lists all,
-    None none.
+    `live` enables or disables live progress; None detects a terminal. `slow` is the number of slowest runs to list at
+    the end (0: all runs, None: no list).
     """
     style = detect_style(out, environ)
     if live is not None:
         style = TerminalStyle(live or style.has_color, live, style.is_terminal)
     if style.has_live_progress:
-        from simscen.report.live_console import LiveReporter
+        from simscen.report.live_console import LiveReporter  # rich is slow to import
 
         return LiveReporter(out, style, slow)
     return _line_reporter(out, style, slow)
 
 
 def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, str] = os.environ) -> None:
-    """Print lines, with color where it is supported, wrapped to the width of a terminal."""
+    """Print lines, with color if `out` supports it, wrapped to the width of the terminal."""
     _line_reporter(out, detect_style(out, environ)).print_lines(lines)
 
 

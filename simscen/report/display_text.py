@@ -1,5 +1,7 @@
 """Text for terminals, XML, HTML, and CI logs: escaping, paths, and lines with styled parts."""
 
+import base64
+import hashlib
 import os
 import re
 import unicodedata
@@ -10,9 +12,9 @@ from pathlib import Path, PurePath
 from shutil import get_terminal_size
 from typing import Literal, TextIO
 
-_UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-_MARKER = re.compile(r"##(\w*)\[")
-_ASCII = str.maketrans(
+_CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+_CI_MARKER = re.compile(r"##(\w*)\[")
+_ASCII_REPLACEMENTS = str.maketrans(
     {"✓": "+", "✗": "x", "·": "-", "≤": "<=", "≥": ">=", "°": " deg", "×": "x", "…": "...", "—": "-", "→": "->"}
 )
 
@@ -28,7 +30,7 @@ def escape_control(text: str) -> str:
 
     The result is valid in XML 1.0.
     """
-    return _UNSAFE.sub(lambda match: _escaped(match[0]), text)
+    return _CONTROL_CHARACTERS.sub(lambda match: _escaped(match[0]), text)
 
 
 def one_line(text: str) -> str:
@@ -41,27 +43,29 @@ def html_text(text: str) -> str:
     return escape(one_line(text), quote=True)
 
 
+def csp_hash(text: str) -> str:
+    """Return the hash of a script or style as a source of a content security policy: "sha256-…"."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
+
+
 def number_with_noun(number: int, noun: str) -> str:
     """Return a number with a regular noun: "1 run", "2 runs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def shell_command_text(text: str) -> str:
-    """Return a command, quoted by shlex.join, on one line that can be copied into bash or zsh.
-
-    Line breaks and tabs, which are in single quotes, become `$'\\n'` and `$'\\t'`.
-    """
+    """Return a command from shlex.join on one line for bash or zsh: a line break becomes `$'\\n'`, a tab `$'\\t'`."""
     return escape_control(text.replace("\n", "'$'\\n''").replace("\t", "'$'\\t''"))
 
 
 def display_width(text: str) -> int:
-    """Return the number of terminal columns of a text: two for a wide character, none for a combining one."""
+    """Return the number of terminal columns of a text: two per wide character, none per combining character."""
     return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def ascii_only(text: str) -> str:
-    """Return a text in ASCII: simscen's symbols are replaced by similar text, other non-ASCII characters by escapes."""
-    return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")
+    """Return a text in ASCII. Symbols such as "✓" are replaced by similar text, other characters by escapes."""
+    return text.translate(_ASCII_REPLACEMENTS).encode("ascii", "backslashreplace").decode("ascii")
 
 
 def escape_ci_commands(line: str) -> str:
@@ -70,12 +74,12 @@ def escape_ci_commands(line: str) -> str:
 
 
 def escape_ci_markers(text: str) -> str:
-    """Escape CI commands that can be anywhere in a line: `##[error]` (GitHub, Azure), `##vso[…]`, `##teamcity[…]`."""
-    return _MARKER.sub(r"##\1\\[", text)
+    """Escape the CI commands that are valid anywhere in a line: `##[error]`, `##vso[…]`, `##teamcity[…]`."""
+    return _CI_MARKER.sub(r"##\1\\[", text)
 
 
 def escape_ci_markers_in_json(document: str) -> str:
-    """Escape CI commands in the text of a JSON document, so that a parser still reads the same data."""
+    """Escape CI commands in the text of a JSON document without changing the data."""
     return document.replace("##", "#\\u0023")
 
 
@@ -87,8 +91,7 @@ def _escaped(character: str) -> str:
 def relative_to_checkout(file: str) -> str:
     """Convert a path relative to the working folder to a path relative to $GITHUB_WORKSPACE.
 
-    GitHub expects the paths of annotations in this form. Outside of GitHub Actions, and for a file that does not exist
-    or is outside of that folder, return the path unchanged.
+    Return the path unchanged if the variable is not set, or if the file does not exist or is outside of that folder.
     """
     workspace = os.environ.get("GITHUB_WORKSPACE")
     if not workspace:
@@ -98,10 +101,10 @@ def relative_to_checkout(file: str) -> str:
 
 
 def relative_to_cwd(file: str, folder: str) -> str:
-    """Return the path of a `file` in `folder` as seen from the working folder; the absolute path if that is shorter.
+    """Convert a path relative to `folder` (absolute) to a path relative to the working folder.
 
-    `file` is relative to `folder`, which is absolute. Return `file` unchanged if it no longer exists, or if one of the
-    arguments is "".
+    Return the absolute path if it is shorter. Return `file` unchanged if the file does not exist, or if an argument is
+    "".
     """
     path = str(Path(folder, file))
     return min(os.path.relpath(path), path, key=len) if file and folder and os.path.lexists(path) else file
@@ -115,8 +118,8 @@ Role = Literal["plain", "name", "good", "bad", "warning", "quiet"]
 class StyledText:
     """Part of a line with a role.
 
-    `file` is the path that the text links to in terminals with support for links; "" for no link. If `is_shell` is
-    true, the text is a shell command, and a backslash continues it in the next line when it is wrapped.
+    `file` is the path that the text links to; "" for no link. If `is_shell` is true, the text is a shell command, which
+    is wrapped with a backslash at the end of the line.
     """
 
     text: str
@@ -131,7 +134,7 @@ StyledLine = tuple[StyledText, ...]
 
 def plain_text(line: StyledLine) -> str:
     """Return the text of a line without styles and trailing spaces."""
-    return "".join(piece.text for piece in line).rstrip()
+    return "".join(part.text for part in line).rstrip()
 
 
 _WORD = re.compile(r"(\s*)(\S+)")
@@ -140,21 +143,20 @@ _LINE_CONTINUATION = " \\"
 
 
 def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
-    """Wrap a line to at most `columns` (None = no limit), and indent the second and further lines.
+    """Wrap a line to at most `columns` (None: no limit), and indent the second and further lines.
 
-    A part that begins with two spaces moves to the next line as a whole if it fits there. Words that are longer than a
-    line are not split, so that paths can be copied.
+    A part that begins with two spaces moves to the next line as a whole if it fits there. Words are never split.
     """
     if columns is None or display_width(plain_text(line)) <= columns:
         return [line]
-    return _LineWrapper(columns, min(_indent(line), columns // 3)).wrap(line)
+    return _LineWrapper(columns, min(_continuation_indent(line), columns // 3)).wrap(line)
 
 
-def _indent(line: StyledLine) -> int:
-    """Return the indentation for the further lines of a wrapped line: the column after its label.
+def _continuation_indent(line: StyledLine) -> int:
+    """Return the indentation of the second and further lines of a wrapped line.
 
-    A label is a first part that ends with a space, such as "      again ". For a line without a label, return two
-    columns more than the indentation of the line.
+    If the first part is a label that ends with a space, such as "      again ", it is the width of the label. Otherwise
+    it is two columns more than the indentation of the first line.
     """
     first = line[0].text
     if first.strip() and first.endswith(" "):
@@ -164,7 +166,7 @@ def _indent(line: StyledLine) -> int:
 
 
 class _LineWrapper:
-    """Wraps one line to at most `columns`; further lines start at column `indent`. Use each instance only once."""
+    """Wraps one line to at most `columns`. Further lines start at column `indent`. Use each instance only once."""
 
     def __init__(self, columns: int, indent: int) -> None:
         self._columns, self._indent = columns, indent
@@ -173,59 +175,60 @@ class _LineWrapper:
         self._used_columns = 0
 
     def wrap(self, line: StyledLine) -> list[StyledLine]:
-        for number, piece in enumerate(line):
+        for number, part in enumerate(line):
             punctuation = number + 1 < len(line) and re.match(r"[^\s\w]+", line[number + 1].text)
-            self._add_piece(piece, display_width(punctuation[0]) if punctuation else 0)
+            self._add_part(part, display_width(punctuation[0]) if punctuation else 0)
         self._finish_line()
         return self._lines
 
-    def _add_piece(self, piece: StyledText, reserved: int) -> None:
-        """Add a piece, and keep `reserved` columns for the punctuation that follows it."""
-        text = piece.text
+    def _add_part(self, part: StyledText, reserved: int) -> None:
+        """Add a part to the current line or the next one. Keep `reserved` columns free for punctuation behind it."""
+        text = part.text
         if self._used_columns + display_width(text.rstrip()) + reserved <= self._columns:
-            self._append(piece, text)
+            self._append(part, text)
         elif text.startswith("  ") and self._indent + display_width(text.strip()) + reserved <= self._columns:
-            self._start_line(piece, text.strip())
+            self._start_line(part, text.strip())
         else:
-            for blank, word, last in _words(piece):
-                tail = reserved if last else len(_LINE_CONTINUATION) if piece.is_shell else 0
+            for blank, word, last in _words(part):
+                tail = reserved if last else len(_LINE_CONTINUATION) if part.is_shell else 0
                 if self._used_columns + display_width(blank + word) + tail <= self._columns or not self._used_columns:
-                    self._append(piece, blank + word)
+                    self._append(part, blank + word)
                 else:
-                    self._start_line(piece, word, tail)
+                    self._start_line(part, word, tail)
 
-    def _append(self, piece: StyledText, text: str) -> None:
-        self._line.append(replace(piece, text=text))
+    def _append(self, part: StyledText, text: str) -> None:
+        """Append `text` in the style of `part` to the current line."""
+        self._line.append(replace(part, text=text))
         self._used_columns += display_width(text)
 
-    def _start_line(self, piece: StyledText, text: str, tail: int = 0) -> None:
-        """Continue in the next line, and keep `tail` columns after the text.
+    def _start_line(self, part: StyledText, text: str, reserved: int = 0) -> None:
+        """Start the next line with `text` in the style of `part`. Keep `reserved` columns free behind it.
 
-        If the text does not fit, the indentation is reduced by as many columns as are missing.
+        If the text does not fit, the indentation is reduced.
         """
-        if piece.is_shell and self._line and self._line[-1].is_shell:
-            self._append(piece, _LINE_CONTINUATION)
-        indent = max(0, min(self._indent, self._columns - display_width(text) - tail))
+        if part.is_shell and self._line and self._line[-1].is_shell:
+            self._append(part, _LINE_CONTINUATION)
+        indent = max(0, min(self._indent, self._columns - display_width(text) - reserved))
         self._finish_line()
         self._line.append(StyledText(" " * indent))
         self._used_columns = indent
-        self._append(piece, text)
+        self._append(part, text)
 
     def _finish_line(self) -> None:
         self._lines.append(tuple(self._line))
         self._line = []
 
 
-def _words(piece: StyledText) -> Iterator[tuple[str, str, bool]]:
-    """Yield for each word: the spaces before it, the word, and whether it is the last one."""
-    found = (_SHELL_WORD if piece.is_shell else _WORD).findall(piece.text)
+def _words(part: StyledText) -> Iterator[tuple[str, str, bool]]:
+    """Yield for each word of a part: the spaces before the word, the word, and whether the word is the last one."""
+    found = (_SHELL_WORD if part.is_shell else _WORD).findall(part.text)
     for number, (blank, word) in enumerate(found, start=1):
         yield blank, word, number == len(found)
 
 
 @dataclass(frozen=True)
 class TerminalStyle:
-    """Features of an output stream. With live progress, lines on the screen are updated in place."""
+    """Features of an output stream. Live progress means that lines on the screen are updated in place."""
 
     has_color: bool
     has_live_progress: bool
@@ -233,14 +236,15 @@ class TerminalStyle:
 
     @property
     def columns(self) -> int | None:
-        """Current width of the terminal, or None if the output is not a terminal and lines are not wrapped."""
+        """Current width of the terminal; None if the output is not a terminal."""
         return get_terminal_size().columns if self.is_terminal else None
 
 
 def detect_style(out: TextIO, environ: Mapping[str, str]) -> TerminalStyle:
     """Detect the features of `out` from the stream and from the environment variables `environ`.
 
-    NO_COLOR takes precedence over FORCE_COLOR and CLICOLOR_FORCE, which take precedence over TERM=dumb and CLICOLOR=0.
+    Color depends on the first of these variables that is set: NO_COLOR, FORCE_COLOR or CLICOLOR_FORCE, TERM=dumb,
+    CLICOLOR=0.
     """
     is_terminal = out.isatty()
     is_capable = is_terminal and environ.get("TERM") not in ("dumb", "unknown")
@@ -254,7 +258,7 @@ def detect_style(out: TextIO, environ: Mapping[str, str]) -> TerminalStyle:
 
 
 def can_encode(out: TextIO) -> bool:
-    """Return whether `out` can encode the symbols of the reporters, such as "✓". If not, reporters write ASCII."""
+    """Return whether `out` can encode the symbols of the reporters, such as "✓"."""
     try:
         "✓✗·≤≥°".encode(getattr(out, "encoding", None) or "ascii")
     except (UnicodeEncodeError, LookupError):

@@ -28,10 +28,10 @@ MAX_ROWS = 1000
 
 
 class GitHubReporter:
-    """Prints plain lines and annotations, and writes the job summary to `summary` at the end of the session.
+    """Prints plain lines and annotations to `out`, and at the end of the session the job summary to `summary`.
 
-    `slow` is the number of slowest runs to list, as in text_reporter. `pictures_url` is the address of the uploaded
-    output folder; without it, the summary has no pictures.
+    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `pictures_url` is the URL of
+    the uploaded output folder; without it, the summary has no pictures.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class GitHubReporter:
 def annotations(run: RunFinished) -> list[str]:
     """Return workflow commands, such as `::error file=…::…`, that annotate the scenario file of a run.
 
-    There is one for each violation and for an error. A skipped run or an expected failure has a single notice.
+    A run has one annotation per violation, and one for its error. A skipped run or an expected failure has one notice.
     """
     name = short_run_name(run.key)
     if excuse := reason_without_failure(run):
@@ -86,7 +86,7 @@ def annotations(run: RunFinished) -> list[str]:
 def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures_url: str = "") -> str:
     """Return the job summary: counts, a table of at most MAX_ROWS runs with failures first, and a stack comparison.
 
-    With `pictures_url`, the address of the output folder, it also contains the pictures of failures.
+    If the URL of the output folder is given (`pictures_url`), the summary also contains pictures of failures.
     """
     symbols = {
         Outcome.ERROR: "⚠️",
@@ -136,7 +136,7 @@ def _reason_cell(run: RunFinished) -> str:
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
-    """Return a workflow command. `level` is error, warning, or notice; `line` 0 stands for the first line."""
+    """Return a workflow command. `level` is error, warning, or notice. `line` 0 (unknown) becomes line 1."""
     file = relative_to_checkout(scenario_file(run))
     properties = f"file={_escape_property(file)},line={max(line or 1, 1)},title={_escape_property(title)}"
     return f"::{level} {properties}::{_escape_message(message)}"

@@ -1,8 +1,7 @@
-"""Writer of events.jsonl, the journal of a session, from which all other reports can be generated again.
+"""Writer of events.jsonl, the journal of a session, from which all other reports can be generated.
 
 The first line of a session lists all its runs. Each further line records an event: a run started or finished, runs were
-added to a study, or the session ended. A line is written to disk before the session continues, so that finished runs
-are not lost if simscen is killed.
+added to a study, or the session ended.
 """
 
 import fcntl
@@ -28,17 +27,16 @@ from simscen.report.journal_reader import (
 )
 
 BLOCK_BYTES = 1 << 20
-"""Number of bytes that are read at a time to find the last line break of a journal."""
+"""Number of bytes to read at a time when searching for the last line break of a journal."""
 
 
 class Journal:
     """Writes the events of a session to events.jsonl in `folder`, and locks this folder until `close`.
 
-    With `resume`, the folder may already contain a journal, to which lines are appended. With `sync`, each line is on
-    the disk before the session continues. If a line cannot be written, for example because the disk is full, `error` is
-    set, and the session continues.
+    With `resume`, lines are appended to an existing journal. With `sync`, each line is flushed to the disk, so that it
+    is not lost if simscen is killed. If a line cannot be written, for example because the disk is full, `error` is set.
 
-    Raises UsageError if another process writes to the folder, or if the folder contains a journal without `resume`;
+    Raises UsageError if another process has locked the folder, or if a journal exists and `resume` is false. Raises
     OSError if the file cannot be opened.
     """
 
@@ -62,10 +60,10 @@ class Journal:
         shard: tuple[int, int] = (1, 1),
         study: StudyPlan | None = None,
     ) -> None:
-        """Start a session with these runs. Readers ignore all earlier lines of the journal.
+        """Write the first line of a session with these runs. Readers ignore all earlier lines of the journal.
 
-        `version` is the version of simscen, `workers` the number of worker processes. `shard` (i, n) means that these
-        are the runs of part i of n. `study` is the plan of a study; None for other sessions.
+        `version` is the version of simscen. `workers` is the number of worker processes. `shard` (i, n) means that
+        `runs` is part i of n of all runs. `study` is the plan of a study; None for other sessions.
         """
         self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
@@ -80,7 +78,7 @@ class Journal:
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
     def add(self, runs: Sequence[PlannedRun], study: StudyPlan) -> None:
-        """Add further runs to the session of a study, whose new plan is `study`."""
+        """Write a line with further runs of a study. `study` is the new plan of the study."""
         first = len(self._numbers)
         self._numbers |= {run.key: number for number, run in enumerate(runs, start=first)}
         data = [planned_run_to_data(run) for run in runs]
@@ -101,7 +99,7 @@ class Journal:
                 pass
 
     def complete(self, runs: Sequence[RunFinished]) -> None:
-        """Write those of the finished runs that are not in the journal yet, after an interrupt or a full disk."""
+        """Write the finished runs that are not in the journal yet, after an interrupt or a full disk."""
         for run in runs:
             if run.key not in self._finished:
                 self(run)
@@ -111,7 +109,7 @@ class Journal:
         os.close(self._file)
 
     def _write(self, message: dict[str, Any]) -> bool:
-        """Append a line with the seconds since the start. If that fails, set `error`, and return False."""
+        """Append `message` and the seconds since the start as a line. Set `error` and return False if that fails."""
         message = {**message, "at": round(time.monotonic() - self._start, 3)}
         data = json.dumps(message, sort_keys=True, ensure_ascii=True, allow_nan=False).encode() + b"\n"
         size = os.fstat(self._file).st_size
@@ -129,7 +127,7 @@ class Journal:
 
 
 def _truncate_to_complete_lines(file: int) -> int:
-    """Remove an incomplete last line, which a killed process left, and return the remaining size."""
+    """Remove an incomplete last line, which a killed process left, and return the remaining size in bytes."""
     full_size = size = os.fstat(file).st_size
     while size:
         start = max(0, size - BLOCK_BYTES)
@@ -143,7 +141,7 @@ def _truncate_to_complete_lines(file: int) -> int:
 
 
 def require_free(folder: Path) -> None:
-    """Raise UsageError if another process writes the journal in `folder`."""
+    """Raise UsageError if another process has locked the journal in `folder`."""
     if (folder / JOURNAL_FILE).is_file():
         file = os.open(folder / JOURNAL_FILE, os.O_RDONLY)
         try:
@@ -153,7 +151,7 @@ def require_free(folder: Path) -> None:
 
 
 def _lock(file: int, folder: Path) -> None:
-    """Lock an open journal until it is closed. Raises UsageError if another process has locked it."""
+    """Lock the journal with the descriptor `file` until it is closed. Raises UsageError if it is already locked."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,4 +1,4 @@
-"""Reader of events.jsonl, the journal of a session, and conversion of plans and runs to and from its JSON lines."""
+"""Reader of events.jsonl, the journal of a session, and conversion of runs and study plans to and from its lines."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,21 +18,22 @@ from simscen.report.display_text import relative_path, relative_to_cwd
 
 JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2
-"""Version of the format. Journals with other versions are not read."""
+"""Version of the format. Journals with other versions are refused."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """A run of a session that may not have started yet.
+    """A run of a session, as planned before the run starts.
 
     Attributes:
-        path: Scenario file relative to the root.
+        key: Scenario, variation, seed, and stack of the run.
+        path: Scenario file relative to the root folder.
         digest: Hash of everything that the result depends on. A result is reused only if the digest is the same.
-        again: Command that repeats the run, as in RunFinished.
-        file: Scenario file relative to the working folder, as in RunFinished.
-        stack: NAME=VALUE of the chosen stack, as in RunResult; "" for the stack of the scenario.
+        again: Command that repeats the run.
+        file: Scenario file relative to the working folder.
+        stack: Value NAME=VALUE of the option --stack; "" for the stack of the scenario.
         definition: Hash of the scenario without its stacks, by which `simscen compare` detects a changed scenario.
-        varied: Varied values by path in the scenario.
+        varied: Varied values, by the path of the parameter in the scenario.
     """
 
     key: RunKey
@@ -46,7 +47,7 @@ class PlannedRun:
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
-    """Return a planned run as JSON data of the journal."""
+    """Return a planned run as JSON data."""
     source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "definition": run.definition}
     varied = {"varied": dict(run.varied)} if run.varied else {}
     return {**asdict(run.key), **source, "digest": run.digest, **varied}
@@ -68,7 +69,7 @@ def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
 
 
 def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
-    """Return the plan of a study as JSON data, without the varied values, which are in the planned runs."""
+    """Return the plan of a study as JSON data, without the varied values."""
     claim = None if plan.claim is None else plan.claim.model_dump(exclude_unset=True)
     return {
         "scenario": plan.scenario,
@@ -81,7 +82,7 @@ def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
 
 
 def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -> StudyPlan:
-    """Read the data of `study_plan_to_data`, and take the varied values from the planned runs."""
+    """Read the data of `study_plan_to_data`. The varied values are taken from the planned runs."""
     claim = None if data["claim"] is None else PassRate.model_validate(data["claim"])
     values = {run.key: run.varied for run in planned if run.varied}
     return StudyPlan(
@@ -96,7 +97,7 @@ def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
-    """Return a finished run as JSON data. Paths of its files are relative to the output `folder`."""
+    """Return a finished run as JSON data. The paths of its files become relative to the output `folder`."""
     files = {name: relative_path(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
     data = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
     data |= {"resumed": True} if run.resumed else {}
@@ -129,9 +130,9 @@ class JournaledSession:
         planned: All runs of the session.
         finished: Finished runs by key.
         started: Keys of runs that started, whether or not they finished.
-        wall: Seconds of wall time from the start of the session to its end, or to the last line if it did not end.
+        wall: Wall time in s from the start of the session to its end, or to the last line if it did not end.
         interrupted: Whether the session ended before all runs were finished.
-        study: Plan of a session of `simscen study`; None for other sessions.
+        study: Plan of the study, for a session of `simscen study`; None for other sessions.
     """
 
     version: str
@@ -153,12 +154,12 @@ class JournaledSession:
         return RunStore(self.finished.get(run.key) or self._unfinished(run) for run in self.planned)
 
     def start_event(self, folder: Path) -> SessionStarted:
-        """Return the first event of the session as reporters expect it; `folder` is the output folder."""
+        """Return the event with which the session starts, for reporters. `folder` is the output folder."""
         return session_started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 
     @property
     def stacks(self) -> tuple[str, ...]:
-        """NAME=VALUE of each stack that was chosen by --stack, in the order of the runs."""
+        """NAME=VALUE of each stack that was chosen with --stack, in the order of the runs."""
         return tuple(dict.fromkeys(run.stack for run in self.planned if run.stack))
 
     def _unfinished(self, run: PlannedRun) -> RunFinished:
@@ -173,24 +174,24 @@ def read_journal(folder: Path) -> JournaledSession:
     """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid journal."""
     if not (folder / JOURNAL_FILE).is_file():
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
-        raise _invalid(folder, f"the folder has no {JOURNAL_FILE}", hint)
+        raise _invalid_journal(folder, f"the folder has no {JOURNAL_FILE}", hint)
     try:
         lines = _last_session_lines(folder)
         first = next(lines, None)
         if first is None:
-            raise _invalid(folder / JOURNAL_FILE, "the session ended before it listed its runs")
+            raise _invalid_journal(folder / JOURNAL_FILE, "the session ended before it listed its runs")
         session = _SessionReader(first, folder)
         for line in lines:
             session.read(line)
         return session.result()
     except OSError as error:
-        raise _invalid(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
+        raise _invalid_journal(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise _invalid(folder / JOURNAL_FILE, f"the journal is damaged: {error}") from error
+        raise _invalid_journal(folder / JOURNAL_FILE, f"the journal is damaged: {error}") from error
 
 
 def _last_session_lines(folder: Path) -> Iterator[dict[str, Any]]:
-    """Yield the complete lines of the last session in a journal. Raises OSError or ValueError."""
+    """Yield the complete lines of the last session in a journal. Raises OSError or ValueError if it is not readable."""
     with (folder / JOURNAL_FILE).open("rb") as file:
         start, position = None, 0
         for line in file:
@@ -215,7 +216,7 @@ def session_process(folder: Path) -> int | None:
 
 
 class _SessionReader:
-    """Reads the lines of one session. `first` is its first line, with the plan; `folder` is the output folder."""
+    """Reads the lines of one session. `first` is the first line with the planned runs, `folder` the output folder."""
 
     def __init__(self, first: dict[str, Any], folder: Path) -> None:
         if first["format"] != JOURNAL_FORMAT:
@@ -224,7 +225,7 @@ class _SessionReader:
         self._cwd = first.get("cwd", "")
         self._study = first.get("study")
         self._planned: list[PlannedRun] = []
-        self._plan(first["runs"])
+        self._add_planned(first["runs"])
         self._finished = FinishedRuns()
         self._started: set[RunKey] = set()
 
@@ -232,7 +233,7 @@ class _SessionReader:
         """Read a line after the first one."""
         match line["event"]:
             case "added":
-                self._plan(line["runs"])
+                self._add_planned(line["runs"])
                 self._study = line.get("study")
             case "started":
                 self._started.add(self._planned[line["run"]].key)
@@ -241,11 +242,11 @@ class _SessionReader:
                 self._finished.add(self._planned[line["run"]].key, run)
         self._last = {key: line[key] for key in ("wall", "at", "interrupted") if key in line}
 
-    def _plan(self, runs: list[dict[str, Any]]) -> None:
+    def _add_planned(self, runs: list[dict[str, Any]]) -> None:
         self._planned += [_relocate(planned_run_from_data(run), self._cwd) for run in runs]
 
     def result(self) -> JournaledSession:
-        """Return the session after all lines were read."""
+        """Return the session from the lines read so far."""
         planned, first, last = tuple(self._planned), self._first, self._last
         return JournaledSession(
             version=first["version"],
@@ -261,9 +262,9 @@ class _SessionReader:
 
 
 def _relocate(run: Run, cwd: str) -> Run:
-    """Return the run with the path of its scenario file relative to the current working folder instead of `cwd`."""
+    """Return the run with its path `file` relative to the current working folder instead of the folder `cwd`."""
     return replace(run, file=intern(relative_to_cwd(run.file, cwd)))
 
 
-def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:
+def _invalid_journal(path: Path, message: str, hint: str = "") -> InvalidInput:
     return InvalidInput([Problem(str(path), 0, 0, "SC810", message, hint)])

@@ -13,7 +13,7 @@ from simscen.report.violations import error_summary, first_violation, reason_wit
 
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
-    """Yield the outcome and the length of a log in s, then all violations. `name` is the name of the log."""
+    """Yield a line with the outcome and the length in s of a log, then the lines of all violations."""
     tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     note = f"tightest: {one_line(tightest)}" if tightest else reason_without_failure(run)
     yield (*_outcome_and_length(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
@@ -21,7 +21,7 @@ def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
 
 
 def short_log_line(run: RunFinished, name: str) -> StyledLine:
-    """Return a line with the outcome and length of a log, and its tightest margin or the first reason for a failure."""
+    """Return a line with the outcome, the length in s, and the tightest margin or the first violation of a log."""
     if run.outcome is Outcome.ERROR:
         return (*_outcome_and_length(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
     if excuse := reason_without_failure(run):
@@ -32,9 +32,9 @@ def short_log_line(run: RunFinished, name: str) -> StyledLine:
 
 
 def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine]:
-    """Yield the lines of a table of margins, with a row per log and a column per criterion.
+    """Yield a table of margins with a row per log and a column per criterion, then the reasons for missing margins.
 
-    Lines with the reasons for missing margins follow. `runs` are pairs of the name of a log and its result.
+    `runs` are pairs of the name of a log and its result.
     """
     ids = list(dict.fromkeys(verdict.id for _, run in runs for verdict in run.result.verdicts))
     rows = [[one_line(name), *(_cell(run.result, verdict_id) for verdict_id in ids)] for name, run in runs]
@@ -73,7 +73,10 @@ def _outcome_and_length(result: RunResult, name: str) -> tuple[StyledText, ...]:
 
 
 def _cell(result: RunResult, verdict_id: str) -> str:
-    """Return the margin of a verdict; without one, "holds", "fails", "?", "error", or "-" for a missing verdict."""
+    """Return the margin of a verdict as text. Without a margin, return "holds", "fails", "?", "error", or "-".
+
+    "?" is an inconclusive verdict, "-" a missing one.
+    """
     verdict = next((verdict for verdict in result.verdicts if verdict.id == verdict_id), None)
     if verdict is None:
         return "-"
@@ -87,14 +90,14 @@ def _cell(result: RunResult, verdict_id: str) -> str:
 
 
 def _margin_text(margin: float, unit: str) -> str:
-    """Format a margin with its sign: integers for counts, and enough digits to show that a margin is not zero."""
+    """Format a margin with its sign: counts as integers, other margins so that only an exact zero is shown as zero."""
     if not unit and margin == round(margin):
         return f"{margin:+.0f}"
     return f"{margin:+.2f} {unit}".rstrip() if margin == 0 or abs(margin) >= 0.005 else f"{margin:+.1g} {unit}".rstrip()
 
 
 def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
-    """Yield each reason why a criterion is undecided, once, and then why logs could not be judged."""
+    """Yield the different reasons of undecided criteria, then for each log that could not be judged its error."""
     reasons = Counter(
         reason for _, run in runs for verdict in run.result.verdicts for reason in _undecided_reason(verdict)
     )
@@ -106,7 +109,7 @@ def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
 
 
 def _undecided_reason(verdict: Verdict) -> Iterator[str]:
-    """Yield the reason of an inconclusive verdict or an error; nothing for other verdicts."""
+    """Yield the reason of a verdict that is inconclusive or an error. Yield nothing for other verdicts."""
     if verdict.status in (Status.INCONCLUSIVE, Status.ERROR) and verdict.tightest is not None:
         symbol = "?" if verdict.status is Status.INCONCLUSIVE else "error:"
         reasons = "; ".join(verdict.tightest.detail)

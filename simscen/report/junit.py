@@ -1,7 +1,4 @@
-"""Writer of junit.xml, with one testsuite per scenario file and one testcase per run.
-
-Jenkins, GitLab, GitHub Actions, and junitparser support all elements that are used.
-"""
+"""Writer of junit.xml, with one testsuite per scenario file and one testcase per run."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,26 +26,19 @@ from simscen.report.violations import (
 )
 
 Family = Literal["simscen", "xunit2"]
-"""Variant of the format. "xunit2" omits what junit-10.xsd of Jenkins forbids in a testcase: file, line, properties."""
+"""Variant of the format. "xunit2" omits `file`, `line`, and `properties`, which junit-10.xsd of Jenkins forbids."""
 MAX_CLAIM_FAILURES = 100
-"""Maximum number of failed runs that the testcase of a claim lists."""
-
-
-def to_xml(
-    runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
-) -> bytes:
-    """Return the document in UTF-8, with runs sorted by file, scenario, and seed. `name` is the name of the document.
-
-    For a `study` with a claim, the document has one testcase for the claim, and one for each run that could not be
-    completed.
-    """
-    return b"".join(xml_parts(runs, family, name, study))
+"""Maximum number of failed runs in the testcase of a claim."""
 
 
 def xml_parts(
     runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
 ) -> Iterator[bytes]:
-    """Yield the document of `to_xml` in parts that are joined without a separator, to save memory with many runs."""
+    """Yield the document in UTF-8 in consecutive parts, to save memory. Runs are sorted by file, scenario, and seed.
+
+    `name` is the name of `testsuites`. A `study` can have a claim (a minimum pass rate to show). The document then has
+    one testcase for the claim, and one for each run that could not be completed.
+    """
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = in_order(runs)
     if study is not None and study.claim is not None and ordered:
@@ -83,7 +73,7 @@ def xml_parts(
 
 @dataclass
 class SuiteCounts:
-    """Numbers of runs by outcome, and the sum of their wall times in s, for the attributes of a testsuite."""
+    """Attributes of a testsuite: numbers of runs by outcome, and sum of the wall times in s."""
 
     tests: int = 0
     failures: int = 0
@@ -100,14 +90,14 @@ class SuiteCounts:
         self.seconds += run.wall
 
     def add(self, other: "SuiteCounts") -> None:
-        """Add the numbers of another suite, except `skipped`, which is written for single suites only."""
+        """Add the numbers of another suite, except `skipped`."""
         self.tests += other.tests
         self.failures += other.failures
         self.errors += other.errors
         self.seconds += other.seconds
 
     def write_to(self, element: Element) -> None:
-        """Set the attributes of a suite, except `skipped`, which the root element must not have."""
+        """Set the attributes of an element, except `skipped`, which the root element must not have."""
         element.set("tests", str(self.tests))
         element.set("failures", str(self.failures))
         element.set("errors", str(self.errors))
@@ -134,9 +124,9 @@ def _indented_document(root: Element) -> bytes:
 
 
 def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[RunFinished], family: Family) -> bytes:
-    """Return the document of a study with a claim. A failed run has no testcase, but is listed in that of the claim.
+    """Return the document of a study with a claim. The testcase of the claim lists the failed runs.
 
-    An undecided claim is an error of the type `simscen.undecided`, because JUnit has no other element for it.
+    An undecided claim is an error of the type `simscen.undecided`.
     """
     incomplete = [run for run in runs if run.outcome is Outcome.ERROR]
     suite = SubElement(root, "testsuite", {"name": escape_control(scenario_file(runs[0]))})
@@ -186,7 +176,7 @@ def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> No
             SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": reason_without_failure(run)})
         case Outcome.PASSED:
             pass
-    if output := _output(run):
+    if output := _system_out(run):
         SubElement(case, "system-out").text = output
 
 
@@ -230,7 +220,7 @@ def _add_error(case: Element, run: RunFinished) -> None:
 
 
 def _details(run: RunFinished, violations: list[Violation]) -> str:
-    """Return the lines of the violations, and the command that repeats the run."""
+    """Return the violations and the command that repeats the run, one per line."""
     lines = []
     for violation in violations:
         lines.append(f"{source_location(run, violation.line)}: {violation.message}")
@@ -238,8 +228,8 @@ def _details(run: RunFinished, violations: list[Violation]) -> str:
     return "\n".join([*lines, *([f"again: {shell_command_text(run.again)}"] if run.again else [])])
 
 
-def _output(run: RunFinished) -> str:
-    """Return a line for each warning, disturbance, and artifact; artifacts are attachments for Jenkins and GitLab."""
+def _system_out(run: RunFinished) -> str:
+    """Return a line for each warning, disturbance, and artifact. Jenkins and GitLab attach the artifacts."""
     warnings = [violation for violation in reported_violations(run) if violation.is_warning]
     lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
@@ -262,7 +252,7 @@ def _case_name(run: RunFinished) -> str:
 
 
 def _unique(name: str, used_names: set[str]) -> str:
-    """Return the name with a number if it is used already, such as "name #2", and add it to `used_names`."""
+    """Return the name, with a number such as "name #2" if it is used already, and add the result to `used_names`."""
     candidate, number = name, 2
     while candidate in used_names:
         candidate, number = f"{name} #{number}", number + 1

@@ -30,7 +30,7 @@ MIN_FINISHED_RUNS = 2
 class ProgressEstimate:
     """Estimates the remaining time of a session from its events. `clock` returns seconds of wall time.
 
-    Results that are reused from an earlier session do not count for the mean time of a run.
+    Results that are reused from an earlier session do not count in the mean time per run.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -71,7 +71,7 @@ class ProgressEstimate:
 
 
 def _round_duration(seconds: float) -> str:
-    """Format a duration, rounded so that the text does not change constantly."""
+    """Format a duration, rounded to 5 s, 1 min, or 0.1 h."""
     if seconds < 90:
         return f"{max(5, 5 * round(seconds / 5))} s"
     minutes = round(seconds / 60)
@@ -85,8 +85,7 @@ STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "warning":
 class ColorReporter(PlainReporter):
     """Prints the lines of PlainReporter in color.
 
-    Lines that a CI system could read as a command are escaped and have no color. `slow` is the number of slowest runs
-    to list at the end; 0 lists all, None none.
+    Lines that a CI system could read as a command are escaped and have no color.
     """
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
@@ -101,10 +100,10 @@ class ColorReporter(PlainReporter):
 
 
 class LiveReporter:
-    """Prints the lines in color, and below them one line per current run with its simulated time.
+    """Prints lines in color, and below them a line for each current run, which is updated in place.
 
-    The lines of the current runs are updated in place. `slow` is the number of slowest runs to list at the end; 0 lists
-    all, None none. `clock` returns seconds of wall time.
+    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `clock` returns seconds of
+    wall time.
     """
 
     def __init__(
@@ -144,11 +143,13 @@ class LiveReporter:
             self._console.print(_rich_text(line, links=True))
 
     def _current_runs(self) -> Group:
+        """Return a line for each current run, and a line with the progress of the session."""
         rows = [self._row(*state) for _, state in sorted(self._running.items())]
         progress = self._estimate.text
         return Group(*rows, *([Text(f"  {progress}", style="dim")] if progress and rows else []))
 
     def _row(self, started: RunStarted, simulated: float, note: str) -> Text:
+        """Return the line of a current run with its simulated time in s and the note of its latest progress event."""
         name = self._formatter.naming.name(started.key)
         limit = f" of at most {started.time_limit:.0f} s" if started.time_limit else ""
         row = [("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")]
@@ -170,14 +171,11 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
 
 
 def _rich_text(line: StyledLine, links: bool = False) -> Text:
-    """Convert a line to rich.Text without interpreting markup in it, with links to files if `links` is true."""
+    """Convert a line to rich.Text without interpreting markup in it. With `links`, the text links to files."""
     return Text.assemble(*((piece.text, _style(STYLES[piece.role], piece.file if links else "")) for piece in line))
 
 
 def _style(definition: str, file: str) -> Style:
-    """Return the rich style of a definition such as "bold", with a link to the file unless it is "".
-
-    Terminals with support for OSC 8 show the link.
-    """
+    """Return the rich style of a definition such as "bold", with a link (OSC 8) to `file`; "" for no link."""
     style = Style.parse(definition)
     return style + Style(link=Path(file).absolute().as_uri()) if file else style

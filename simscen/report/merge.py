@@ -17,10 +17,10 @@ from simscen.report.journal_reader import JournaledSession, read_journal
 
 
 def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, JournaledSession]:
-    """Return the sessions of shards by their output folders.
+    """Return the session of the shard in each output folder.
 
-    Raises InvalidInput if they cannot be merged: they were written by different versions of simscen, several of them
-    contain the same run, or a shard is missing and `allow_missing` is false.
+    Raises InvalidInput if different versions of simscen wrote the shards, if two shards contain the same run, or if a
+    shard is missing and `allow_missing` is false.
     """
     sessions = {folder: read_journal(folder) for folder in folders}
     folders_by_key: dict[RunKey, Path] = {}
@@ -40,7 +40,7 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
 
 
 def _missing_shards(sessions: dict[Path, JournaledSession]) -> list[Problem]:
-    """Return a problem for each shard i of n that none of the sessions ran."""
+    """Return a problem for each shard i of n without a session."""
     count = max(session.shard[1] for session in sessions.values())
     present = {session.shard[0] for session in sessions.values() if session.shard[1] == count}
     folder = next(folder for folder, session in sessions.items() if session.shard[1] == count)
@@ -54,10 +54,10 @@ def _problem(folder: Path, message: str, hint: str = "") -> Problem:
 
 
 def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:
-    """Write one journal for all shards to `folder`, and copy the folders of their runs. Raises OSError.
+    """Write one journal for all shards to `folder`, and copy the files of their runs. Raises OSError.
 
-    `runs_folder` is the name of the folder in each output folder that contains the folders of the runs. Files are hard
-    links if the file system supports them. The wall time of the merged session is that of the longest shard.
+    `runs_folder` is the name of the subfolder of an output folder with the files of the runs. Files are hard-linked if
+    the file system supports it. The wall time of the merged session is the wall time of the longest shard.
     """
     planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)
     journal = Journal(folder, sync=False)
@@ -74,7 +74,7 @@ def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_fold
             for key in sorted(session.started):
                 journal(RunStarted(key, paths[key]))
             for key in sorted(session.finished):
-                journal(_with_files_in(session.finished[key], source, folder))
+                journal(_with_moved_files(session.finished[key], source, folder))
         interrupted = any(session.interrupted for session in sessions.values())
         wall = max(session.wall for session in sessions.values())
         journal(SessionFinished(0, 0, 0, simulated=0.0, wall=wall, interrupted=interrupted))
@@ -91,8 +91,8 @@ def _link_or_copy(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def _with_files_in(run: RunFinished, source: Path, folder: Path) -> RunFinished:
-    """Return the run with its files in `folder` instead of `source`."""
+def _with_moved_files(run: RunFinished, source: Path, folder: Path) -> RunFinished:
+    """Return the run with the paths of its files changed from `source` to `folder`."""
     files = (
         str(folder / Path(file).relative_to(source)) if file and Path(file).is_relative_to(source) else file
         for file in astuple(run.artifacts)

@@ -1,7 +1,4 @@
-"""Writer of results as Parquet tables, for pandas and DuckDB: runs.parquet with a row per run, and verdicts.parquet.
-
-In verdicts.parquet, each row is a finding.
-"""
+"""Writer of results as Parquet tables: runs.parquet with a row per run, verdicts.parquet with a row per finding."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -22,8 +19,8 @@ RUNS_PER_GROUP = 10_000
 def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[RunKey, Mapping[str, Any]]) -> list[Path]:
     """Write both tables into `folder`, and return the paths of the files.
 
-    `values` are the varied values of each run, by path in the scenario. Raises UsageError if pyarrow is not installed,
-    and OSError if a file cannot be written.
+    `values` are the varied values of each run, by the path of the parameter in the scenario. Raises UsageError if
+    pyarrow is not installed, and OSError if a file cannot be written.
     """
     try:
         import pyarrow as pa
@@ -66,13 +63,13 @@ def _fields(pa: Any, text: str) -> list[Any]:
 
 
 def _groups(runs: RunStore) -> Iterator[Iterator[tuple[int, RunFinished]]]:
-    """Yield groups of at most RUNS_PER_GROUP pairs of a run's number and the run; one empty group without runs."""
+    """Yield groups of at most RUNS_PER_GROUP runs, each with its number. Without runs, yield one empty group."""
     for start in range(0, max(len(runs), 1), RUNS_PER_GROUP):
         yield enumerate(runs[start : start + RUNS_PER_GROUP], start)
 
 
 def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: set[str]) -> dict[str, Any]:
-    """Return the row of a run. The varied values whose paths are `numeric` are in SI units, others are texts."""
+    """Return the row of a run. Varied values at a path in `numeric` become numbers in SI units, others become text."""
     result, error = run.result, run.result.error
     return {
         "run": number,
@@ -95,7 +92,7 @@ def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: 
 
 
 def _verdict_rows(number: int, run: RunFinished) -> Iterator[dict[str, Any]]:
-    """Yield a row for each finding of a run. `number` is the number of the run's row in runs.parquet."""
+    """Yield a row for each finding of a run. `number` refers to the column `run` of runs.parquet."""
     for verdict in run.result.verdicts:
         for finding in verdict.findings:
             x, y = (None, None) if finding.place is None else finding.place

@@ -1,6 +1,6 @@
 """Writer of results.json: the numbers of outcomes, session statistics, and the result of each run.
 
-The document has no wall-clock times, so that equal sessions give equal documents.
+The document contains no wall times, so that equal sessions give equal documents.
 """
 
 import json
@@ -23,21 +23,14 @@ FORMAT = 1
 """Version of the format, which is a key of the document."""
 
 
-def to_json(
-    runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
-) -> str:
-    """Return the document with runs sorted by file, scenario, and seed.
-
-    Paths of artifacts are relative to the output `folder` of the session. `comparison` is that of several stacks,
-    `study` the result of `simscen study`.
-    """
-    return "".join(json_parts(runs, folder, comparison, study))
-
-
 def json_parts(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> Iterator[str]:
-    """Yield the document of `to_json` in parts that are joined without a separator, to save memory with many runs."""
+    """Yield the document in consecutive parts, to save memory. Runs are sorted by file, scenario, and seed.
+
+    Paths of artifacts are relative to the output `folder` of the session. `comparison` compares several stacks; None
+    for one stack. `study` is the result of `simscen study`; None for other sessions.
+    """
     ordered = in_order(runs)
     head, tail = _json_text(_document(ordered, comparison, study)).split(_NO_RUNS)
     yield head + _NO_RUNS[:-1]
@@ -59,7 +52,7 @@ def _json_text(data: dict[str, Any]) -> str:
 def as_document(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> dict[str, Any]:
-    """Return the document of `to_json` as data instead of text."""
+    """Return the document of `json_parts` as data instead of text."""
     ordered = in_order(runs)
     return {**_document(ordered, comparison, study), "runs": [_run_data(run, folder) for run in ordered]}
 
@@ -84,14 +77,12 @@ def _document(ordered: RunStore, comparison: Comparison | None, study: Study | N
 
 
 def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
-    return {**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)}
+    resumed = {"resumed": True} if run.resumed else {}
+    return {**result_data(run.result), "artifacts": _artifacts(run, folder), **resumed}
 
 
 def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
-    """Return the key `suite` with the statistics of all runs, or for several stacks `suites` with those of each stack.
-
-    Runs of different stacks are never pooled.
-    """
+    """Return {"suite": statistics of all runs}, or for several stacks {"suites": statistics by stack}."""
     summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
     if len(summaries) > 1:
         return {"suites": summaries}
@@ -99,9 +90,9 @@ def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
 
 
 def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
-    """Return the statistics of the runs of each stack, without the second runs of --check-determinism.
+    """Return the statistics of the runs of each stack ("" for a single stack), in order of appearance.
 
-    The keys are the names of the stacks in order of appearance; "" if there is only one stack.
+    The second runs of --check-determinism do not count.
     """
     figures_by_stack: dict[str, SessionSummaryBuilder] = {}
     for run in runs:
@@ -115,19 +106,14 @@ def in_order(runs: Sequence[RunFinished]) -> RunStore:
     return (runs if isinstance(runs, RunStore) else RunStore(runs)).in_order()
 
 
-def _resumed(run: RunFinished) -> dict[str, bool]:
-    return {"resumed": True} if run.resumed else {}
-
-
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
-    artifacts = run.artifacts
-    names = "mcap", "picture", "replay", "result"
-    files = {name: getattr(artifacts, name) for name in names}
+    """Return the paths of the artifacts relative to the output `folder`, by kind such as "mcap"."""
+    files = {name: getattr(run.artifacts, name) for name in ("mcap", "picture", "replay", "result")}
     return {name: relative_path(path, folder) for name, path in files.items() if path}
 
 
 class JsonReporter:
-    """Writes the document to `out` at the end of the session."""
+    """Reporter that writes results.json to `out` at the end of the session."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out

@@ -1,4 +1,4 @@
-"""Earlier sessions: outcomes of their runs for the HTML report, and the runs that failed last, for `--last-failed`."""
+"""Earlier sessions: outcomes of their runs for the HTML report, and failed runs for `simscen run --last-failed`."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,15 +40,15 @@ class PastSession:
 
 
 def past_sessions(folder: Path) -> list[PastSession]:
-    """Return the earlier sessions, newest first: those whose output folders are next to `folder` and older."""
+    """Return at most MAX_SHOWN_SESSIONS sessions next to `folder` that are older than its session, newest first."""
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
-    sessions = (past for each in folders[index + 1 :] if (past := _read(each)) is not None)
+    sessions = (past for each in folders[index + 1 :] if (past := _read_session(each)) is not None)
     return list(islice(sessions, MAX_SHOWN_SESSIONS))
 
 
-def _read(folder: Path) -> PastSession | None:
-    """Read results.json of a session. Return None if it is missing, too large, or from another version."""
+def _read_session(folder: Path) -> PastSession | None:
+    """Read results.json of a session. Return None if the file is missing, too large, or from another version."""
     try:
         file = folder / "results.json"
         if file.stat().st_size > MAX_RESULTS_BYTES:
@@ -64,14 +64,14 @@ def _read(folder: Path) -> PastSession | None:
 
 
 def past_outcomes(run: RunFinished, past: Sequence[PastSession]) -> list[PastOutcome | None]:
-    """Return the outcomes of a run in earlier sessions, oldest first; None for sessions without the run."""
+    """Return the outcomes of a run in the earlier sessions, oldest first, with None for a session without the run."""
     return [session.runs.get(run.key) for session in reversed(past)]
 
 
 def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
-    """Return the previous outcome of a run, for example "failed before", if exactly one of both outcomes is good.
+    """Return a text such as "failed before" if the run's outcome changed from good to bad or from bad to good.
 
-    Return "" if the outcome has not changed, or if no earlier session has the run.
+    Return "" if the outcome has not changed, or if no earlier session contains the run.
     """
     known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
     if not known or known[-1].outcome.good == run.outcome.good:
@@ -81,20 +81,20 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 
 MAX_SEARCHED_SESSIONS = 50
 """Maximum number of sessions to search for failures."""
-UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
-"""Error kinds of runs without an outcome. For such a run, the outcome in the session before it still counts."""
+UNFINISHED_KINDS = frozenset({"interrupted", "not-run"})
+"""Error kinds of runs that were not finished. For these runs, the outcome in an earlier session counts."""
 
 
 @dataclass(frozen=True)
 class LastFailed:
-    """Runs whose latest outcome was a failure or an error, and the output `folder` of the newest session."""
+    """Output folder of the newest session, and all runs whose latest outcome is a failure or an error."""
 
     folder: Path
     runs: frozenset[RunKey]
 
 
 def sessions_in(folder: Path) -> list[Path]:
-    """Return the output folders of sessions in `folder`, newest first, without symbolic links such as `latest`."""
+    """Return the session output folders in `folder`, newest first, without symbolic links such as `latest`."""
     if not folder.is_dir():
         return []
     sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
@@ -106,7 +106,7 @@ def sessions_in(folder: Path) -> list[Path]:
 
 
 def last_failed(folder: Path) -> LastFailed | None:
-    """Return the runs that failed when they last ran in a session of `folder`; None if there are no sessions."""
+    """Return the runs whose latest outcome in the sessions in `folder` is bad; None if there are no sessions."""
     sessions = sessions_in(folder)
     if not sessions:
         return None
@@ -120,18 +120,18 @@ def last_failed(folder: Path) -> LastFailed | None:
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield the key of each finished run, and whether its outcome is good. Yields nothing for an invalid journal."""
+    """Yield the key of each finished run and whether its outcome is good. Yield nothing for an invalid journal."""
     try:
         runs = read_journal(session).runs
     except InvalidInput:
         return
     for run in runs:
-        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
+        if run.result.error is None or run.result.error.kind not in UNFINISHED_KINDS:
             yield run.key, run.outcome.good
 
 
 def _session_time(session: Path) -> str:
-    """Return the time in run.json at which the session was written (ISO 8601); "" if it is unknown."""
+    """Return the time at which run.json of the session was written (ISO 8601); "" if the time is unknown."""
     try:
         document = json.loads((session / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Console lines of a session: header, runs, violations, failures, and footer."""
+"""Console lines of a session: header, runs with their violations, list of failures, and footer."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from simscen.report.violations import (
 ERROR_TAIL_LINES = 12
 """Number of last lines of a worker's output that are printed below an error."""
 FIXED_COLUMNS = 33
-"""Columns of the line of a run besides its name. Names are padded to at most the remaining columns."""
+"""Width of the line of a run without the name. Names are padded to at most the remaining width of the terminal."""
 MIN_NAME_COLUMNS = 16
 """Minimum width to which names are padded in a narrow terminal."""
 MAX_DISTURBANCES = 8
@@ -38,10 +38,7 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
 
 @dataclass(frozen=True)
 class RunNaming:
-    """Rule for short unique names of the runs of a session, which are padded to `width` characters.
-
-    If `has_seeds` is true, each name contains the seed. `prefix` is removed from the scenario IDs.
-    """
+    """Rule for short unique names of runs: with the seed if `has_seeds`, without `prefix`, padded to `width`."""
 
     has_seeds: bool = False
     prefix: str = ""
@@ -49,7 +46,7 @@ class RunNaming:
 
     @classmethod
     def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Choose the names of a session. They contain seeds and stacks only if there are several.
+        """Return the rule for a session. Names contain seeds only if there are several.
 
         `columns` is the width of the terminal; None for no limit.
         """
@@ -71,7 +68,7 @@ class RunNaming:
 
 
 def _common_folder(ids: Sequence[str]) -> str:
-    """Return the common folder of all IDs with its slash, for example "scenarios/"; "" for fewer than two IDs."""
+    """Return the common folder of all scenario IDs with a slash, such as "scenarios/"; "" for fewer than two IDs."""
     if len(ids) < 2:
         return ""
     shortest, longest = min(ids), max(ids)
@@ -96,7 +93,7 @@ def _stacks_text(stacks: Sequence[str]) -> str:
 
 
 def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
-    """Yield a line with the outcome of a run, followed by the lines of `violation_lines`."""
+    """Yield a line with the outcome of a run, then the lines of `violation_lines`."""
     symbol, role = SYMBOLS[run.outcome]
     yield (
         StyledText("  "),
@@ -108,10 +105,9 @@ def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
 
 
 def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield violations, disturbances, artifacts, and the command that repeats a run that did not pass.
+    """Yield the violations, disturbances, artifacts, and repeat command of a run that did not pass.
 
-    Yields only warnings for a passed run, and nothing for a skipped run or an expected failure, whose reason is in the
-    first line of `run_lines`.
+    Yield only warnings for a passed run, and nothing for a skipped run or an expected failure.
     """
     if run.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
         return
@@ -131,7 +127,7 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
 def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
     """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and the path of report.html.
 
-    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run".
+    `unfinished` is as in `outcome_counts`.
     """
     yield (*outcome_counts(session, unfinished), *_timing_and_junit(session))
     if session.page:
@@ -141,8 +137,8 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
-    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". These
-    runs are part of `session.errors`, but are counted separately here.
+    `unfinished` maps a description such as "not run" to the number of these runs. They are also part of
+    `session.errors`, but are not counted as errors here.
     """
     counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
@@ -169,7 +165,7 @@ def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
 
 
 def _times_and_reason(run: RunFinished) -> tuple[StyledText, ...]:
-    """Return the simulated and wall time of a run, and its tightest margin or why it is not a failure."""
+    """Return the simulated and wall time, and the tightest margin of a passed run or the reason of another outcome."""
     if run.outcome is Outcome.SKIPPED:
         return (StyledText(reason_without_failure(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
@@ -192,7 +188,7 @@ def _error_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the disturbances that happened. Those that did not happen are among the violations."""
+    """Yield at most MAX_DISTURBANCES of the disturbances that took place."""
     happened = [each for each in run.result.disturbances if each.happened]
     texts = [one_line(disturbance_line(each, run.result.tick_rate)) for each in happened]
     more = [f"and {len(texts) - MAX_DISTURBANCES} more"] if len(texts) > MAX_DISTURBANCES else []
@@ -201,7 +197,7 @@ def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the paths of replay and picture, or of the log without a picture, and the command that repeats a run."""
+    """Yield the paths of replay and picture (of the log if there is no picture), and the command to repeat the run."""
     files = run.artifacts
     paths = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
     for name, path in paths:
@@ -222,7 +218,7 @@ def _label(name: str) -> StyledText:
 
 
 MAX_DETAILED_FAILURES = 20
-"""Maximum number of failures that are listed with paths. Further failures have only their cause."""
+"""Maximum number of failures that are listed with paths. Further failures are listed with their cause only."""
 NONDETERMINISTIC = "nondeterministic"
 """Kind of the error of a run whose log differs from that of its repetition."""
 
@@ -231,10 +227,9 @@ Name = Callable[[RunKey], str]
 
 
 def failure_lines(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]:
-    """Yield each failure with its first cause, its artifacts, and the command that repeats it.
+    """Yield each failed run with its first violation or error, artifacts, and repeat command.
 
-    Yields nothing for a session with a single run, whose lines were printed just before. Runs that were repeated by
-    --check-determinism are listed once.
+    Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
     """
     failed = {run.key for run in runs if not run.outcome.good}
     failures = [
@@ -263,10 +258,7 @@ def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: Name) -
 
 
 def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield the result of --check-determinism: whether the logs of repeated runs are equal.
-
-    Yields nothing if no run was repeated.
-    """
+    """Yield whether the logs of the runs that --check-determinism repeated are equal; nothing without such runs."""
     if not any(run.key.is_repetition for run in runs):
         return
     first_runs = {run.key: run for run in runs if not run.key.is_repetition}
@@ -286,7 +278,7 @@ def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
 
 
 def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return by how much the runs of each pair differ: verdicts, time to the goal, and path length."""
+    """Return how much the two runs of the pairs differ: verdicts, time to the goal, and path length."""
     equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
     parts = [f"verdicts equal in {equal} of {len(pairs)}"]
     for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
@@ -302,10 +294,9 @@ def _statuses(run: RunFinished) -> list[tuple[str, str]]:
 
 
 def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield the two last lines of an interrupted session.
+    """Yield the last two lines of an interrupted session: outcomes, then report.html and the option --resume.
 
-    The first line has the numbers of outcomes, with `unfinished` as in `outcome_counts`. The second line has the path
-    of report.html, if it was written, and the option --resume that continues the session, if it has an output folder.
+    `unfinished` is as in `outcome_counts`.
     """
     yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
     page = (
@@ -316,7 +307,7 @@ def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) 
 
 
 def _first_cause(run: RunFinished) -> str:
-    """Return the first reason why a run did not pass."""
+    """Return the error of a run, or the first violation."""
     return error_summary(run) if run.outcome is Outcome.ERROR else first_violation(run) or "failed"
 
 

@@ -1,4 +1,7 @@
-"""Result of a study as console lines, and the texts that the HTML report and JUnit use as well."""
+"""Result of a study (many runs of one scenario) as console lines, and texts that other reports use as well.
+
+A claim is a minimum pass rate that the study tests, with a stated confidence.
+"""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -11,7 +14,7 @@ MAX_ROWS = 60
 MAX_EFFECTS = 10
 """Maximum number of listed significant effects."""
 SIGNIFICANCE_LEVEL = 0.05
-"""Maximum p-value, corrected for the number of tests, of a significant effect."""
+"""Maximum p-value of a significant effect, corrected for the number of tests."""
 CLAIM_ROLES: dict[ClaimStatus, Role] = {
     ClaimStatus.HELD: "good",
     ClaimStatus.REFUTED: "bad",
@@ -21,7 +24,7 @@ CLAIM_ROLES: dict[ClaimStatus, Role] = {
 
 
 def study_lines(study: Study) -> Iterator[StyledLine]:
-    """Yield pass rates by parameter, effects of parameters on margins, smallest margins, total pass rate, and claim."""
+    """Yield pass rates by parameter, effects of parameters on margins, smallest margins, pass rate, and claim."""
     yield from _rate_table(study.rates)
     yield from _effect_table(study)
     yield from _worst_margins(study)
@@ -34,7 +37,7 @@ def study_lines(study: Study) -> Iterator[StyledLine]:
 
 
 def pass_rate_text(study: Study) -> str:
-    """Return the pass rate of all runs, with its 95 % interval if the runs are random."""
+    """Return the pass rate of all runs, with its 95 % interval if the values were drawn at random."""
     runs = study.passed + study.failed
     text = f"study of {one_line(study.scenario)}: {study.passed} of {number_with_noun(runs, 'run')} passed"
     if runs:
@@ -43,7 +46,7 @@ def pass_rate_text(study: Study) -> str:
 
 
 def pass_rate_notes(study: Study) -> list[str]:
-    """Return remarks on how to interpret the pass rate: how the values were chosen, and what they cover."""
+    """Return notes about the choice of the varied values, the covered pairs of values, and the accepted draws."""
     texts = []
     if not study.is_random:
         texts.append(
@@ -57,7 +60,7 @@ def pass_rate_notes(study: Study) -> list[str]:
 
 
 def claim_title(claim: ClaimResult) -> str:
-    """Return a short form of the claim, such as "pass rate >= 0.95 (confidence 0.95)"."""
+    """Return the claim in short, such as "pass rate >= 0.95 (confidence 0.95)"."""
     return f"pass rate >= {claim.min_rate:.6g} (confidence {claim.confidence:.6g})"
 
 
@@ -77,14 +80,14 @@ def claim_text(claim: ClaimResult) -> str:
 
 
 def undecided_hint(claim: ClaimResult) -> str:
-    """Return what can be done about an undecided claim."""
+    """Return how an undecided claim can be decided: by more runs."""
     if claim.runs < claim.max_runs:
         return f"{claim.max_runs} are needed"
     return "more `runs` may decide it"
 
 
 def limits_text(claim: ClaimResult) -> str:
-    """Return the confidence limits, such as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
+    """Return the confidence limits of a claim, such as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
     if claim.limits is None:
         return ""
     low, high = claim.limits
@@ -92,12 +95,12 @@ def limits_text(claim: ClaimResult) -> str:
 
 
 def interval_text(limits: tuple[float, float] | None) -> str:
-    """Return a 95 % interval, such as ", 95 % interval 94.1 … 99.8 %"; "" without limits. `limits` are from 0 to 1."""
+    """Return ", 95 % interval 94.1 … 99.8 %" for `limits` (0.941, 0.998); "" for None."""
     return "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
 
 
 def effect_text(effect: ParameterEffect) -> str:
-    """Return whether a larger value of a parameter raises or lowers the margin, if its values have an order."""
+    """Return whether a larger value of a parameter raises or lowers the margin, if the values have an order."""
     if not effect.is_ordered:
         return "the margin depends on the value"
     return "a larger value lowers the margin" if effect.effect < 0 else "a larger value raises the margin"
@@ -109,7 +112,7 @@ def significant_effects(study: Study) -> Sequence[ParameterEffect]:
 
 
 def _rate_table(rates: Sequence[RateRow]) -> Iterator[StyledLine]:
-    """Yield a heading for each parameter, and below it the pass rate for each of its values."""
+    """Yield a heading for each parameter, and below it the pass rate for each value."""
     if not rates:
         return
     listed = rates[:MAX_ROWS]
@@ -148,7 +151,7 @@ def _effect_table(study: Study) -> Iterator[StyledLine]:
 
 
 def _worst_margins(study: Study) -> Iterator[StyledLine]:
-    """Yield the smallest margin of each criterion, with the run in which it occurred."""
+    """Yield the smallest margin of each criterion, and the run in which it occurred."""
     if not study.worst:
         return
     yield ()

@@ -1,4 +1,4 @@
-"""Formatting of session events as console lines, the interface of all reporters, and the reporter for plain text."""
+"""Reporter, the interface of all reporters, and PlainReporter, which prints session events as lines of plain text."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -40,14 +40,14 @@ from simscen.report.session_lines import (
 from simscen.report.study import study_lines
 
 INTERRUPTED, NOT_RUN = "interrupted", "not-run"
-"""Error kinds of runs that were not finished. These runs are counted at the end, but not printed."""
+"""Error kinds of runs that were not finished. These runs are not printed, but counted at the end."""
 
 
 class SessionFormatter:
-    """Formats the events of a session as console lines with styles. Call it with each event in order.
+    """Formats the events of a session, in order, as console lines with styles.
 
-    `slow` is the number of slowest runs to list at the end: 0 lists all runs, as with pytest's `--durations=0`, and
-    None lists none. `columns` returns the current width of the terminal, or None for no limit.
+    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `columns` returns the current
+    width of the terminal, or None for no limit.
     """
 
     def __init__(self, slow: int | None = None, columns: Callable[[], int | None] = lambda: None) -> None:
@@ -76,7 +76,7 @@ class SessionFormatter:
                 pass
 
     def _new_warnings(self, run: RunFinished) -> Iterator[StyledLine]:
-        """Yield the warnings of the external stack in this run, except those of earlier runs of the session."""
+        """Yield the warnings of the external stack in this run that did not occur in earlier runs of the session."""
         for text in run.warnings:
             if text not in self._warned:
                 self._warned.add(text)
@@ -109,10 +109,10 @@ def _error_kind(run: RunFinished) -> str:
 
 
 class Reporter(Protocol):
-    """Prints or writes the events of a session. It is a context manager, so that it can restore the terminal."""
+    """Prints or writes the events of a session. A reporter is also a context manager, to restore the terminal."""
 
     def __call__(self, event: SessionEvent) -> None:
-        """Print or write one event. The events come in the order in which they happen."""
+        """Print or write one event. Events come in the order in which they happen."""
         ...
 
     def __enter__(self) -> "Reporter":
@@ -129,7 +129,7 @@ class Reporter(Protocol):
 class PlainReporter:
     """Prints lines without color and cursor movement, in ASCII if the stream supports nothing else.
 
-    `slow` is the number of slowest runs to list at the end; 0 lists all, None none.
+    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list).
     """
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:

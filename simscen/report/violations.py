@@ -1,4 +1,4 @@
-"""Texts about a finished run that all reporters use: violations, errors, names, and locations in the scenario file."""
+"""Texts about a finished run for all reporters: violations, errors, names, and locations in the scenario file."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from simscen.report.display_text import escape_control, one_line
 
 @dataclass(frozen=True)
 class Violation:
-    """A finding that did not pass.
+    """A finding (checked bound of a criterion) that did not pass.
 
     Attributes:
         verdict: Verdict that contains the finding.
@@ -27,7 +27,7 @@ class Violation:
 
     @property
     def is_warning(self) -> bool:
-        """Whether the criterion only warns. Errors of a criterion are never warnings."""
+        """Whether the criterion has the severity `warn`. An error in the criterion is never a warning."""
         return self.verdict.severity == "warn" and self.verdict.status is not Status.ERROR
 
 
@@ -44,8 +44,8 @@ def reported_violations(run: RunFinished) -> list[Violation]:
 def short_run_name(key: RunKey, with_seed: bool = True, prefix: str = "") -> str:
     """Return the name of a run in a list, such as "faults/lidar_off[speed=0.5] (seed 7, slow)".
 
-    It consists of the scenario ID without `prefix`, the variation, the seed if `with_seed` is true, and the stack if
-    there are several.
+    The name consists of the scenario ID without `prefix`, the variation, the seed if `with_seed` is true, and the stack
+    if the session has several.
     """
     extra = ", ".join(part for part in (f"seed {key.seed}" if with_seed else "", key.stack_name) if part)
     name = key.test.removeprefix(prefix)
@@ -53,7 +53,7 @@ def short_run_name(key: RunKey, with_seed: bool = True, prefix: str = "") -> str
 
 
 def source_location(run: RunFinished, line: int = 0) -> str:
-    """Return path:line of a criterion in the scenario file. For `line` 0 (unknown), return that of the first line."""
+    """Return path:line in the scenario file. `line` 0 (unknown) becomes line 1."""
     return one_line(f"{scenario_file(run)}:{line or 1}")
 
 
@@ -63,9 +63,9 @@ def scenario_file(run: RunFinished) -> str:
 
 
 def error_details(run: RunFinished) -> tuple[str, str, str]:
-    """Return the error of a run that could not be completed or judged: kind, message, and end of the worker's output.
+    """Return the kind and message of the error of a run, and the end of the worker's output.
 
-    Without an error of the simulation, the kind is "invalid", and the message consists of the errors of criteria.
+    For a completed run that could not be judged, the kind is "invalid", and the message lists the errors of criteria.
     """
     if run.result.error is not None:
         return run.result.error.kind, one_line(run.result.error.message), escape_control(run.result.error.tail)
@@ -75,7 +75,7 @@ def error_details(run: RunFinished) -> tuple[str, str, str]:
 
 
 def error_summary(run: RunFinished) -> str:
-    """Return "kind: message" of a run that could not be completed, or the message if it starts with the kind."""
+    """Return the error of a run as "kind: message", or only the message if it starts with the kind."""
     kind, message, _ = error_details(run)
     return message if message.startswith(kind) else f"{kind}: {message}"
 
@@ -83,7 +83,7 @@ def error_summary(run: RunFinished) -> str:
 def first_violation(run: RunFinished, more: str = " (and {} more)") -> str:
     """Return the message of the first violation that is not a warning; "" if there is none.
 
-    `more` is the format of the text that follows if there are further violations; {} is their number.
+    If there are further violations, `more` follows, with their number in place of {}.
     """
     messages = [violation.message for violation in reported_violations(run) if not violation.is_warning]
     return messages[0] + (more.format(len(messages) - 1) if len(messages) > 1 else "") if messages else ""
@@ -107,5 +107,5 @@ def _violation(run: RunFinished, verdict: Verdict, line: int, finding: Finding) 
 
 
 def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return an error for a verdict that has no findings, because its criterion checked nothing; otherwise ()."""
+    """Return an error finding for a verdict without findings, whose criterion checked nothing; otherwise ()."""
     return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)

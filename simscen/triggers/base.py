@@ -1,4 +1,4 @@
-"""Base class of trigger conditions, the choice of a condition by its YAML key, and the trigger of an event (`when`)."""
+"""Base class of conditions, combinations of conditions, and Trigger, the entry `when` of an event in YAML."""
 
 from __future__ import annotations
 
@@ -20,24 +20,23 @@ if TYPE_CHECKING:
 
 
 class Condition(ABC):
-    """Condition on the state of the run.
-
-    *Given* the same situation *then* the result is the same: a condition keeps no state and draws no random numbers.
-    """
+    """Condition on the state of the run. It keeps no state of its own and draws no random numbers."""
 
     is_robot_specific: ClassVar[bool] = True
-    """Whether the result depends on which of several robots the condition is for."""
+    """Whether a scenario with several robots must name the robot of this condition (key `robot`)."""
 
     @abstractmethod
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition is true at this beat."""
+        """Return whether the condition is true in the current situation."""
 
 
 class AnyCondition(Choice):
     """One condition, chosen by its YAML key, or a combination of conditions (`all`, `any`, `not`)."""
 
     group: ClassVar[str] = "trigger"
+    """Group of the plugin registry in which packages add conditions."""
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
+    """Fields that can be combined with any condition."""
 
     time: Annotated[Condition | None, LazySpec("simscen.triggers.timing", "Time")] = None
     robot_within: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "RobotWithin")] = None
@@ -73,7 +72,7 @@ class AnyCondition(Choice):
     not_: AnyCondition | None = Field(default=None, alias="not")
     """True while this condition is false."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """Count the condition as true only after it has been true without interruption for this long; default: at once."""
+    """Time for which the condition must be true without interruption before it counts as true; default: none."""
     robot: RobotName | None = None
     """The robot that the condition is for, if there are several; default: the only one."""
 
@@ -83,19 +82,19 @@ class AnyCondition(Choice):
         return self.all or self.any or ([self.not_] if self.not_ is not None else [])
 
     def parts(self) -> Iterator[AnyCondition]:
-        """Yield this condition and all conditions in it, at any depth."""
+        """Yield this condition and all nested conditions, at any depth."""
         yield self
         for condition in self.inner:
             yield from condition.parts()
 
     def situation_of_robot(self, now: Situation) -> Situation:
-        """Return the situation as seen by the robot that the condition is for."""
+        """Return the situation from the point of view of `robot`, or `now` itself if `robot` is None."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition is true at this beat, regardless of `for`.
+        """Return whether the condition is true in the current situation, regardless of `for`.
 
-        Raises RunError if a condition of a plugin returns something else than a boolean.
+        Raises RunError if a condition of a plugin does not return a boolean.
         """
         now = self.situation_of_robot(now)
         if self.all is not None:
@@ -115,25 +114,25 @@ class AnyCondition(Choice):
 
 # `all` and `any` are fields of AnyCondition, so that its methods cannot call the built-in functions by these names.
 def all_hold(conditions: list[AnyCondition], now: Situation) -> bool:
-    """Return whether all conditions are true."""
+    """Return whether all conditions are true in the current situation."""
     return all(condition.holds(now) for condition in conditions)
 
 
 def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
-    """Return whether at least one condition is true."""
+    """Return whether at least one condition is true in the current situation."""
     return any(condition.holds(now) for condition in conditions)
 
 
 class Trigger(AnyCondition):
-    """A condition, and how often, with which delay, and with which probability it starts an event."""
+    """Condition that starts an event, with the edge, delay, maximum number, and probability of the starts."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
-    """Start when the condition becomes true (rising) or false (falling)."""
+    """Start the event when the condition becomes true (rising) or false (falling)."""
     delay: Duration = 0.0
     """Delay between the edge and the start."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Maximum number of starts."""
     probability: Probability = 1.0
-    """Probability that an edge starts the event, drawn from the scenario's seed."""
+    """Probability that an edge starts the event. The random draw depends on the seed."""

@@ -13,12 +13,12 @@ from simscen.spec.places import DisturbanceName, GoalName, MovableName, ObjectNa
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
-COMPLETED = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
+COMPLETION_KINDS = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
 """Kinds of events that complete a waypoint."""
 
 
 def _count_events(now: Situation, kind: EventKind, name: str | None) -> int:
-    """Return the number of logged events of this kind and name; None counts all names."""
+    """Return the number of logged events with this kind and name. With the name None, events of all names count."""
     return sum(e.kind == kind and name in (None, e.name) for e in now.events)
 
 
@@ -26,7 +26,7 @@ class EventStatus(Spec, Condition):
     """True once another event or a fault of this scenario has started or ended, or a mark has been set.
 
     Use it for disturbances that follow each other: the lidar goes silent, and a second later a person steps in the way.
-    A mark is a name for a time in the log, which the action `mark` sets.
+    A mark is a named time in the log, set by the action `mark`.
 
     Example: `when: {event: {name: pallet falls, status: started}}`
     """
@@ -36,10 +36,10 @@ class EventStatus(Spec, Condition):
     name: DisturbanceName
     """The `name` of the event, fault, or mark; an unnamed fault is called `<sensor>.<fault>`, e.g. `lidar.off`."""
     status: Literal["started", "ended"] = "started"
-    """The required status."""
+    """The required status of the event or fault; a mark has none."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether such an event, fault, or mark has been logged."""
+        """Return whether the log contains the mark, or the start or end of the event or fault."""
         kinds = [EventKind(f"{source}.{self.status}") for source in ("event", "fault")]
         return any(_count_events(now, kind, self.name) > 0 for kind in (*kinds, EventKind.MARK))
 
@@ -54,7 +54,7 @@ class Replan(Spec, Condition):
     """Number of replans."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there were enough plans besides the first plan of each goal."""
+        """Return whether the log contains `count` plans, without the first plan of each goal."""
         return sum(e.kind == EventKind.PLAN_MADE and e.data.get("reason") != "goal" for e in now.events) >= self.count
 
 
@@ -69,10 +69,10 @@ class RecoveryStatus(Spec, Condition):
     name: BehaviorName | None = None
     """Name of the behavior; default: any."""
     count: Count = 1
-    """Number of times."""
+    """Required number of starts or ends."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether enough such events have been logged."""
+        """Return whether the log contains `count` matching starts or ends of recovery behaviors."""
         return _count_events(now, EventKind(f"recovery.{self.status}"), self.name) >= self.count
 
 
@@ -86,12 +86,12 @@ class Collided(Spec, Condition):
     """Name of the object; default: any."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether such a collision has been logged."""
+        """Return whether the log contains a collision with the object."""
         return _count_events(now, EventKind.COLLISION_STARTED, self.object) > 0
 
 
 class GoalStatus(Spec, Condition):
-    """True once the robot has reported that a goal was accepted, reached, passed, failed, or canceled.
+    """True once the robot has reported `count` times that a goal was accepted, reached, passed, failed, or canceled.
 
     Example: `when: {goal: {name: shelf, status: reached}}`
     """
@@ -101,10 +101,10 @@ class GoalStatus(Spec, Condition):
     name: GoalName | None = None
     """Name of the goal, in any loop (`shelf#2`: in the second loop); default: any goal."""
     count: Count = 1
-    """Number of times."""
+    """Required number of reports."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether enough such reports have been logged."""
+        """Return whether the log contains `count` matching reports."""
         kind = EventKind(f"goal.{self.status}")
         return sum(e.kind == kind and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
 
@@ -112,8 +112,8 @@ class GoalStatus(Spec, Condition):
 class Waypoint(Spec, Condition):
     """True once the robot has reported `count` waypoints as reached or passed.
 
-    Use it for disturbances at a certain point of a tour, whether the robot stops at its waypoints or not: after the
-    second shelf, a door closes. The count continues over all loops of the tour.
+    Use it for disturbances at a certain point of a tour: after the second shelf, a door closes. The count continues
+    over all loops of the tour.
 
     Example: `when: {waypoint: {count: 2}}`
     """
@@ -124,14 +124,16 @@ class Waypoint(Spec, Condition):
     """Number of waypoints."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether enough waypoints are completed."""
-        return sum(e.kind in COMPLETED and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
+        """Return whether the log contains `count` completed waypoints."""
+        return (
+            sum(e.kind in COMPLETION_KINDS and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
+        )
 
 
 class PedestrianStatus(Spec, Condition):
-    """True once a pedestrian has reacted to the robot, stopped reacting, or reached one of its goals.
+    """True once a pedestrian has reacted to the robot, stopped reacting, or reached one of the pedestrian's goals.
 
-    Use it for consequences of a reaction: a second person comes to look as well, or a door opens for the arrival.
+    Use it, for example, for a door that opens when a pedestrian arrives.
 
     Example: `when: {pedestrian: {name: anna, status: reacted}}`
     """
@@ -143,8 +145,8 @@ class PedestrianStatus(Spec, Condition):
     name: MovableName | None = None
     """Name of the pedestrian; default: any."""
     count: Count = 1
-    """Number of times."""
+    """Required number of reactions, ends of reactions, or reached goals."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether enough such events have been logged."""
+        """Return whether the log contains `count` matching events of pedestrians."""
         return _count_events(now, EventKind(f"pedestrian.{self.status}"), self.name) >= self.count

@@ -86,40 +86,39 @@ class DistanceRemaining(Value[NonNegativeLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is a goal and it is near."""
+        """Return whether there is a goal within the distance."""
         return now.goal is not None and now.robot.distance(now.goal.pose) <= self.root
 
 
 class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
     """True while the straight-line distance from the estimated pose to the goal is at most the given distance.
 
-    A robot with a wrong belief slows down, parks, or reports success where it believes the goal is.
-    `distance_remaining` measures from the true position.
+    The condition `distance_remaining` measures from the true position instead.
 
     Example: `when: {believed_distance_remaining: 1 m}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there are a goal and a belief near it."""
+        """Return whether there are a goal and an estimated pose within the distance."""
         return now.goal is not None and now.belief is not None and now.belief.pose.distance(now.goal.pose) <= self.root
 
 
 class LocalizationError(Value[NonNegativeLength], Condition):
-    """True while the distance between estimated and true position of the robot is greater than the given one.
+    """True while the distance between the estimated and the true position of the robot is greater than the given one.
 
     Example: `when: {localization_error: 0.5 m}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is a belief and its error is larger."""
+        """Return whether there is an estimated pose with a larger error."""
         return now.belief is not None and now.robot.distance(now.belief.pose) > self.root
 
 
 class LocalizationLost(Spec, Condition):
     """True while the estimated pose has a large error or, with `std`, a large reported uncertainty.
 
-    Use it for disturbances after kidnapping or slip: stairs, a person, or a new goal while the robot navigates with a
-    wrong pose. `localization_error` considers the position alone. False while there is no estimated pose.
+    Use it for disturbances while the robot navigates with a wrong pose, for example after kidnapping or slip. The
+    condition is false while there is no estimated pose.
 
     Example: `when: {localization_lost: {tolerance: 0.5 m, yaw_tolerance: 30 deg}, for: 1 s}`
     """
@@ -129,11 +128,10 @@ class LocalizationLost(Spec, Condition):
     yaw_tolerance: PositiveAngle = 0.5236
     """Maximum error of the estimated heading (rad); default: 30°."""
     std: PositiveLength | None = None
-    """Maximum standard deviation of the position (m) that the localizer reports, whether the estimate is correct or
-    not; default: no maximum."""
+    """Maximum standard deviation of the position (m) that the localizer reports; default: no maximum."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is a belief that is wrong or uncertain."""
+        """Return whether there is an estimated pose that is wrong or uncertain."""
         belief = now.belief
         if belief is None:
             return False
@@ -143,10 +141,7 @@ class LocalizationLost(Spec, Condition):
 
 
 def _max_position_std(belief: Belief) -> float:
-    """Return the largest standard deviation of the position over all directions.
-
-    It is the square root of the larger eigenvalue of the covariance of x and y.
-    """
+    """Return the square root of the larger eigenvalue of the covariance of x and y, in m."""
     xx, xy, yy = (float(belief.covariance[index]) for index in ((0, 0), (0, 1), (1, 1)))
     return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))
 
@@ -199,12 +194,12 @@ class RobotWithin(Spec, Condition):
 class ClearanceBelow(Value[PositiveLength], Condition):
     """True while the distance between the robot's hull and the nearest obstacle is less than the given one.
 
-    Use it for disturbances in narrow places: a scan that drops out in a doorway, a push beside a shelf. Walls, objects,
-    and other robots count. The clearance is measured with each truth sample (`physics.truth_rate`).
+    Walls, objects, and other robots are obstacles. The distance is measured at `physics.truth_rate`. Use the condition
+    for disturbances in narrow places: a scan that drops out in a doorway, a push beside a shelf.
 
     Example: `when: {clearance_below: 30 cm}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the newest sample of the true clearance is smaller."""
+        """Return whether the newest measured distance is smaller than the given one."""
         return now.clearance is not None and now.clearance < self.root

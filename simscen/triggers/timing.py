@@ -25,9 +25,8 @@ class Time(Value[Duration], Condition):
 class ScanAge(Spec, Condition):
     """True while the newest scan that the stack received is older than `above`.
 
-    Use it for a second disturbance while a lidar is silent, such as a person who steps in front of a blind robot. The
-    age is the simulated time since the stack received the scan, however late it arrived; before the first scan, it is
-    the time since the start.
+    The age is the simulated time since the stack received the scan. Before the first scan, it is the time since the
+    start of the run. Use the condition for a second disturbance while a lidar is silent.
 
     Example: `when: {scan_age: {above: 500 ms, sensor: lidar}}`
     """
@@ -38,6 +37,6 @@ class ScanAge(Spec, Condition):
     """Name of the lidar in the robot's `sensors`; default: the lidar whose scan arrived last."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the scan is older."""
+        """Return whether the newest scan is older than `above`."""
         last = now.last_scan_tick(self.sensor)
         return now.tick - (0 if last is None else last) > now.clock.ticks(self.above)

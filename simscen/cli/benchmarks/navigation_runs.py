@@ -22,7 +22,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import read_log
 from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
-from simscen.report.session_history import UNDECIDED_KINDS
+from simscen.report.session_history import UNFINISHED_KINDS
 from simscen.report.session_lines import RunNaming, run_lines
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
@@ -96,7 +96,7 @@ def completed_trials(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _was_interrupted(run: RunFinished) -> bool:
-    return run.result.error is not None and run.result.error.kind in UNDECIDED_KINDS
+    return run.result.error is not None and run.result.error.kind in UNFINISHED_KINDS
 
 
 ExperimentDrive = tuple[int, Drive]

@@ -1,6 +1,6 @@
-"""Finds the goals of a drive in its log, and cuts off the part of the drive before the first goal.
+"""Finds the goals of a drive in a log, and cuts off the part of the drive before the first goal.
 
-Goals are read from goal messages. If the log has none, they are the ends of the plans; if it has no plans either, the
+Goals are read from goal messages. Without goal messages, goals are the ends of plans. Without plans, goals are the
 stops and bends of the driven path.
 """
 
@@ -21,17 +21,17 @@ from simscen.record.foreign.trace_reader import goal_events
 from simscen.record.messages import event_text
 
 SAME_GOAL_M = 0.05
-"""Two successive plans whose ends are at most this far apart lead to the same goal."""
+"""Maximum distance between the ends of two successive plans to the same goal."""
 STOPPED_SPEED_M_S, STOPPED_TURN_RAD_S = 0.03, 0.05
-"""Speeds below which the robot counts as standing still."""
+"""Speed and turn rate below which the robot counts as standing still."""
 MIN_STOP_S = 2.0
 """Minimum duration of a stop that counts as a goal."""
 MIN_LEG_M = 0.5
 """Minimum distance between two stops that count as goals."""
 MIN_BEND_M = 0.5
-"""If the path between two stops deviates from a straight line by more than this, its farthest point is also a goal."""
+"""Minimum deviation of the path between two stops from a straight line for an additional goal at the bend."""
 STOP_SOURCE, BEND_SOURCE = "the robot stopped there", "its path bends there"
-"""Values of RecordedGoal.source for goals that are derived from the driven path."""
+"""Values of RecordedGoal.source for goals derived from the driven path."""
 _STATUS_OF_EVENTS = {
     EventKind.GOAL_REACHED: "reached",
     EventKind.GOAL_PASSED: "passed",
@@ -43,7 +43,7 @@ ToSeconds = Callable[[int], float]
 
 
 def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> Iterator[RecordedGoal]:
-    """Return the goals of a drive. `poses` (n, 3) are its best known poses x, y, yaw in the map frame."""
+    """Return the goals of a drive. `poses` (n, 3) are the best known poses x, y, yaw in the map frame."""
     sent = [
         RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
         for message in messages.of("goal")
@@ -61,7 +61,7 @@ def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues)
 def _with_results_of_events(
     sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]
 ) -> Iterator[RecordedGoal]:
-    """Yield the accepted goals, with their names and results from the events of simscen's navigator."""
+    """Yield the accepted goals, with names and results from the events of simscen's navigator (time in s, event)."""
     accepted = [(time, event) for time, event in events if event.kind is EventKind.GOAL_ACCEPTED]
     poses = list(sent)
     for time, event in accepted:
@@ -83,7 +83,7 @@ def _with_results_of_events(
 def _with_results_of_actions(
     sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds
 ) -> Iterator[RecordedGoal]:
-    """Yield the goals with the results of their Nav2 actions; unchanged if these cannot be matched with the goals."""
+    """Yield the goals with the results of their Nav2 actions, or without results if actions and goals do not match."""
     states = [(message.log_time, message.content) for message in messages.of("status")]
     names = [str(number) for number in range(len(sent))]
     events = goal_events(states, names) if states and sent else "no status"
@@ -145,13 +145,13 @@ def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 
 
 MIN_IDLE_S = 1.0
-"""The time before the first goal is only cut off if it is at least this long."""
+"""Minimum time before the first goal that is cut off."""
 LEAD_S = 0.5
-"""Time before the first motion that is kept if goals are derived from the motion."""
+"""Time to keep before the first motion, if goals are derived from the motion."""
 
 
 def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
-    """Return the drive without the time before its first goal, with all times relative to the new start."""
+    """Return the drive without the time before the first goal. All times become relative to the new start."""
     if not drive.goals:
         return drive
     begin = drive.goals[0].sent
@@ -188,7 +188,7 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
 
 
 def _values_from(signal: TimedValues, begin: float, keep_last: bool = False) -> TimedValues:
-    """Return the values from `begin` on; with `keep_last`, also the newest value before `begin`, at time 0."""
+    """Return the values from `begin` on. With `keep_last`, the newest value before `begin` is kept at time 0."""
     first = int(np.searchsorted(signal.times, begin))
     if keep_last and first > 0 and (first == len(signal) or signal.times[first] > begin):
         first -= 1

@@ -1,6 +1,6 @@
 """Reads and decodes the messages of a log that a reconstruction uses, by the role of their topic.
 
-A role is the use that simscen makes of a topic, such as `odom` or `goal`; each role has a default topic.
+A role is the purpose of a topic, such as `odom` or `goal`. Each role has a default topic.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from simscen.record.messages.decode import MessageReader, decode_checked
 
 
 class LoggedMessage(NamedTuple):
-    """A decoded message with its log time and the stamp of its header in ns; the stamp is 0 if it has none."""
+    """A decoded message with log time and header stamp in ns; the stamp is 0 for a message without a header."""
 
     log_time: int
     stamp: int
@@ -29,7 +29,7 @@ class LoggedMessage(NamedTuple):
 
 
 class ImuMessage(NamedTuple):
-    """Used part of sensor_msgs/msg/Imu: stamp in ns, frame, and turn rate in rad/s about the vertical axis."""
+    """Part of sensor_msgs/msg/Imu: stamp in ns, frame, and turn rate in rad/s about the vertical axis."""
 
     stamp: int
     frame: str
@@ -45,9 +45,9 @@ EXTRA_TOPICS = {
     "footprint": "/local_costmap/published_footprint",
     "events": topics.EVENTS.name,
 }
-"""Default topics of the roles that only a reconstruction uses; the other roles are in TOPICS."""
+"""Default topics of the roles that only a reconstruction uses. The other roles are in TOPICS."""
 TOPIC_ROLES = (*TOPICS, *(role for role in EXTRA_TOPICS if role != "events"))
-"""Roles that users can give another topic with `--topic NAME=TOPIC`; only simscen itself writes events."""
+"""Roles whose topic users can change with `--topic NAME=TOPIC`."""
 
 
 def decode_imu(reader: MessageReader) -> ImuMessage:
@@ -67,7 +67,7 @@ def decode_polygon(reader: MessageReader) -> list[tuple[float, float]]:
 
 
 Decoders = Mapping[str, Callable[[bytes], Any]]
-"""Functions that decode a serialized message, by message type."""
+"""Functions that decode a serialized message, by ROS message type."""
 _POSES: Decoders = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
 _TRANSFORMS: Decoders = {topics.TF.type: partial(decode_checked, decode.transforms)}
 _DECODERS: Mapping[str, Decoders] = {
@@ -95,23 +95,26 @@ _DECODERS: Mapping[str, Decoders] = {
 
 @dataclass
 class LogMessages:
-    """Messages of a log by role, in order of log time, and message types by topic. Truncated logs are not complete."""
+    """Messages of a log by role, in order of log time, and message types by topic.
+
+    `is_complete` is false for a truncated log.
+    """
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     is_complete: bool = True
 
     def of(self, role: str) -> list[LoggedMessage]:
-        """Return the messages of a role; none if the log has none."""
+        """Return the messages of a role; [] if the log has none."""
         return self.by_role.get(role, [])
 
 
 def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, robot: str = "") -> LogMessages:
     """Read the messages of an MCAP file or a rosbag2 folder. Raises UnusableLog if it cannot be read.
 
-    `renamed` maps roles to topics that differ from the defaults. `truth` is the topic of the ground truth, None for
-    none. If the topic for scans has none, scans of another topic are used. In a log of simscen with several robots,
-    only the messages of `robot` are read, and its name is removed from topics and frames.
+    `renamed` maps roles to topics that differ from the defaults. `truth` is the topic of the ground truth; None for no
+    ground truth. If the default scan topic has no messages, the scans of another topic are used. In a simscen log with
+    several robots, only the messages of `robot` are read, without the name of the robot in topics and frames.
     """
     prefix = f"/{robot}" if robot else ""
     names = {**TOPICS, **EXTRA_TOPICS, **renamed}
@@ -124,9 +127,9 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     for raw in stream:
         role = roles.get(raw.topic)
         if role is not None and raw.type in _DECODERS[role]:
-            messages.by_role.setdefault(role, []).append(_without_robot(_decoded(raw, role), robot))
+            messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
         elif role is None and raw.type == topics.SCAN_TYPE:
-            other_scans.setdefault(raw.topic, []).append(_decoded(raw, "scan"))
+            other_scans.setdefault(raw.topic, []).append(_decode(raw, "scan"))
     if not messages.of("scan") and other_scans:
         messages.by_role["scan"] = other_scans[min(other_scans)]
     robot_topics = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}
@@ -138,7 +141,7 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
 
 
 class _RolesAndScans:
-    """Container of the topics to read: those with a role, and all with "scan" in their name."""
+    """Container of the topics to read: topics with a role, and topics with "scan" in their name."""
 
     def __init__(self, roles: Mapping[str, str]) -> None:
         self._roles = roles
@@ -147,7 +150,7 @@ class _RolesAndScans:
         return topic in self._roles or "scan" in str(topic)
 
 
-def _decoded(raw: RawMessage, role: str) -> LoggedMessage:
+def _decode(raw: RawMessage, role: str) -> LoggedMessage:
     if raw.encoding != "cdr":
         raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
     try:
@@ -158,7 +161,7 @@ def _decoded(raw: RawMessage, role: str) -> LoggedMessage:
 
 
 def _without_robot(message: LoggedMessage, robot: str) -> LoggedMessage:
-    """Return a message whose frame names do not contain the name of the robot; unchanged if `robot` is ""."""
+    """Return a message without the name of the robot in frame names."""
     if not robot:
         return message
     frames = RobotFrames(robot)

@@ -27,23 +27,23 @@ BASE_FRAMES = ("base_link", "base_footprint")
 NO_TRUTH = "none"
 """Value of DriveOptions.truth to ignore the ground truth of a log."""
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""If the stamps of messages differ more than this from their log times, both are of different clocks."""
+"""Maximum difference between the stamp and the log time of a message if both are from the same clock."""
 MIN_POSES = 2
-"""Smallest number of poses with which a topic or transform is used as the source of the poses."""
+"""Minimum number of poses of a topic or transform that is used as the source of poses."""
 DEFAULT_LIDAR_HEIGHT_M, MIN_LIDAR_HEIGHT_M = 0.2, 0.05
 """Assumed height of a lidar with unknown mount, and lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
-"""Largest coordinate of a usable footprint, in the frame in which it is published."""
+"""Maximum coordinate of a usable footprint, in the frame in which the footprint is published."""
 
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """How to read a log.
+    """Options for reading a log.
 
     Attributes:
-        truth: Topic of the ground truth, "none" to ignore it; None for the default topic of simscen's own logs.
-        topics: Topics by role, for roles whose topic is not the default.
-        robot: Robot whose messages are read, in a log of simscen with several robots.
+        truth: Topic of the ground truth; "none" to ignore the ground truth; None for the default of simscen's logs.
+        topics: Topics by role such as "odom", for roles whose topic is not the default.
+        robot: Robot whose messages are read, in a simscen log with several robots.
     """
 
     truth: str | None = None
@@ -52,7 +52,7 @@ class DriveOptions:
 
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
-    """Read a drive from its first goal on, from an MCAP file or a rosbag2 folder. Raises InvalidInput if unusable."""
+    """Read the drive from the first goal on in an MCAP file or a rosbag2 folder. Raises InvalidInput if unusable."""
     with unusable_log_as_invalid_input(path):
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
@@ -102,7 +102,7 @@ class _DriveReader:
         )
 
     def _clock_offset(self) -> int:
-        """Return in ns how far the clock of the stamps is ahead of the clock of the log times; 0 for the same clock."""
+        """Return the difference in ns between the clock of the stamps and the clock of the log; 0 for one clock."""
         differences = [
             message.stamp - message.log_time
             for role in ("scan", "odom", "amcl_pose", "truth")
@@ -121,7 +121,7 @@ class _DriveReader:
         return (logged - self._start) / NS_PER_SECOND
 
     def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
-        """Return the times of measurement and the log times (n,) of messages, in s since the start."""
+        """Return the times of measurement (n,) and the log times (n,) of messages, in s since the start."""
         arrivals = np.array([message.log_time - self._start for message in messages], dtype=np.float64) / NS_PER_SECOND
         if not any(message.stamp for message in messages):
             return arrivals, arrivals
@@ -129,7 +129,7 @@ class _DriveReader:
         return stamps, arrivals
 
     def _signal(self, role: str, columns: int, row_of: Callable[[Any], Sequence[float]]) -> TimedValues:
-        """Return the values of the messages of a role; `row_of` returns the columns for a decoded message."""
+        """Return the values of the messages of a role. `row_of` converts a decoded message to a row of values."""
         messages = self._messages.of(role)
         if not messages:
             return no_values(columns)
@@ -140,7 +140,7 @@ class _DriveReader:
         return TimedValues(times[order], values[order], arrivals[order])
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
-        """Return the best known poses in the map frame, their source in words, and whether they are a ground truth."""
+        """Return the best known poses in the map frame, the source in words, and whether it is a ground truth."""
         if self._messages.of("truth"):
             return self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane), "ground truth", True
         for base in BASE_FRAMES:
@@ -163,7 +163,7 @@ class _DriveReader:
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
 
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
-        """Return the poses x, y, yaw of the frame `inner` in `outer`; None if tf does not contain them."""
+        """Return the poses x, y, yaw of the frame `inner` in `outer`; None if /tf does not contain the transform."""
         try:
             found = self._transforms.between(outer, inner)
         except UnusableLog as error:
@@ -237,7 +237,7 @@ class _DriveReader:
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
 
     def _footprint(self, poses: TimedValues) -> Polygon:
-        """Return the footprint in the base frame, () if unknown. Nav2 publishes it in the odom or map frame."""
+        """Return the footprint in the base frame; () if unknown."""
         messages = self._messages.of("footprint")
         if not messages:
             return ()
@@ -251,11 +251,11 @@ class _DriveReader:
 
 
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
-"""Roles whose messages do not tell when the drive began and ended, because they may be logged at any time."""
+"""Roles whose messages can be logged at any time, so that they do not define the start and end of the drive."""
 
 
 def _belief_along_odometry(belief: TimedValues, odometry: TimedValues) -> TimedValues:
-    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the later odometry."""
+    """Return poses in the map frame at the times of the odometry: the latest belief plus the odometry since then."""
     at_belief = odometry.poses_at(belief.times)
     corrections = [
         Pose2(*pose).compose(Pose2(*odom).inverse())

@@ -1,4 +1,4 @@
-"""Data of a recorded drive as arrays with times in s since its start, and its motion in steps of equal duration."""
+"""Data of a recorded drive as arrays, with times in s since the start, and the motion in steps of equal duration."""
 
 from __future__ import annotations
 
@@ -42,17 +42,16 @@ class TimedValues:
         return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
 
 
-USUAL_PERIOD_PERCENTILE = 20
-"""Percentile of the times between messages that is taken as the period; a low one, because lost messages cause gaps."""
-
-
 def usual_period(times: Array) -> float:
-    """Return the period in s of a sensor from the `times` (n,) of its messages; nan for fewer than two messages."""
-    return float(np.percentile(np.diff(times), USUAL_PERIOD_PERCENTILE)) if len(times) > 1 else float("nan")
+    """Return the 20th percentile of the times between messages in s, to ignore gaps; nan for fewer than two messages.
+
+    `times` (n,) are the times of the messages.
+    """
+    return float(np.percentile(np.diff(times), 20)) if len(times) > 1 else float("nan")
 
 
 def no_values(columns: int) -> TimedValues:
-    """Return a signal without any values, which would have this number of columns."""
+    """Return a signal of length 0 with this number of columns."""
     return TimedValues(np.empty(0), np.empty((0, columns)), np.empty(0))
 
 
@@ -69,8 +68,7 @@ class Scans:
         range_max: Maximum range in m.
         mount: Pose of the lidar on the base.
         height: Height of the lidar above the base frame in m.
-        is_malformed: Whether a scan (n,) has another number of beams than most; its ranges are nan.
-
+        is_malformed: Mask (n,) of scans with another number of beams than most scans. Their ranges are nan.
     """
 
     times: Array
@@ -92,7 +90,7 @@ class Scans:
         return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
 
     def is_hit(self) -> Mask:
-        """Return which beams (n, beams) measured an object within the limits of the lidar."""
+        """Return a mask (n, beams) of beams with a range within the limits of the lidar."""
         with np.errstate(invalid="ignore"):
             hit: Mask = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
             return hit
@@ -103,7 +101,7 @@ class Scans:
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     def thinned(self, target: int) -> Scans:
-        """Return evenly spread scans: at least `target` and less than twice as many, or all if there are fewer."""
+        """Return evenly spread scans: at least `target` and less than twice as many, or all scans of a short drive."""
         return self.subset(slice(None, None, max(1, len(self) // target)))
 
 
@@ -112,12 +110,13 @@ class RecordedGoal:
     """Goal of the drive.
 
     Attributes:
+        name: Name of the goal; "" if unknown.
         pose: Pose in the map frame.
-        sent: Time in s at which it was accepted or, if unknown, sent.
-        ended: Time in s of its result; None if the log has no result.
+        sent: Time in s at which the goal was accepted or, if unknown, sent.
+        ended: Time in s of the result; None if the log has no result.
         status: "reached", "passed" (without a stop), "failed", "canceled", or "unknown".
-        error: Name of the error code, "" for none.
-        source: What the goal was derived from, in words; begins with the topic if it is from a message.
+        error: Name of the error code; "" for none.
+        source: Source of the goal in words. It begins with the topic if the goal is from a message.
     """
 
     name: str
@@ -131,13 +130,14 @@ class RecordedGoal:
 
 @dataclass(frozen=True, eq=False)
 class RecordedDrive:
-    """Everything that the reconstruction uses from a log. Units are m, rad, m/s, and rad/s.
+    """Data that the reconstruction uses from a log. Units are m, rad, m/s, and rad/s.
 
     Attributes:
+        name: Name of the log.
         duration: Time in s of the last message.
         poses: Best known poses x, y, yaw (n, 3) of the base in the map frame.
         pose_source: Source of `poses` in words.
-        has_true_poses: Whether `poses` are a ground truth; otherwise they are estimates of the robot.
+        has_true_poses: Whether `poses` are a ground truth. Otherwise, they are estimates of the robot.
         belief: Poses x, y, yaw from the localizer with the covariances xx, xy, xyaw, yy, yyaw, yawyaw (n, 9).
         corrections: Poses x, y, yaw of the odom frame in the map frame (n, 3), from /tf.
         odometry: Poses x, y, yaw in the odom frame and velocities vx, vy, wz in the base frame (n, 6).
@@ -145,9 +145,10 @@ class RecordedDrive:
         turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1).
         bumper: 1 while the bumper is pressed, otherwise 0 (n, 1).
         scans: Scans of the lidar frame with the most scans; None without scans.
+        map: Last map in the log; None without a map.
         goals: Goals in the order in which they were sent.
-        footprint: Corners (x, y) of the robot's footprint in the base frame, () if unknown.
-        notes: Sentences about what the log does not show, or how it was read, for the user.
+        footprint: Corners (x, y) of the robot's footprint in the base frame; () if unknown.
+        notes: Sentences for the user about missing data and assumptions.
         begin: Time in s from the start of the log to the start of the drive.
     """
 
@@ -174,15 +175,15 @@ class RecordedDrive:
 STEP_S = 0.5
 """Duration of a motion step."""
 MAX_STEP_M = 2.0
-"""Steps over which the pose moves farther are left out: the pose has jumped."""
+"""Maximum true motion in a step. Steps with a larger motion, a jump of the pose, are omitted."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionSteps:
     """Motion in steps of STEP_S that begin at `times` (n,) in s.
 
-    The motion is measured by odometry, true (from the poses of the drive), and commanded. Each is an array (n, 3) of
-    forward distance in m, leftward distance in m, and turn in rad.
+    `measured` is the motion by odometry, `true` the motion by the poses of the drive, and `commanded` the motion by
+    commands. Rows (n, 3) are forward distance in m, leftward distance in m, and turn in rad.
     """
 
     times: Array
@@ -213,7 +214,7 @@ def motion_steps(drive: RecordedDrive) -> MotionSteps:
 
 
 def _increments(poses: TimedValues, edges: Array) -> Array:
-    """Return the motion (n - 1, 3) between the times `edges` (n,), along the mean heading of each step."""
+    """Return the motion (n - 1, 3) between the times `edges` (n,), in the frame of the mean heading of each step."""
     at = poses.poses_at(edges)
     turn = wrap_array(np.diff(at[:, 2]))
     middle = at[:-1, 2] + turn / 2
@@ -223,7 +224,7 @@ def _increments(poses: TimedValues, edges: Array) -> Array:
 
 
 def _commanded(commands: TimedValues, edges: Array) -> Array:
-    """Return the motion (n - 1, 3) between the times `edges` (n,) if each command is executed until the next one."""
+    """Return the motion (n - 1, 3) between the times `edges` (n,) by exact execution of the commands."""
     if not len(commands):
         return np.zeros((len(edges) - 1, 3))
     fine = np.arange(float(edges[0]), float(edges[-1]) + 1e-9, 0.02)

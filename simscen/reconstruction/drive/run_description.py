@@ -1,7 +1,6 @@
-"""Reads from the header of a simscen log which world, robot, and stack the run used.
+"""Reads the world, robot, and stack of a run from the header of a simscen log.
 
-The events, faults, criteria, and objects of the recorded scenario are not read. The reconstruction derives them from
-the messages, as for the log of a real robot.
+The events, faults, criteria, and objects of the recorded scenario are not read.
 """
 
 from __future__ import annotations
@@ -24,15 +23,17 @@ from simscen.sim.body.outline import circle
 
 @dataclass(frozen=True)
 class RunDescription:
-    """Description of the run. The defaults are those for logs of real robots.
+    """Description of the recorded run. The defaults are for logs of real robots.
 
     Attributes:
-        world: World file, or the data of an inline world without its objects; None if unknown.
-        has_map: False if the robot drove without a map.
+        seed: Seed of the run.
+        world: World file, or the data of an inline world without objects; None if unknown.
+        has_map: Whether the robot had a map.
         robot: Name of a shipped robot, or robot file; None if unknown.
-        other_robots: Name, corners of the footprint in m, times (n,) in s, and true poses x, y, yaw (n, 3) of each
-            robot that is not reconstructed.
-        notes: Remarks for the user about missing files.
+        stack: Key `stack` of the recorded scenario.
+        other_robots: For each robot that is not reconstructed: name, corners of the footprint in m, times (n,) in s,
+            and true poses x, y, yaw (n, 3).
+        notes: Notes for the user about missing files.
     """
 
     seed: int = 1
@@ -57,15 +58,15 @@ def choose_robot(log: Path, name: str) -> str:
 
 
 def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
-    """Return the description in the header of a log, or the default one for the log of a real robot.
+    """Return the description from the header of a log, or the default description for the log of a real robot.
 
-    `root` is the folder from which the recorded scenario was run, to find its files. In a log with several robots,
-    `robot` is the name of the one to describe. Raises InvalidInput if the recorded scenario is no YAML mapping.
+    `root` is the folder of the files of the recorded scenario. In a log with several robots, `robot` is the name of the
+    robot to describe. Raises InvalidInput if the recorded scenario is no YAML mapping.
     """
     if log.is_dir() or not is_simscen_log(log):
         return RunDescription()
     recorded = read_log(log, partial=True)
-    header, written = recorded.header, _scenario(recorded.header.scenario)
+    header, written = recorded.header, _parse_scenario(recorded.header.scenario)
     if robot:
         header, written = header.robots[robot], _for_single_robot(written, robot)
         described = _described_run(header, written, root)
@@ -82,7 +83,7 @@ def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Arr
 
 
 def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) -> RunDescription:
-    """Return the description of a run from its log header and the data `written` in its scenario."""
+    """Return the description of a run from the log header and the data `written` of the recorded scenario."""
     scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
     world, named = written.get("world"), written.get("robot", {}).get("model", "turtlebot")
@@ -104,13 +105,13 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
 
 
 def _for_single_robot(written: Mapping[str, Any], robot: str) -> Mapping[str, Any]:
-    """Return the data of a scenario with several robots as if it had only this robot."""
+    """Convert the data of a scenario with several robots to the data of a scenario with only this robot."""
     own = written.get("robots", {}).get(robot, {})
     return {**written, "robot": own, "stack": own.get("stack", written.get("stack", {}))}
 
 
-def _scenario(text: str) -> Mapping[str, Any]:
-    """Return the data of the recorded scenario from its YAML text."""
+def _parse_scenario(text: str) -> Mapping[str, Any]:
+    """Return the data of a scenario from YAML text."""
     tree, problems = parse_yaml(text, "scenario.yaml")
     if not isinstance(tree, MappingNode):
         raise InvalidInput(problems)

@@ -1,4 +1,4 @@
-"""Finds faults between commands and motion: late or ignored commands, weak motors, and reduced speed limits."""
+"""Finds faults of the velocity commands and of the base: late or ignored commands, wrong gains, and speed limits."""
 
 from __future__ import annotations
 
@@ -15,40 +15,41 @@ from simscen.reconstruction.reasons import FoundFault, Reason, windows
 SAMPLE_PERIOD_S = 0.025
 """Period of the samples at which commands and odometry are compared."""
 MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
-"""Largest lag that is searched, and smallest one that is reported."""
+"""Maximum lag to search for, and minimum lag to report."""
 NORMAL_LAG_S = 0.09
-"""Lag of a base without faults, which needs this time to accelerate; subtracted from the reported latency."""
+"""Lag of a base without faults, which is subtracted from the reported latency."""
 MIN_COMMAND_M_S = 0.1
 """Speed above which a command, or the base, counts as driving."""
 IGNORED_RATIO, MIN_IGNORED_S = 0.1, 0.4
-"""The base ignores a command if it drives at less than this fraction of the commanded speed for at least this time."""
+"""Maximum ratio of driven to commanded speed, and minimum duration, of an ignored command."""
 KEPT_RATIO, MIN_KEPT_S = 0.5, 0.6
-"""The base keeps its speed if the command is below this fraction of it for this time, which is longer than braking."""
+"""Maximum ratio of commanded to driven speed, and minimum duration, of a base that keeps its speed."""
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
-"""A command is steady if it changes in this time by at most this fraction of its value."""
+"""Minimum duration of a steady command, and maximum change in this time as a fraction of the command."""
 MIN_GAIN_ERROR = 0.08
-"""Smallest deviation of a gain (ratio of driven to commanded speed) from 1 that is reported."""
+"""Minimum deviation of a gain (ratio of driven to commanded speed) from 1 to report."""
 MIN_STEADY_SAMPLES = 20
-"""Number of samples with a steady command that the estimate of a speed limit or a gain needs."""
+"""Minimum number of samples with a steady command for estimating a speed limit or a gain."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
-"""Smallest reported difference between the gains of both sides, and largest fraction of squared speed they may miss."""
+"""Minimum difference to report between the gains of left and right wheels, and maximum fraction of the squared speed
+that the gains do not explain."""
 MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
-"""Deficit to the commanded speed above which a limit may act, and largest standard deviation of speeds at a limit."""
+"""Minimum difference between commanded and driven speed at a speed limit, and maximum standard deviation of the driven
+speed at a speed limit."""
 SMOOTHING_S = 0.5
-"""Time over which speeds are averaged to reduce the noise of the odometry."""
+"""Time over which speeds are averaged."""
 MIN_LIMIT_FALL_M_S = 0.05
-"""Decrease of the speed limit during the drive above which it is reported as a low battery."""
+"""Minimum decrease of the speed limit during the drive that is reported as a low battery."""
 MIN_ERROR_DECREASE = 0.02
-"""A lag exists if it reduces the mean squared difference between command and motion by more than this. The velocities
-are divided by the standard deviation of the command."""
+"""Minimum decrease by a lag of the mean squared difference between command and motion, in variances of the command."""
 MIN_COMMAND_STD = 0.05
-"""Standard deviation of a commanded velocity, in m/s or rad/s, below which the lag cannot be estimated from it."""
+"""Minimum standard deviation of a commanded velocity, in m/s or rad/s, for estimating the lag."""
 
 
 def command_faults(drive: RecordedDrive, wheel_separation: float = 0.0) -> Iterator[FoundFault]:
-    """Yield the faults of the commands and of the base that executes them.
+    """Yield the faults of the commands and of the base.
 
-    `wheel_separation` is the distance in m between left and right wheels; 0 if the sides cannot be told apart.
+    `wheel_separation` is the distance in m between left and right wheels; 0 to omit faults of one side.
     """
     times, commanded, driven = _speeds(drive)
     if len(times) < 80:
@@ -61,14 +62,14 @@ def command_faults(drive: RecordedDrive, wheel_separation: float = 0.0) -> Itera
     shift = round(lag / SAMPLE_PERIOD_S)
     if shift:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
-    ignored = [*_ignored(times, commanded, driven), *_kept(times, commanded, driven)]
+    ignored = [*_ignored_commands(times, commanded, driven), *_kept_speeds(times, commanded, driven)]
     yield from ignored
     if ignored:
         return
     sides = [*_side_gains(times, commanded, driven, wheel_separation)]
     yield from sides
     if not sides:
-        yield from _limits(times, commanded, driven)
+        yield from _limit_or_gain(times, commanded, driven)
 
 
 def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
@@ -84,14 +85,14 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     return times, command[:, [0, 2]], moved[:, [3, 5]]
 
 
-def _averaged(speeds: Array) -> Array:
+def _moving_average(speeds: Array) -> Array:
     """Return the moving average of speeds (n,) over SMOOTHING_S."""
     result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
     return result
 
 
 def _lag(commanded: Array, driven: Array) -> float:
-    """Return the lag in s of the driven velocities (n, 2) behind the commanded ones; 0 if none can be shown."""
+    """Return the lag in s of the driven velocities (n, 2) behind the commanded velocities (n, 2); 0 without a lag."""
     best, lag, error_without_lag = -np.inf, 0, -np.inf
     varies = np.std(commanded, axis=0) >= MIN_COMMAND_STD
     if not varies.any():
@@ -107,8 +108,8 @@ def _lag(commanded: Array, driven: Array) -> float:
     return lag * SAMPLE_PERIOD_S if best - error_without_lag > MIN_ERROR_DECREASE else 0.0
 
 
-def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
-    """Return a fault for each time in which the base stood although it was commanded to drive."""
+def _ignored_commands(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
+    """Return a fault for each time window in which the base stood although it was commanded to drive."""
     stands = (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S) & (
         np.abs(driven[:, 0]) < IGNORED_RATIO * np.abs(commanded[:, 0])
     )
@@ -119,9 +120,9 @@ def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
     return found
 
 
-def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield a fault for each time in which the base kept its speed although it was commanded to slow down."""
-    speed = _averaged(driven[:, 0])
+def _kept_speeds(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
+    """Yield a fault for each time window in which the base kept its speed although it was commanded to slow down."""
+    speed = _moving_average(driven[:, 0])
     keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_RATIO * np.abs(speed))
     for window in windows(keeps, times, MIN_KEPT_S, 0.1):
         if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
@@ -132,13 +133,13 @@ def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]
 
 
 def _side_gains(times: Array, commanded: Array, driven: Array, wheel_separation: float) -> Iterator[FoundFault]:
-    """Yield the fault that left and right wheels drive at different fractions of their commanded speeds."""
+    """Yield a fault if the left and the right wheels have different gains (ratio of driven to commanded speed)."""
     if wheel_separation <= 0.0:
         return
     half = wheel_separation / 2
     gains, remaining = [], []
     for side in (-half, half):
-        command, speed = (_averaged(motion[:, 0] + side * motion[:, 1]) for motion in (commanded, driven))
+        command, speed = (_moving_average(motion[:, 0] + side * motion[:, 1]) for motion in (commanded, driven))
         gain = float(command @ speed) / max(float(command @ command), 1e-9)
         gains.append(gain)
         remaining.append(float(np.mean((speed - gain * command) ** 2)) / max(float(np.mean(speed**2)), 1e-9))
@@ -150,12 +151,12 @@ def _side_gains(times: Array, commanded: Array, driven: Array, wheel_separation:
     yield FoundFault("wheels", "gain", {"left": left, "right": right}, reason=reason)
 
 
-def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
-    """Yield a falling speed limit, a constant speed limit, or a gain of the speed; at most one of them."""
-    steady = _steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
+def _limit_or_gain(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
+    """Yield at most one fault: a falling speed limit, a constant speed limit, or a gain of the speed."""
+    steady = _is_steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
     if int(steady.sum()) < MIN_STEADY_SAMPLES:
         return
-    command, speed, at = np.abs(commanded[steady, 0]), np.abs(_averaged(driven[:, 0]))[steady], times[steady]
+    command, speed, at = np.abs(commanded[steady, 0]), np.abs(_moving_average(driven[:, 0]))[steady], times[steady]
     ratio = speed / command
     slow = command - speed > MIN_SHORTFALL_M_S
     if slow.mean() < 0.2:
@@ -183,9 +184,9 @@ def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFaul
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
-    """Fit a limit that falls linearly and then is constant to `speeds` (n,) at `times` (n,).
+    """Fit a speed limit that first falls linearly and then is constant to `speeds` (n,) at `times` (n,).
 
-    Return the limit at time 0, the final limit, the time from which on it is constant, and the standard deviation.
+    Return the limit at time 0, the final limit, the time at which the fall ends, and the standard deviation.
     """
     best = (0.0, 0.0, 0.0, math.inf)
     for drain in np.linspace(times[0], times[-1], 25)[4:].tolist():
@@ -198,8 +199,8 @@ def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, fl
     return best
 
 
-def _steady(commanded: Array) -> Mask:
-    """Return at which samples (n,) the commanded speed has hardly changed for STEADY_S."""
+def _is_steady(commanded: Array) -> Mask:
+    """Return a mask (n,) of samples at which the commanded speed has been steady for STEADY_S."""
     count = round(STEADY_S / SAMPLE_PERIOD_S)
     speed = np.abs(commanded[:, 0])
     steady = np.zeros(len(speed), dtype=bool)

@@ -1,4 +1,7 @@
-"""Finds lidar faults from beams that end too early (dust, ghosts) or pass through walls (glass)."""
+"""Finds lidar faults from beams that end too early (dust, ghosts) or pass through walls (glass).
+
+A ghost is an apparent object that moves with the lidar.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +26,21 @@ from simscen.reconstruction.static_world import StaticWorld, beam_ends
 from simscen.worlds.geometry.triangulation import merge_solids
 
 MIN_FALSE_FRACTION = 0.015
-"""Fraction of isolated beams in a scan above which the scan shows dust."""
+"""Minimum fraction of isolated beams in a scan that shows dust."""
 JUMP_M = 0.3
-"""If the ranges of neighbor beams differ by at least this, the beams end at different objects."""
+"""Minimum difference between the ranges of neighbor beams that end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""A ghost is not visible this many beams beside its own. Ranges that differ by less than this show the same object."""
-MIN_GHOST_FRACTION, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
-"""Limits of a ghost: fraction of the scans that show it between its first and its last scan; spread (median deviation)
-of its range in m, or in standard deviations of the noise if that is larger; and distance that the lidar must move."""
-MIN_GHOST_S = 2.0
-"""Time for which a ghost must be seen."""
+"""Number of beams beside a ghost at which the ghost must not be visible, and maximum range difference of one object."""
+MIN_GHOST_FRACTION = 0.3
+"""Minimum fraction of the scans, from the first to the last scan with the ghost, that show the ghost."""
+MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS = 0.02, 2.0
+"""Maximum median deviation of the range of a ghost: the larger of a distance and a multiple of the range noise."""
+MIN_DRIVEN_M, MIN_GHOST_S = 0.6, 2.0
+"""Minimum motion of the lidar, and minimum time, in which a ghost is seen."""
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield dust (single beams that end in free space) and ghosts (objects that move with the lidar).
-
-    `end` is the end of the drive in s.
-    """
+    """Yield the faults dust (single beams that end in free space) and ghost. `end` is the end of the drive in s."""
     usable = ~invalid_scans(compared)
     isolated = isolated_returns(compared)
     for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
@@ -72,7 +73,7 @@ def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def isolated_returns(compared: ComparedScans) -> Mask:
-    """Return which beams (n, beams) end before the static world, but not near the ends of their neighbor beams."""
+    """Return a mask (n, beams) of beams that end before the static world and not near the ends of neighbor beams."""
     ranges = np.where(compared.is_hit, compared.scans.ranges, np.inf)
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(ranges, axis=1))
@@ -83,7 +84,7 @@ def isolated_returns(compared: ComparedScans) -> Mask:
 
 
 def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
-    """Return first beam, last beam, and range in m of each object that moves with the lidar while the robot drives."""
+    """Return the first beam, the last beam, and the range in m of each ghost."""
     if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
     short = compared.is_short & ~invalid_scans(compared)[:, None]
@@ -108,10 +109,9 @@ def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
 
 
 def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
-    """Return whether the object in a sector usually continues beside it, as an object does that only passes by.
+    """Return whether the object at the range `distance` in the beams from `first` to `last` is usually wider.
 
-    `ranges` (n, beams) are nan for beams that do not end before the static world. The sector reaches from the beam
-    `first` to the beam `last`, and the object is at the range `distance` in m.
+    `ranges` (n, beams) are nan for beams that do not end before the static world.
     """
     with np.errstate(invalid="ignore"):
         same = np.abs(ranges - distance) < SAME_OBJECT_M
@@ -121,13 +121,13 @@ def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
 
 
 MIN_PASSING_FRACTION, MIN_PASSING_BEAMS = 0.3, 30
-"""A wall is transparent if more than this fraction of its beams, and at least this number of beams, pass through it."""
+"""Minimum fraction, and minimum number, of the beams toward a wall that pass through a transparent wall."""
 MAX_SURFACE_DISTANCE_M = 0.05
-"""A beam is expected to end at a solid if its expected end is at most this far from the solid."""
+"""Maximum distance between a solid and the expected end of a beam that should end at the solid."""
 
 
 def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> FoundFault | None:
-    """Return the fault that beams of `usable` scans (n,) pass through named walls or obstacles; None if they do not."""
+    """Return a fault if beams of `usable` scans (n,) pass through named walls or obstacles; otherwise None."""
     rows = np.flatnonzero(usable)
     # A beam without any return may have been lost; only one that ends behind the wall has passed through it.
     through = compared.passes_through[rows] & compared.is_hit[rows]
@@ -153,23 +153,23 @@ def glass_fault(compared: ComparedScans, world: StaticWorld, usable: Mask) -> Fo
 
 
 def _passing_fractions(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str, tuple[int, float]]:
-    """Return by name of the solid how many beams should end at it, and which fraction of them passes through it.
+    """Return by solid name the number of beams that should end at the solid, and the fraction that passes through it.
 
-    `points` (n, 2) are the expected ends of beams in the map frame, and `passed` (n,) tells which of them pass.
+    `points` (n, 2) are the expected ends of beams in the map frame. `passed` (n,) is a mask of passing beams.
     """
     counts: dict[str, list[int]] = {}
     for solid in solids:
         if not solid.name or solid.name == "map":
             continue
-        inside = _near(solid, points)
+        inside = _is_near(solid, points)
         count = counts.setdefault(solid.name, [0, 0])
         count[0] += int(inside.sum())
         count[1] += int(passed[inside].sum())
     return {name: (total, through / total) for name, (total, through) in sorted(counts.items()) if total}
 
 
-def _near(solid: Solid, points: Array) -> Mask:
-    """Return which points (n, 2) are in or near the convex hull of a solid, seen from above."""
+def _is_near(solid: Solid, points: Array) -> Mask:
+    """Return a mask (n,) of points (n, 2) in or near the convex hull of a solid, seen from above."""
     from scipy.spatial import ConvexHull
 
     corners = merge_solids((solid,)).vertices[:, :2]

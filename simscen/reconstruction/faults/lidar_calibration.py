@@ -1,7 +1,4 @@
-"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a wrong scale, or a drift of its ranges.
-
-The errors are computed from the differences between measured ranges and the ranges expected in the static world.
-"""
+"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, wrong scale, or drift of the ranges."""
 
 from __future__ import annotations
 
@@ -17,31 +14,31 @@ from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
 TARGET_SCANS = 40
-"""The scans are thinned out evenly to at least this number, and less than twice as many."""
+"""Minimum number of scans to use of a long drive. At most twice as many scans are used."""
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
-"""Changes of the mount from which the numerical derivatives of the ranges are computed."""
+"""Changes of the mount for the numerical derivatives of the ranges."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
-"""Yaw errors of the mount that are tried as starting points of the estimate."""
+"""Yaw errors of the mount to try as initial values of the estimate."""
 MAX_MISFIT_RATIO = 0.7
-"""The best tried yaw error is the starting point if it reduces the median range difference to less than this fraction
-of the difference at the nominal mount. Otherwise, the estimate starts at the nominal mount."""
+"""Maximum ratio of the median range difference at a tried yaw error to the difference at the nominal mount. At a larger
+ratio, the estimate starts at the nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Beams with a larger difference from the expected range are ignored. While the mount is estimated, this limit is
-halved after each Gauss-Newton step, down to 0.1 m."""
+"""Maximum difference from the expected range of a beam that is used. While the mount is estimated, this limit is halved
+after each Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
-"""Smallest number of beams from which the mount is estimated."""
+"""Minimum number of beams for estimating the mount."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
-"""Smallest error of a mount that is reported. Smaller ones may be errors of the recorded poses or of the walls."""
+"""Minimum error of a mount to report."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
-"""Smallest bias of the ranges, deviation of their scale from 1, and drift that are reported."""
+"""Minimum bias of the ranges, deviation of the scale of the ranges from 1, and drift of the ranges to report."""
 
 
 def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
-    """Return the true pose of the lidar relative to its nominal mount, by Gauss-Newton steps on the range differences.
+    """Return the true pose of the lidar relative to the nominal mount, by Gauss-Newton steps on the range differences.
 
-    Returns the identity if too few beams hit the static world.
+    Return the identity if too few beams hit the static world.
     """
     step = max(1, len(compared.scans) // TARGET_SCANS)
     chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
@@ -88,7 +85,7 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
 
 
 def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | None:
-    """Return the fault that the lidar has another pose on the robot than its mount; None if the error is small.
+    """Return the fault of a wrong mount of the lidar; None if the error of the mount is small.
 
     The poses of the drive must be a ground truth.
     """
@@ -107,7 +104,7 @@ def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | Non
 
 
 def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> ComparedScans:
-    """Return the scans compared again, with the lidar at its estimated true pose on the robot."""
+    """Compare the scans again with the lidar at the estimated true pose on the robot."""
     error = mount_error(compared, world)
     poses = offset_poses(compared.poses, error)
     expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
@@ -115,7 +112,7 @@ def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> Compare
 
 
 def range_error_faults(compared: ComparedScans) -> Iterator[FoundFault]:
-    """Yield the fault of a drift, a wrong scale, or a constant error (bias) of all ranges; at most one of them."""
+    """Yield at most one fault: a drift, a wrong scale, or a constant error (bias) of all ranges."""
     residuals = np.where(np.abs(np.nan_to_num(compared.residuals, nan=9.0)) < OUTLIER_M, compared.residuals, np.nan)
     rows = np.isfinite(residuals).sum(axis=1) >= 20
     if int(rows.sum()) < 10:

@@ -17,38 +17,37 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
-"""Noise is reported if it exceeds the nominal noise by more than this distance, and this multiple of nominal noise."""
+"""Minimum noise to report beyond the nominal noise: the larger of a distance and a multiple of the nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""If the noise of the lidar is known, noise is reported above this multiple of it that exceeds it by this distance."""
+"""Minimum noise to report for a lidar with known noise: a multiple of this noise, and a distance beyond this noise."""
 MIN_NOISE_S = 2.0
-"""Shortest time with additional noise that is reported."""
+"""Minimum duration of additional noise to report."""
 MIN_INVALID_SCANS = 2
-"""Smallest number of invalid scans that is reported."""
+"""Minimum number of invalid scans to report."""
 MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
-"""A scan is invalid if less than the first fraction of its beams hits anything, although more than the second fraction
-should hit the static world."""
+"""Maximum fraction of beams with a hit in an invalid scan, and minimum fraction of beams that should hit the world."""
 MIN_NAN_FRACTION = 0.03
-"""Fraction of nan ranges in a scan above which beams are missing."""
+"""Minimum fraction of nan ranges in a scan with missing beams."""
 BLIND_FRACTION = 0.95
-"""A beam is blind if it returns nan in more than this fraction of the scans."""
+"""Minimum fraction of scans in which a blind beam returns nan."""
 MIN_SECTOR_BEAMS = 3
-"""Smallest number of neighboring beams that form a sector."""
+"""Minimum number of neighboring beams of a sector."""
 MIN_MISSING_FRACTION, MAX_NEAR_FRACTION = 0.03, 0.1
-"""The range may be limited if more than the first fraction of beams returns nothing where the static world is in range.
-At most the second fraction of these beams may have an expected range below the limit."""
+"""For a limited range: minimum fraction of beams without a return although the static world is in range, and maximum
+fraction of these beams with an expected range below the limit."""
 MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
-"""Shortest duration of a fault, and longest interruption within it."""
+"""Minimum duration of a fault, and maximum interruption within a fault."""
 RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
 """Model of the fault `rain` (Goodin et al., 2019) for the rain rate R in mm/h and the range z in m: extinction
 α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)² m."""
 WHITE_REFLECTIVITY = 0.9
-"""Reflectivity of a surface that the lidar just detects at its maximum range in clear air, as in the fault `rain`."""
+"""Reflectivity of a surface that the lidar detects up to its maximum range in clear air, as in the fault `rain`."""
 HEAVY_RAIN_MM_H = 25.0
-"""Largest rain rate that is reported."""
+"""Maximum rain rate to report."""
 
 
 def invalid_scans(compared: ComparedScans) -> Mask:
-    """Return which scans (n,) are invalid: they have the wrong number of beams, or hardly any valid range."""
+    """Return a mask (n,) of invalid scans: scans with a wrong number of beams, or with hardly any valid range."""
     hits = compared.is_hit.mean(axis=1)
     expected = np.isfinite(compared.expected).mean(axis=1)
     result: Mask = compared.scans.is_malformed | (
@@ -58,7 +57,7 @@ def invalid_scans(compared: ComparedScans) -> Mask:
 
 
 def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
-    """Yield at most one fault that covers all invalid scans, with the probability of an invalid scan in its time."""
+    """Yield at most one fault, which covers all invalid scans."""
     invalid, times = invalid_scans(compared), compared.scans.times
     if int(invalid.sum()) < MIN_INVALID_SCANS:
         return
@@ -68,7 +67,7 @@ def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
     whole = times[last] - times[first] > 0.6 * end
     share = float(invalid.mean()) if whole else share
     values: dict[str, object] = {}
-    kinds = {_content(compared, index) for index in indices.tolist()}
+    kinds = {_garbage_value(compared, index) for index in indices.tolist()}
     if len(kinds) == 1:
         values["value"] = kinds.pop()
     if share < 0.9:
@@ -78,8 +77,8 @@ def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
     yield FoundFault("lidar", "garbage", values, None if whole else begin, None if whole else length, reason)
 
 
-def _content(compared: ComparedScans, index: int) -> str:
-    """Return the content of the invalid scan `index` as a value of the fault `garbage`, such as "nan" or "short"."""
+def _garbage_value(compared: ComparedScans, index: int) -> str:
+    """Return the parameter `value` of the fault `garbage` for the invalid scan `index`, such as "nan" or "short"."""
     ranges = compared.scans.ranges[index]
     if compared.scans.is_malformed[index]:
         return "short"
@@ -121,7 +120,7 @@ def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
-    """Return the directions of the beams `first` and `last` in degrees, rounded so that neighbor beams still differ."""
+    """Return the directions of two beams as text in degrees, with enough digits to tell neighbor beams apart."""
     spacing = float(np.degrees(abs(angles[1] - angles[0])))
     decimals = max(0, math.ceil(-math.log10(spacing)))
     begin, end = (f"{math.degrees(angles[index]):.{decimals}f}" for index in (first, last))
@@ -135,7 +134,10 @@ def mask_runs(mask: Mask) -> list[tuple[int, int]]:
 
 
 def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> Iterator[FoundFault]:
-    """Yield faults that far objects return nothing: rain if there is more than the nominal noise in m, else a limit."""
+    """Yield faults for far objects without a return: rain if the noise exceeds the nominal noise, else a range limit.
+
+    `nominal_noise` is a standard deviation in m.
+    """
     usable = ~invalid_scans(compared)
     near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)
     lost = compared.is_missing & near
@@ -164,9 +166,9 @@ def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> I
 
 
 def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[str, object]:
-    """Return the parameters of the fault `rain` in which objects up to `limit` m are seen.
+    """Return the parameters of the fault `rain` with which the lidar sees objects up to `limit` m.
 
-    `noise_per_meter` is the standard deviation per meter of range, and `range_max` m the range in clear air.
+    `noise_per_meter` is the standard deviation per meter of range, `range_max` the maximum range in m in clear air.
     """
     share = math.sqrt(min(1.0, noise_per_meter / RAIN_NOISE_PER_M))
     rate = HEAVY_RAIN_MM_H if share > 0.99 else min(HEAVY_RAIN_MM_H, -math.log(1.0 - share))
@@ -176,9 +178,9 @@ def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[
 
 
 def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
-    """Yield a fault for each time in which ranges have more noise than `nominal_noise` m.
+    """Yield a fault for each time window in which ranges have more noise than `nominal_noise` m.
 
-    If `is_known`, this is the noise of the lidar itself. Otherwise it is a typical value, and only much more counts.
+    `is_known` states that `nominal_noise` is the noise of this lidar instead of a typical value.
     """
     usable = ~invalid_scans(compared)
     noise = median_filter(compared.noise, size=5, mode="nearest")
@@ -195,7 +197,7 @@ def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_k
 
 
 def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Window]:
-    """Return the time windows in which `mask` (n,) holds for the usable scans; other scans count as the one before."""
+    """Return the time windows in which `mask` (n,) is true. A scan that is not usable counts as the previous one."""
     held = mask.copy()
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
     held = held[newest] & usable[newest]
@@ -205,9 +207,9 @@ def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Wi
 def lidar_fault_in_window(
     kind: str, values: Mapping[str, object], window: Window, compared: ComparedScans, end: float, text: str
 ) -> FoundFault:
-    """Return a lidar fault with the reason `text`. Its start is None if the window begins with the drive.
+    """Return a lidar fault with the reason `text`.
 
-    Its duration is None if the window ends with the drive.
+    The start is None if the window begins with the drive. The duration is None if the window ends with the drive.
     """
     times, period = compared.scans.times, compared.scans.period
     from_start = window.begin <= float(times[0]) + 3 * period

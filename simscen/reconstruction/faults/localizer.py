@@ -12,19 +12,19 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
-"""The estimated pose jumps if its error changes by more than one of these between two estimates."""
+"""Minimum change of the error between two estimates, in position or heading, that counts as a jump."""
 MIN_OUTAGE_S, MIN_OUTAGE_PERIODS = 1.0, 6.0
-"""Shortest outage that is reported: the larger of a time and a multiple of the usual period of the estimates."""
+"""Minimum duration of an outage to report: the larger of a time and a multiple of the period of the estimates."""
 MIN_CORRECTION_M_RAD = 1e-9
-"""If the transform from map to odom changes by less than this in m and rad, the localizer has not corrected it."""
+"""Minimum change of the transform from map to odom, in m or rad, that counts as a correction."""
 MAX_JUMP_S = 30.0
-"""Longest time between a jump and the jump back."""
+"""Maximum time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
-"""Distance that the robot must drive during an outage that is reported: more than twice Nav2's update_min_d, 0.25 m."""
+"""Minimum distance that the robot drives during an outage: more than twice Nav2's default update_min_d of 0.25 m."""
 
 
 def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the faults of the localizer; none for a drive with hardly any estimates."""
+    """Yield the faults of the localizer; none for a drive with fewer than five estimates."""
     if len(drive.belief) < 5:
         return
     yield from _jump(drive)
@@ -32,7 +32,7 @@ def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the first jump of the belief away from the true pose and back, or a single jump away that lasts."""
+    """Yield the first jump of the estimated pose away from the true pose and back, or a single jump without return."""
     if not drive.has_true_poses:
         return
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
@@ -59,14 +59,14 @@ def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
         return
 
 
-def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -> Iterator[FoundFault]:
-    """Yield the jump of the poses `belief` (n, 3) at the index `out` if they never return to `truth` (n, 3)."""
-    begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
-    stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
+def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, index: int) -> Iterator[FoundFault]:
+    """Yield the jump of the poses `belief` (n, 3) at `index` if `belief` never returns to `truth` (n, 3)."""
+    begin, errors = float(drive.belief.times[index]), np.hypot(*(belief - truth)[:, :2].T)
+    stays = float(errors[index:].min()) > MIN_JUMP_M and float(errors[:index].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
-        text = f"the estimated pose jumps by {float(errors[out]):.2f} m and stays there"
+        text = f"the estimated pose jumps by {float(errors[index]):.2f} m and stays there"
         reason = Reason(text, begin, float(drive.belief.times[-1]), "medium")
-        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, reason)
+        yield FoundFault("localizer", "jump", _jump_values(truth[index], belief[index]), begin, None, reason)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
@@ -76,14 +76,14 @@ def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
 
 
 def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
-    """Return whether the true pose jumps between two times in s, so that the error is no fault of the localizer."""
+    """Return whether the true pose jumps between two times in s."""
     chosen = (drive.poses.times >= begin) & (drive.poses.times <= end)
     steps = np.hypot(*np.diff(drive.poses.values[chosen, :2], axis=0).T)
     return bool((steps > MIN_JUMP_M).any())
 
 
 def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the outages in which the robot drove: gaps between estimates or, without gaps, missing corrections."""
+    """Yield the outages while the robot drives: gaps between estimates or, without gaps, missing corrections."""
     times = drive.belief.times
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
     gaps = np.flatnonzero(np.diff(times) > limit)
@@ -97,7 +97,7 @@ def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the outages in which the transform from map to odom does not change although the robot drives."""
+    """Yield the outages in which the transform from map to odom stays constant although the robot drives."""
     corrections = drive.corrections
     if len(corrections) < 2 or len(drive.odometry) < 2:
         return

@@ -1,4 +1,4 @@
-"""Finds outages, lost messages, delays, and low rates from the times of a sensor's messages, and finds repeated scans.
+"""Finds outages, lost messages, delays, and low rates in the messages of a sensor, and repeated scans of a lidar.
 
 In all functions, `target` is the name of the sensor, and `end` is the end of the drive in s.
 """
@@ -14,24 +14,24 @@ from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_perio
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_OUTAGE_PERIODS = 4.5
-"""A longer gap between two messages, in periods, is an outage and not a few lost messages."""
+"""Minimum gap between two messages, in periods, that counts as an outage."""
 MIN_GAP_PERIODS = 1.5
-"""In a longer gap between two messages, in periods, messages are missing."""
+"""Minimum gap between two messages, in periods, in which messages are lost."""
 MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
-"""Lost messages are reported above this fraction of all messages, and from this number on."""
+"""Minimum fraction, and minimum number, of lost messages to report."""
 MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
-"""Messages are lost if more than the second fraction of the gaps is a multiple of the period, with errors below the
-first fraction of a period. Otherwise the sensor measures irregularly."""
+"""Maximum difference, in periods, between a gap with lost messages and a multiple of the period, and minimum fraction
+of gaps that meet this limit."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
-"""Delays above the larger of these, in periods and in s, are reported; drivers and networks cause smaller ones."""
+"""Minimum delay to report: the larger of a number of periods and a time."""
 MIN_OUTAGES_INTERMITTENT = 3
-"""Number of outages from which on they are reported as one intermittent fault."""
+"""Minimum number of outages that are reported as one intermittent fault."""
 SLOW_FACTOR = 1.6
-"""The sensor is slow while its period is longer than this multiple of the usual period."""
+"""Minimum ratio of the period of a slow sensor to its usual period."""
 MIN_REPEATED_SCANS = 3
-"""Smallest number of repeated scans in a row that is reported."""
+"""Minimum number of repeated scans in a row to report."""
 MIN_EQUAL_BEAMS = 20
-"""Number of beams with a return in both scans that the comparison of two scans needs."""
+"""Minimum number of beams with a return in both of two equal scans."""
 
 
 def stream_faults(
@@ -39,24 +39,24 @@ def stream_faults(
 ) -> Iterator[FoundFault]:
     """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s.
 
-    `nominal_period` is the period of the sensor in s; if None, it is estimated from the times.
+    `nominal_period` is the period of the sensor in s; None to estimate the period from the times.
     """
     if len(times) < 3:
         return
     period = nominal_period or usual_period(times)
     if period <= 0.0:
         return
-    yield from _delay(target, times, arrivals, period, end)
-    yield from _gaps(target, times, period, end)
+    yield from _delay_faults(target, times, arrivals, period, end)
+    yield from _rate_and_gap_faults(target, times, period, end)
 
 
-def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
-    """Yield the faults that gaps between messages show: a low rate, or else outages and lost messages."""
+def _rate_and_gap_faults(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield a low rate or, if the rate is normal, outages and lost messages."""
     edges = np.append(times, max(end, float(times[-1])))
     steps = np.diff(edges)
     steps[-1] = max(steps[-1], period)
     long = np.flatnonzero(steps > MIN_OUTAGE_PERIODS * period)
-    slow = _slow(target, times, period, end)
+    slow = _slow_fault(target, times, period, end)
     if slow is not None:
         yield slow
         return
@@ -94,8 +94,8 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
         yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, reason)
 
 
-def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
-    """Return the fault that the sensor measured for some time at a regular, but lower rate; None if it did not."""
+def _slow_fault(target: str, times: Array, period: float, end: float) -> FoundFault | None:
+    """Return the fault of a regular, but too low rate for some time; None if there is none."""
     steps = np.diff(times)
     is_slow = steps > SLOW_FACTOR * period
     if not is_slow.all() and not _is_regular(steps[~is_slow]):
@@ -117,8 +117,8 @@ def _is_regular(steps: Array) -> bool:
     return float(np.std(steps)) <= 0.15 * float(np.mean(steps))
 
 
-def _delay(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:
-    """Yield a fault for each time in which messages were logged late."""
+def _delay_faults(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:
+    """Yield a fault for each time window in which messages were logged late."""
     delays = arrivals - times
     limit = max(MIN_DELAY_S, MIN_DELAY_PERIODS * period)
     usual = max(0.0, float(np.percentile(delays, 2)))
@@ -139,7 +139,7 @@ def _delay(target: str, times: Array, arrivals: Array, period: float, end: float
 
 
 def repeated_scans(scans: Scans) -> Mask:
-    """Return which scans (n,) have exactly the ranges of the previous scan, which noise prevents for new scans."""
+    """Return a mask (n,) of scans with exactly the ranges of the previous scan."""
     same = np.zeros(len(scans), dtype=bool)
     if len(scans) < 2:
         return same
@@ -151,7 +151,7 @@ def repeated_scans(scans: Scans) -> Mask:
 
 
 def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
-    """Yield a fault for each time in which a lidar repeated its last scan."""
+    """Yield a fault for each time window in which a lidar repeated its last scan."""
     for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
         if window.last - window.first + 1 < MIN_REPEATED_SCANS:
             continue

@@ -1,4 +1,7 @@
-"""Finds faults of wheel odometry and gyroscope from their differences to the true motion."""
+"""Finds faults of wheel odometry and gyroscope by comparison with the true motion.
+
+The scale of a sensor is the ratio of measured to true motion. A step is a motion step of STEP_S.
+"""
 
 from __future__ import annotations
 
@@ -12,32 +15,31 @@ from simscen.reconstruction.drive.recorded_drive import STEP_S, Mask, MotionStep
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
-"""Total distance and turn of the drive from which on the scales of distances and turns are estimated."""
+"""Minimum distance and turn of a drive for estimating the scales of distances and turns."""
 MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_RAD_PER_M = 0.02, 0.03, 0.008
-"""Smallest deviations from 1 of the scales of distances and turns, and smallest turn per meter, that are reported."""
+"""Minimum deviations from 1 of the scales of distances and turns, and minimum turn per meter, to report."""
 MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
-"""Smallest velocities of the odometry at rest that are reported."""
+"""Minimum velocities of the odometry at rest to report."""
 MIN_SLIP_FRACTION, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
-"""A step has slip if the robot drives less far than its wheels roll, by this fraction and by this distance. Slip is
-reported if it lasts for this time."""
+"""Minimum part of the rolled distance that is lost in a step with slip (fraction, m), and minimum duration of slip."""
 MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
-"""Smallest standard deviations after 1 m and after 1 rad that are reported. Good odometry has 0.01."""
+"""Minimum standard deviations after 1 m and after 1 rad to report."""
 MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
-"""The fraction of the distance lost by slip must exceed that in the rest of the drive by this difference. A part of the
-drive counts only if the wheels rolled this far."""
+"""Minimum difference between the lost fractions during slip and in the rest of the drive, and minimum rolled distance
+for computing a lost fraction."""
 REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
-"""Largest motion in a step in which the robot stands, and number of these steps that the estimate of a drift needs."""
+"""Maximum motion in a step at rest, and minimum number of steps at rest for estimating a drift."""
 LONG_FRACTION = 0.75
-"""Slip that lasts longer than this fraction of the drive is no slip, but a scale of the odometry."""
+"""Maximum duration of slip as a fraction of the drive. Longer slip is a scale of the odometry."""
 CONFIDENCE_SIGMAS = 4.0
-"""An estimate is reported if it exceeds this multiple of its standard deviation."""
+"""Minimum ratio of an estimate to its standard deviation to report the estimate."""
 
 
 def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = False) -> Iterator[FoundFault]:
     """Yield the faults of the odometry.
 
-    `wheel_separation` is the distance in m between left and right wheels. If the robot `skids` in turns, as skid-steer
-    robots do, wrong turns and noise are no fault.
+    `wheel_separation` is the distance in m between left and right wheels. If `skids` is true (skid-steer robot), wrong
+    turns and noise are not reported.
     """
     if len(steps) < 6:
         return
@@ -48,8 +50,8 @@ def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = F
 
 
 def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
-    """Yield a fault for each time in which the wheels rolled farther than the robot drove."""
-    measured, true = _wheels(steps.measured, wheel_separation), _wheels(steps.true, wheel_separation)
+    """Yield a fault for each time window in which the wheels rolled farther than the robot drove."""
+    measured, true = (_wheel_distances(motion, wheel_separation) for motion in (steps.measured, steps.true))
     lost = np.abs(measured) - np.abs(true)
     slips = ((lost > MIN_SLIP_FRACTION * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
     for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
@@ -71,19 +73,20 @@ def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
 
 
 def _lost_fraction(measured: Array, true: Array, chosen: Mask) -> float:
-    """Return which fraction of the wheels' distances (n, 2) is lost in the `chosen` steps (n,), for the worse side."""
+    """Return the lost fraction of the rolled distances (n, 2) in the `chosen` steps (n,), for the worse side."""
     rolled = np.abs(measured[chosen]).sum(axis=0)
     lost = (np.abs(measured[chosen]) - np.abs(true[chosen])).sum(axis=0)
     return float((lost / np.maximum(rolled, 1e-6)).max()) if rolled.max() > MIN_ROLLED_M else 0.0
 
 
-def _wheels(motion: Array, wheel_separation: float) -> Array:
+def _wheel_distances(motion: Array, wheel_separation: float) -> Array:
     """Return the distances (n, 2) in m that left and right wheels roll in motion steps (n, 3)."""
     half = motion[:, 2] * wheel_separation / 2
     return np.column_stack((motion[:, 0] - half, motion[:, 0] + half))
 
 
 def _slip_values(measured: Array, true: Array) -> dict[str, object]:
+    """Return the parameters of the fault `slip` from wheel distances (n, 2); {} without slip."""
     rolled = np.abs(measured).sum(axis=0)
     shares = 1.0 - (true * np.sign(measured)).sum(axis=0) / np.maximum(rolled, 1e-6)
     shares = np.clip(np.where(rolled > 0.1, shares, 0.0), 0.0, 0.95)
@@ -93,14 +96,14 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
 
 
 def _follows_commands(steps: MotionSteps, window: Window) -> bool:
-    """Return whether the true motion is closer to the commands than the odometry: then, only the odometry is wrong."""
+    """Return whether the true motion is closer to the commands than the odometry is."""
     commanded = float(np.abs(steps.commanded[window.samples][:, 0]).sum())
     true, measured = (float(np.abs(motion[window.samples][:, 0]).sum()) for motion in (steps.true, steps.measured))
     return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
 
 
 def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
-    """Yield errors over the whole drive: scale or bias by least squares, drift at rest, and noise."""
+    """Yield faults of the whole drive: scale or bias by least squares, drift at rest, and noise."""
     measured, true = steps.measured, steps.true
     forward = _fit(true[:, :1], measured[:, 0])
     turn = _fit(true[:, [2, 0]], measured[:, 2])
@@ -141,7 +144,7 @@ def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
 
 
 def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
-    """Yield the fault that the odometry reports motion while the robot stands."""
+    """Yield a fault if the odometry reports motion while the robot stands."""
     rest = (np.abs(steps.true[:, :2]).max(axis=1) < REST_M) & (np.abs(steps.true[:, 2]) < REST_RAD)
     # Wheels also turn in place when something holds the robot that is commanded to drive.
     rest &= np.abs(steps.commanded).max(axis=1) < REST_M
@@ -158,7 +161,10 @@ def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
 
 
 def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array, drive: tuple[float, float]) -> Iterator[FoundFault]:
-    """Yield the fault that measured motion scatters about the fitted distances and turns (n,) in the whole drive."""
+    """Yield a fault if the measured motion scatters about the fitted distances and turns (n,).
+
+    `drive` is the start and the end of the drive in s.
+    """
     values: dict[str, object] = {}
     distance, turned = steps.true[:, 0], steps.true[:, 2]
     moved, rotated = np.abs(distance) > 0.05, np.abs(turned) > 0.05
@@ -174,21 +180,21 @@ def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array, drive: tuple
 
 
 BIN_S, MIN_BINS = 0.5, 8
-"""Length of the bins over which turn rates are averaged, and number of bins that an estimate needs."""
+"""Length of the bins over which turn rates are averaged, and minimum number of bins for an estimate."""
 MIN_BIAS_RAD_S, MIN_DRIFTED_RAD_S = 0.006, 0.006
-"""Smallest bias, and smallest change of the bias by drift, that are reported."""
+"""Minimum bias, and minimum change of the bias by drift, to report."""
 MIN_GYRO_SCALE_ERROR, MIN_GYRO_TURN_RAD = 0.03, 2.0
-"""Smallest deviation of the scale from 1 that is reported, and total turn that its estimate needs."""
+"""Minimum deviation of the scale from 1 to report, and minimum total turn for estimating the scale."""
 MAX_RATE_CHANGE_RAD_S = 0.2
-"""Bins with a larger change of the turn rate are not used, because errors of the times would look like a bias."""
+"""Maximum change of the turn rate between bins that are used for estimating a bias or a drift."""
 MIN_RAMP_S, MIN_RAMP_SIGMAS = 4.0, 4.0
-"""Shortest duration of a drift, and its smallest change in standard deviations of the remaining errors."""
+"""Minimum duration of a drift, and minimum change by the drift in standard deviations of the remaining errors."""
 MAX_ERROR_RATIO = 0.2
-"""A drift or a scale is reported only if it reduces the sum of squared errors to less than this fraction."""
+"""Maximum ratio of the sum of squared errors with a drift or scale to the sum without it, to report the fault."""
 
 
 def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield a wrong scale, a drift, or a bias of the gyroscope; at most one of them."""
+    """Yield at most one fault of the gyroscope: a wrong scale, a drift, or a bias."""
     times, measured, true = _turn_rates(drive)
     if len(times) < MIN_BINS:
         return
@@ -238,7 +244,7 @@ def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _ramp(times: Array, errors: Array) -> tuple[float, float, float, float]:
-    """Return begin and end in s, slope in rad/s², and remaining sum of squares of the ramp that fits `errors` best."""
+    """Fit a ramp to `errors` (n,) in rad/s. Return start and end in s, slope in rad/s², and sum of squared errors."""
     best = (float(times[0]), float(times[-1]), 0.0, float(np.sum((errors - errors.mean()) ** 2)))
     stride = max(1, len(times) // 40)
     for first in range(0, len(times) - MIN_BINS // 2, stride):

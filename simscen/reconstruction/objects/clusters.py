@@ -1,4 +1,4 @@
-"""Groups the hits of each scan that the static world does not explain into clusters, one for each visible object."""
+"""Groups the hits of each scan that are not from the static world into clusters, one cluster per visible object."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from simscen.reconstruction.faults.message_stream import repeated_scans
 from simscen.reconstruction.static_world import StaticWorld
 
 MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
-"""Smallest number of hits of a cluster, and largest number of beams without a hit between two of its hits."""
+"""Minimum number of hits of a cluster, and maximum number of beams without a hit between two hits of a cluster."""
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
-"""Largest distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
+"""Maximum distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
 TRUE_WALL_DISTANCE_M = 0.12
-"""Distance from a wall within which a hit belongs to the wall, if the poses are true."""
+"""Maximum distance from a wall of a hit that belongs to the wall, for true poses."""
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""The same distance for estimated poses: fixed, and per meter of range, because of errors of the heading."""
+"""Maximum distance from a wall of a hit that belongs to the wall, for estimated poses: constant, and per m of range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +31,11 @@ class ScanCluster:
 
     Attributes:
         scan: Index of the scan.
+        time: Time of the scan in s.
         points: Hits (m, 2) in the map frame.
         lidar: Position (2,) of the lidar in the map frame.
         angle: Angle in rad that the hits cover, seen from the lidar.
-        is_fully_visible: Whether the beams on both sides of the hits end farther away: nothing hides the object.
+        is_fully_visible: Whether nothing hides a part of the object: the beams on both sides end farther away.
     """
 
     scan: int
@@ -52,13 +53,13 @@ class ScanCluster:
 
 
 def usable_scans(compared: ComparedScans) -> Mask:
-    """Return which scans (n,) are neither invalid nor a repetition of the previous scan."""
+    """Return a mask (n,) of scans that are neither invalid nor a repetition of the previous scan."""
     result: Mask = ~invalid_scans(compared) & ~repeated_scans(compared.scans)
     return result
 
 
 def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: bool) -> list[list[ScanCluster]]:
-    """Return the clusters of each scan, in the order of the scans."""
+    """Return the clusters of each scan, in the order of the scans; [] for a scan without clusters."""
     unexplained = compared.is_short & ~isolated_returns(compared) & usable_scans(compared)[:, None]
     for first, last, _ in ghost_beams(compared):
         unexplained[:, first : last + 1] = False
@@ -105,14 +106,14 @@ def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[Sca
 
 
 FREE_MARGIN_M, MIN_VISIBLE_FRACTION = 0.25, 0.3
-"""A beam shows that a point is free if it ends at least this far behind the point. A scan counts only if at least this
-fraction of the points is visible."""
+"""Minimum distance of the end of a beam behind a free point, and minimum fraction of visible points in a scan."""
 
 
 def fraction_seen_free(compared: ComparedScans, points: Array, rows: Indices) -> Array:
-    """Return for each scan in `rows` (k,) which fraction of the visible points is free; nan if few are visible.
+    """Return the fraction (k,) of free points among the visible points in each scan of `rows` (k,).
 
-    `points` (m, 2) are in the map frame. A point is free if a beam passes through it.
+    `points` (m, 2) are in the map frame. A point is free if a beam passes through the point. The fraction is nan if too
+    few points are visible.
     """
     offsets = points[None, :, :] - compared.poses[rows, None, :2]
     distance = np.hypot(offsets[..., 0], offsets[..., 1])

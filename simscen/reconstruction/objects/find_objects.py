@@ -19,45 +19,45 @@ from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
 MIN_DISPLACEMENT_M = 0.4
-"""Distance that an object must move to count as moving."""
+"""Minimum displacement of a moving object."""
 MIN_FREED_FRACTION = 0.5
-"""An object has moved if more than this fraction of its first hits is free later, or of its farthest hits was free
-earlier."""
+"""Minimum fraction of a moving object's first hits that are free later, or of its farthest hits that were free."""
 SEEN_FREE_FRACTION = 0.6
-"""An object is absent if beams pass through more than this fraction of its points."""
+"""Minimum fraction of an object's points through which beams pass while the object is absent."""
 COMPARED_CLUSTERS = 5
-"""Number of clusters at the start of a track, and where it is farthest from the start, that are compared."""
+"""Number of clusters to compare at the start of a track, and where the track is farthest from the start."""
 KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD, MAX_KEYFRAMES = 0.05, math.radians(10), 400
-"""Largest distance and turn between a track and its keyframes, and approximate largest number of keyframes."""
+"""Maximum distance and turn between a track and its keyframes, and approximate maximum number of keyframes."""
 MERGE_DISTANCE_M = 0.3
-"""Two tracks may be of the same standing object if some of their hits are at most this far apart."""
+"""Maximum distance between the nearest hits of two tracks of the same standing object."""
 MIN_CLUSTERS_STANDING = 10
-"""Smallest number of clusters from which a standing object is reported."""
+"""Minimum number of clusters of a standing object."""
 PART_MARGIN_M, PART_FRACTION = 0.15, 0.5
-"""A track belongs to a known object if more than this fraction of its clusters is within this distance of it."""
+"""Maximum distance from a known object, and minimum fraction of clusters within this distance, for a track that belongs
+to the known object."""
 MIN_SIZE_M = 0.06
-"""Objects with a smaller longest side, or radius, are ignored."""
+"""Minimum length of the longest side, or of the radius, of an object."""
 MAX_OBJECT_SPEED_M_S = 4.0
-"""Keyframes that an object could reach only at a higher speed are errors of its track and are left out."""
+"""Maximum speed of an object. Keyframes that require a higher speed are omitted."""
 
 
 def find_objects(
     compared: ComparedScans, world: StaticWorld, has_true_poses: bool, robots: Sequence[FoundObject] = ()
 ) -> list[FoundObject]:
-    """Return the other `robots`, and after them the objects that the scans show and the static world does not have."""
+    """Return the other `robots`, then the objects that the scans show and the static world does not contain."""
     tracks = track_objects(scan_clusters(compared, world, has_true_poses))
     usable = np.flatnonzero(usable_scans(compared))
     moving = [track for track in tracks if _has_moved(compared, track, usable)]
-    standing = _merged([track for track in tracks if track not in moving], compared, usable)
+    standing = _merge_tracks([track for track in tracks if track not in moving], compared, usable)
     moving.sort(key=lambda track: (-len(track.clusters), track.begin))
     found: list[FoundObject] = [*robots]
     for track in moving:
         if not any(_is_part(track, thing) for thing in found):
-            found.append(_found(compared, track, usable, is_moving=True))
+            found.append(_object_of_track(compared, track, usable, is_moving=True))
     known = [*found]
     for track in standing:
         if len(track.clusters) >= MIN_CLUSTERS_STANDING and not any(_is_part(track, thing) for thing in known):
-            found.append(_found(compared, track, usable, is_moving=False))
+            found.append(_object_of_track(compared, track, usable, is_moving=False))
     found = [thing for thing in found[len(robots) :] if max(thing.size) >= MIN_SIZE_M]
     found.sort(key=lambda thing: (thing.keyframes[0][0], *thing.keyframes[0][1:3]))
     kinds = {True: "moving object", False: "object"}
@@ -70,9 +70,9 @@ def find_objects(
 
 
 def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> FoundObject:
-    """Return another robot as a box around its `outline`, which moves along `poses` x, y, yaw (n, 3).
+    """Return another robot as a box around `outline` that moves along `poses` x, y, yaw (n, 3).
 
-    The outline is in the frame of the robot; the poses in the map frame are those at `times` (n,) in s.
+    The outline is in the frame of the robot. The poses are in the map frame, at `times` (n,) in s.
     """
     corners = np.array(outline)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -84,7 +84,7 @@ def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> 
 
 
 def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
-    """Return whether an object moved, rather than only the visible part of it. `usable` are indices of scans."""
+    """Return whether an object moved, instead of only its visible part. `usable` are indices of usable scans."""
     shape = fit_shape(track.clusters, is_moving=True)
     centers = shape.poses[:, :2]
     start = np.median(centers[:COMPARED_CLUSTERS], axis=0)
@@ -104,7 +104,7 @@ def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> 
 
 
 def median_of_three(values: Array) -> Array:
-    """Return the medians (n,) of each value (n,) and its two neighbors."""
+    """Return the median (n,) of each value (n,) and its two neighbors."""
     if len(values) < 3:
         return values
     padded = np.concatenate((values[:1], values, values[-1:]))
@@ -116,8 +116,8 @@ def _median_fraction(fractions: Array) -> float:
     return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
-def _merged(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
-    """Return the tracks of standing objects; several tracks of the same object become one."""
+def _merge_tracks(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
+    """Merge tracks of the same standing object."""
     merged: list[ObjectTrack] = []
     for track in tracks:
         same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)
@@ -129,7 +129,7 @@ def _merged(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices)
 
 
 def _is_same(earlier: ObjectTrack, later: ObjectTrack, compared: ComparedScans, usable: Indices) -> bool:
-    """Return whether two tracks are of the same standing object: they touch, and it did not disappear in between."""
+    """Return whether two tracks touch and belong to an object that did not disappear between them."""
     a, b = (np.concatenate([cluster.points for cluster in track.clusters]) for track in (earlier, later))
     a, b = a[:: max(1, len(a) // 200)], b[:: max(1, len(b) // 200)]
     if float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min()) > MERGE_DISTANCE_M:
@@ -140,7 +140,7 @@ def _is_same(earlier: ObjectTrack, later: ObjectTrack, compared: ComparedScans, 
 
 
 def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
-    """Return whether most clusters of a track are at the position that another object has at their times."""
+    """Return whether most clusters of a track are at the position of the object `thing` at the same time."""
     times = np.array([cluster.time for cluster in track.clusters])
     centers = np.array([cluster.center for cluster in track.clusters])
     inside = np.hypot(*(centers - thing.poses_at(times)[:, :2]).T) < thing.radius + PART_MARGIN_M
@@ -148,8 +148,8 @@ def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
     return float(np.mean(inside & present)) > PART_FRACTION
 
 
-def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
-    """Return the object of a track, still without a name."""
+def _object_of_track(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
+    """Return the object of a track, with the name ""."""
     shape = fit_shape(track.clusters, is_moving)
     keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
     appears = _appearance(compared, track, usable)
@@ -168,7 +168,7 @@ def _found(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_movi
 
 
 def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
-    """Return the time in s at which the object appeared; None if no earlier scan shows its first position free."""
+    """Return the time in s at which the object appeared; None if no earlier scan shows that its first place is free."""
     points = np.concatenate([cluster.points for cluster in track.clusters[:3]])
     before = usable[usable < track.clusters[0].scan]
     if not len(before):
@@ -179,7 +179,7 @@ def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) ->
 
 
 def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
-    """Return the time in s at which the object disappeared; None if no later scan shows its last position free."""
+    """Return the time in s at which the object disappeared; None if no later scan shows that its last place is free."""
     points = np.concatenate([cluster.points for cluster in track.clusters[-3:]])
     after = usable[usable > track.clusters[-1].scan]
     if not len(after):
@@ -195,7 +195,7 @@ def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
 
 
 def keyframes_of(shape: ObjectShape) -> list[Keyframe]:
-    """Return few keyframes between which linear interpolation gives the poses of a shape within the tolerances."""
+    """Return few keyframes whose linear interpolation approximates the poses of a shape (Douglas-Peucker)."""
     times, poses = shape.times, shape.poses.copy()
     poses[:, 2] = np.unwrap(poses[:, 2])
     scale = np.array([1.0, 1.0, KEYFRAME_TOLERANCE_M / KEYFRAME_TOLERANCE_RAD])

@@ -1,4 +1,4 @@
-"""Data of an object that the scans show and the map does not: its shape, its keyframes, and its pedestrian."""
+"""Data of an object that the scans show and the map does not contain: shape, keyframes, and fitted pedestrian."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Keyframe = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class FittedPedestrian:
-    """Pedestrian of the scenario language whose simulated motion in the recorded drive reproduces a tracked person.
+    """Simulated pedestrian whose motion in the recorded drive approximates the track of a person.
 
     Attributes:
         begin: Time in s at which the pedestrian appears.
         walker: Start, goals, speed, and behavior of the pedestrian.
         times: Times (n,) in s of the simulation.
         positions: Positions (n, 2) of the pedestrian in the simulation.
-        rmse: RMSE in m of these positions from the track.
-        time_shift: Delay or lead in s, not negative, at which the positions would fit the track best.
-        meets_robot: Whether the robot came so near that the track shows how the person reacts to it.
+        rmse: RMSE in m between the simulated positions and the track.
+        time_shift: Magnitude in s of the time shift with which the positions fit the track best.
+        meets_robot: Whether the robot came so near that the track shows how the person reacts to the robot.
     """
 
     begin: float
@@ -39,7 +39,7 @@ class FittedPedestrian:
 
     @property
     def sentence(self) -> str:
-        """Phrase that states how well the pedestrian reproduces the track, and how it reacts to the robot."""
+        """Phrase with the RMSE and with the reaction of the pedestrian to the robot."""
         reaction = ""
         if self.walker.blind_to:
             reaction = " if it does not evade the robot"
@@ -55,12 +55,12 @@ class FoundObject:
     Attributes:
         name: Name in the scenario.
         size: (length, width) of a box in m, or (radius,) of a cylinder.
-        keyframes: Poses in order of time; a single one for a standing object.
-        appears: Time in s at which it appears; None if it is there from the start.
-        disappears: Time in s at which it disappears; None if it stays.
-        reason: Reason for which it is in the scenario.
-        is_robot: Whether it is another robot whose poses are in the log.
-        pedestrian: Pedestrian that reproduces the keyframes; None if the object is no person or no pedestrian fits.
+        keyframes: Poses in order of time; one keyframe for a standing object.
+        appears: Time in s at which the object appears; None for the start of the drive.
+        disappears: Time in s at which the object disappears; None if it stays.
+        reason: Observation of the object in the log.
+        is_robot: Whether the object is another robot, whose poses are in the log.
+        pedestrian: Fitted pedestrian; None if the object is no person or no pedestrian fits.
     """
 
     name: str
@@ -79,7 +79,7 @@ class FoundObject:
 
     @property
     def is_cylinder(self) -> bool:
-        """Whether the object is an upright cylinder; otherwise it is a box."""
+        """Whether the object is an upright cylinder instead of a box."""
         return len(self.size) == 1
 
     @property
@@ -98,7 +98,7 @@ class FoundObject:
 
     @property
     def comment(self) -> str:
-        """The reason as one line, with the fit of the pedestrian if there is one."""
+        """The reason as one line, with the sentence of the pedestrian if there is one."""
         if self.pedestrian is None:
             return self.reason.comment
         return replace(self.reason, text=f"{self.reason.text}; {self.pedestrian.sentence}").comment

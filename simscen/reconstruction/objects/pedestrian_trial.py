@@ -1,4 +1,4 @@
-"""Simulates pedestrians in a recorded drive, in which the robot and other objects move as in the log."""
+"""Simulates pedestrians in a recorded drive. The robot and other objects move as in the log."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from simscen.sim.body.outline import circle
 STEP_S = 0.05
 """Time step of the pedestrian simulation."""
 NEAR_M = 4.0
-"""Objects and people that are farther from all pedestrians than this are left out of a step, to save time."""
+"""Maximum distance of objects and people from the simulated pedestrians in a step. Others are omitted to save time."""
 Walker = tuple[float, WalkingPedestrian]
 """Time in s at which a pedestrian appears, and the pedestrian."""
 IsGivenUp = Callable[[float, tuple[float, float]], bool]
-"""Returns for a time in s and the position of a pedestrian whether it is so far off its track that the trial ends."""
+"""Returns for a time in s and the position of a pedestrian whether the pedestrian is too far from the track."""
 
 
 class PedestrianTrial:
-    """Simulates pedestrians together with the recorded robot, which is a disc of `robot_radius` m."""
+    """Simulates pedestrians together with the recorded robot, a disc of `robot_radius` m."""
 
     def __init__(self, drive: RecordedDrive, world: PedestrianMap, robot_radius: float) -> None:
         self.world = world
         self._poses, self._radius = drive.poses, robot_radius
 
     def robot_distances(self, times: Array, positions: Array) -> Array:
-        """Return the distances (n,) in m of `positions` (n, 2) at `times` (n,) from the center of the robot."""
+        """Return the distances (n,) in m between `positions` (n, 2) and the center of the robot at `times` (n,)."""
         distances: Array = np.hypot(*(positions - self._poses.poses_at(times)[:, :2]).T)
         return distances
 
@@ -45,10 +45,10 @@ class PedestrianTrial:
         end: float,
         is_given_up: IsGivenUp = lambda _time, _position: False,
     ) -> dict[str, tuple[Array, Array]]:
-        """Simulate `walkers` until the time `end` in s, or until one of them is given up.
+        """Simulate the pedestrians `walkers` until `end` in s, or until `is_given_up` returns true for one of them.
 
-        Return the times (n,) and positions (n, 2) of each by name. `people` and `objects` follow their keyframes. The
-        walkers evade `people` as they evade robots, and avoid `objects` as they avoid walls.
+        Return the times (n,) and positions (n, 2) of each pedestrian by name. `people` and `objects` follow their
+        keyframes. The pedestrians treat `people` like robots, and `objects` like walls.
         """
         crowd = Crowd(self.world.walls, self.world.plan_path)
         paths: dict[str, list[tuple[float, float, float]]] = {walker.name: [] for _, walker in walkers}
@@ -81,18 +81,18 @@ class PedestrianTrial:
 
 
 class _RecordedMotion:
-    """Robot, person, or object that has one of the given poses (n, 3) in each step of the simulation."""
+    """Robot, person, or object with a recorded pose for each step of the simulation. `poses` is (n, 3)."""
 
     def __init__(self, poses: Array) -> None:
         self.poses = poses
 
     def is_near(self, index: int, positions: Array) -> bool:
-        """Return whether its pose in the step `index` is within NEAR_M of one of the positions (m, 2)."""
+        """Return whether the pose in the step `index` is within NEAR_M of one of the positions (m, 2)."""
         return bool(len(positions)) and float(np.hypot(*(positions - self.poses[index, :2]).T).min()) < NEAR_M
 
 
 class _RecordedDisc(_RecordedMotion):
-    """Robot or person as a disc that pedestrians evade as a robot."""
+    """Robot or person as a disc that pedestrians treat like a robot."""
 
     def __init__(self, name: str, radius: float, poses: Array) -> None:
         super().__init__(poses)
@@ -101,12 +101,13 @@ class _RecordedDisc(_RecordedMotion):
         self._velocities: Array = np.gradient(poses[:, :2], STEP_S, axis=0) if several else np.zeros((1, 2))
 
     def observed(self, index: int) -> ObservedRobot:
+        """Return the disc in the step `index` of the simulation."""
         vx, vy = self._velocities[index].tolist()
         return ObservedRobot(self._name, Pose2(*self.poses[index].tolist()), (vx, vy), self._radius, self._outline)
 
 
 class _RecordedOutline(_RecordedMotion):
-    """Object as an outline that pedestrians avoid as a wall."""
+    """Object as an outline that pedestrians treat like a wall."""
 
     def __init__(self, thing: FoundObject, times: Array) -> None:
         super().__init__(thing.poses_at(times))
@@ -118,4 +119,5 @@ class _RecordedOutline(_RecordedMotion):
             self._outline = np.array([(x, y), (-x, y), (-x, -y), (x, -y)])
 
     def observed(self, index: int) -> ObservedObject:
+        """Return the outline in the step `index` of the simulation."""
         return ObservedObject(self._name, (Pose2(*self.poses[index].tolist()).apply(self._outline),))

@@ -1,4 +1,4 @@
-"""Finds pedestrians of the scenario language whose simulated motion reproduces tracked people."""
+"""Fits simulated pedestrians to the tracks of people."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
 from simscen.reconstruction.reasons import windows
 
 MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
-"""Smallest and largest radius of a round object that may be a person."""
+"""Minimum and maximum radius of a round object that can be a person."""
 MAX_LEGS_SIDE_M = 0.7
-"""Longest side of a box that may be the two legs of a person."""
+"""Maximum side of a box that can be the two legs of a person."""
 MIN_BODY_RADIUS_M, MAX_BODY_RADIUS_M, LEGS_BODY_RADIUS_M = 0.2, 0.35, 0.25
-"""Limits of the radius of a pedestrian, and its radius if the lidar saw legs."""
+"""Limits of the radius of a pedestrian, and radius of a pedestrian whose legs the lidar saw."""
 MIN_WALK_M = 1.0
-"""Length of the shortest track that may be a person's."""
+"""Minimum length of the track of a person."""
 MAX_PEOPLE = 4
-"""Number of people above which none becomes a pedestrian, because small differences grow too fast in a crowd."""
+"""Maximum number of people for which pedestrians are fitted. Simulations of larger crowds diverge."""
 MIN_WALKING_SPEED_M_S, MAX_WALKING_SPEED_M_S = 0.3, 2.2
-"""Limits of the usual speed of a person who walks."""
+"""Minimum and maximum median speed of a person who walks."""
 MAX_RMSE_M, MAX_TIME_SHIFT_S = 0.3, 0.5
-"""Largest RMSE and time shift between a track and the pedestrian that replaces it."""
+"""Maximum RMSE and time shift between the track and the simulation of an accepted pedestrian."""
 TRIED_SHIFTS_S = np.round(np.arange(-1.0, 1.01, 0.05), 2)
-"""Time shifts at which a track is compared with a simulated pedestrian."""
+"""Time shifts to try between a track and a simulated pedestrian."""
 STEP_S, SMOOTHING_STEPS = 0.1, 5
-"""Time between two positions of a track, and number of steps before and after over which its speed is averaged."""
+"""Time between two positions of a track, and number of steps on each side over which the speed is averaged."""
 MOVING_SPEED_M_S, MIN_STOP_S = 0.2, 1.5
-"""Speed below which a person stands, and duration of the shortest stop that may be a reaction to the robot."""
+"""Speed below which a person stands, and minimum duration of a stop that can be a reaction to the robot."""
 PATH_TOLERANCES_M = (math.inf, 0.6, 0.3)
-"""Largest distances between the track and the straight lines from goal to goal, in the order in which they are tried.
-With the first, the end of the track is the only goal."""
+"""Maximum distances to try between a track and the straight lines from goal to goal; inf: only one goal."""
 MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
-"""Distance from the robot within which a person would evade it, or stop and look at it."""
+"""Distance from the robot within which a person evades the robot, or stops and looks at the robot."""
 MIN_RMSE_DECREASE_M = 0.05
-"""A more complex pedestrian is preferred only if its RMSE is smaller by more than this."""
-GOOD_RMSE_M, HOPELESS_RMSE_M, LOST_M = 0.12, 0.6, 1.2
-"""No other goals or reactions are tried below the first RMSE, and no other speeds above the second. A simulation ends
-if the pedestrian is farther from the track than the third value."""
+"""Minimum decrease of the RMSE for which a more complex pedestrian is preferred."""
+GOOD_RMSE_M, HOPELESS_RMSE_M = 0.12, 0.6
+"""RMSE below which the search for goals and reactions ends, and RMSE above which a person gets no pedestrian."""
+LOST_M = 1.2
+"""Maximum distance between a simulated pedestrian and the track. The simulation ends at a larger distance."""
 SPEED_FACTORS = (0.93, 1.07)
-"""Multiples of the measured speed that are also tried."""
+"""Multiples of the measured speed to try."""
 
 
 @dataclass(frozen=True)
 class _Reaction:
-    """How a person may react to the robot: behavior, its duration in s, and what the person does not see."""
+    """Possible reaction of a person to the robot: behavior, duration in s, and kinds of obstacles that are not seen."""
 
     behavior: Behavior = "regular"
     duration: float = 0.0
@@ -60,7 +60,7 @@ class _Reaction:
 
 
 def fit_pedestrians(objects: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
-    """Return the objects. Those that a pedestrian reproduces have this pedestrian and a name like "person 1"."""
+    """Return the objects. An object to which a pedestrian fits gets this pedestrian and a name such as "person 1"."""
     people = [thing for thing in objects if is_person(thing)]
     if len(people) > MAX_PEOPLE:
         return [*objects]
@@ -72,14 +72,15 @@ def fit_pedestrians(objects: Sequence[FoundObject], trial: PedestrianTrial) -> l
     found = [replace(thing, pedestrian=fitted.get(thing.name)) for thing in objects]
     while any(thing.pedestrian for thing in found):
         found = _simulated_together(found, trial)
-        worst = max(found, key=_error)
-        if _error(worst) <= 1.0:
+        worst = max(found, key=_relative_error)
+        if _relative_error(worst) <= 1.0:
             break
         found = [replace(thing, pedestrian=None) if thing is worst else thing for thing in found]
-    return [*_named(found)]
+    return [*_with_person_names(found)]
 
 
-def _named(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
+def _with_person_names(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
+    """Yield the objects. Objects with a pedestrian are named "person 1", "person 2", …"""
     count = 0
     for thing in found:
         if thing.pedestrian is None:
@@ -90,14 +91,14 @@ def _named(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
             yield replace(thing, name=walker.name, pedestrian=replace(thing.pedestrian, walker=walker))
 
 
-def _error(thing: FoundObject) -> float:
-    """Return the error of an object's pedestrian as a multiple of the largest allowed one; 0 without a pedestrian."""
+def _relative_error(thing: FoundObject) -> float:
+    """Return the error of an object's pedestrian as a multiple of the maximum error; 0 without a pedestrian."""
     pedestrian = thing.pedestrian
     return 0.0 if pedestrian is None else max(pedestrian.rmse / MAX_RMSE_M, pedestrian.time_shift / MAX_TIME_SHIFT_S)
 
 
 def is_person(thing: FoundObject) -> bool:
-    """Return whether size, track length, and speed of an object fit a person who walks."""
+    """Return whether the size, track length, and speed of an object fit a walking person."""
     if not thing.is_moving or thing.is_robot:
         return False
     if thing.is_cylinder:
@@ -109,7 +110,7 @@ def is_person(thing: FoundObject) -> bool:
 
 
 class _Track:
-    """Positions (n, 2) and speeds (n,) of an object at times (n,) every STEP_S."""
+    """Positions (n, 2) in m and speeds (n,) in m/s of an object, sampled every STEP_S."""
 
     def __init__(self, thing: FoundObject) -> None:
         begin, end = thing.keyframes[0][0], thing.keyframes[-1][0]
@@ -131,7 +132,8 @@ class _Track:
         walking = self.speeds[self.speeds > MOVING_SPEED_M_S]
         return float(np.median(walking)) if len(walking) else 0.0
 
-    def at(self, time: float) -> tuple[float, float]:
+    def position_at(self, time: float) -> tuple[float, float]:
+        """Return the position (x, y) in m at a time in s."""
         x, y = (float(np.interp(time, self.times, self.positions[:, axis])) for axis in (0, 1))
         return x, y
 
@@ -139,17 +141,17 @@ class _Track:
 def _fit_pedestrian(
     thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: PedestrianTrial
 ) -> FittedPedestrian | None:
-    """Return the simplest pedestrian that reproduces `thing` while all others move as recorded; None if none does."""
+    """Return the simplest pedestrian that fits `thing` while all others move as recorded; None if none fits."""
     track = _Track(thing)
     distances = trial.robot_distances(track.times, track.positions)
     meets_robot = bool(distances.min() < MEETING_DISTANCE_M)
 
     def is_lost(time: float, position: tuple[float, float]) -> bool:
-        return time > track.times[0] and math.dist(position, track.at(time)) > LOST_M
+        return time > track.times[0] and math.dist(position, track.position_at(time)) > LOST_M
 
     def tried(begin: float, walker: WalkingPedestrian) -> FittedPedestrian:
         walked = trial.simulate([(begin, walker)], people, objects, float(track.times[-1]), is_lost)
-        return _compared(track, begin, walker, *walked[walker.name])
+        return _with_errors(track, begin, walker, *walked[walker.name])
 
     best: FittedPedestrian | None = None
     for reaction in _reactions(track, distances, meets_robot):
@@ -173,7 +175,7 @@ def _better(simple: FittedPedestrian | None, other: FittedPedestrian, margin: fl
 
 
 def _reactions(track: _Track, distances: Array, meets_robot: bool) -> Iterator[_Reaction]:
-    """Yield possible reactions to the robot, the simplest first. `distances` (n,) from the track to it are in m."""
+    """Yield possible reactions to the robot, the simplest first. `distances` (n,) to the robot are in m."""
     yield _Reaction()
     if meets_robot:
         yield _Reaction(blind_to=frozenset({"robots"}))
@@ -187,14 +189,14 @@ def _reactions(track: _Track, distances: Array, meets_robot: bool) -> Iterator[_
 def _walkers(
     thing: FoundObject, track: _Track, reaction: _Reaction, trial: PedestrianTrial
 ) -> Iterator[tuple[float, WalkingPedestrian]]:
-    """Yield pedestrians that may walk along a track, with their times of appearance in s; those with few goals first.
+    """Yield time of appearance in s and pedestrian for each possible walk along a track, walks with few goals first.
 
     Pedestrians start at rest. If the track begins in motion, they appear earlier by the relaxation time.
     """
     radius, walls = body_radius(thing), trial.world.walls
     lead = RELAXATION_TIME_S if track.speeds[0] > MOVING_SPEED_M_S else 0.0
     begin = round(max(0.0, float(track.times[0]) - lead), 2)
-    x, y = track.at(begin + lead)
+    x, y = track.position_at(begin + lead)
     tried: set[tuple[tuple[float, float], ...]] = set()
     for tolerance in PATH_TOLERANCES_M:
         places = [*track.positions[path_corners(track.positions, tolerance)], _last_goal(track, radius, trial)]
@@ -218,16 +220,16 @@ def _walkers(
 
 
 def body_radius(thing: FoundObject) -> float:
-    """Return the body radius in m of the pedestrian for an object."""
+    """Return the radius in m of a pedestrian for an object."""
     if not thing.is_cylinder:
         return LEGS_BODY_RADIUS_M
     return min(max(thing.size[0], MIN_BODY_RADIUS_M), MAX_BODY_RADIUS_M)
 
 
 def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
-    """Return the end (2,) of a track or, if it ends in motion, a point beyond it: pedestrians brake before goals."""
+    """Return the end (2,) of a track, or a point beyond the end if the track ends in motion: pedestrians brake."""
     end: Array = track.positions[-1]
-    motion = end - track.at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
+    motion = end - track.position_at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
     distance = float(np.hypot(*motion))
     if distance < MOVING_SPEED_M_S * SMOOTHING_STEPS * STEP_S:
         return end
@@ -238,7 +240,7 @@ def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
 
 
 def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
-    """Return the objects; their pedestrians have the positions and errors of one simulation of all pedestrians."""
+    """Return the objects with the positions and errors from one simulation of all pedestrians."""
     walkers = [(thing.pedestrian.begin, thing.pedestrian.walker) for thing in found if thing.pedestrian]
     objects = [thing for thing in found if not thing.pedestrian]
     end = max(thing.keyframes[-1][0] for thing in found if thing.pedestrian)
@@ -247,16 +249,16 @@ def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) ->
     for thing in found:
         pedestrian = thing.pedestrian
         if pedestrian is not None:
-            again = _compared(_Track(thing), pedestrian.begin, pedestrian.walker, *paths[thing.name])
+            again = _with_errors(_Track(thing), pedestrian.begin, pedestrian.walker, *paths[thing.name])
             pedestrian = replace(again, meets_robot=pedestrian.meets_robot)
         together.append(replace(thing, pedestrian=pedestrian))
     return together
 
 
-def _compared(
+def _with_errors(
     track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array
 ) -> FittedPedestrian:
-    """Return the pedestrian with the errors of its simulated `positions` (n, 2) at `times` (n,) from the track."""
+    """Return the pedestrian `walker` with the errors of the simulated `positions` (n, 2) at `times` (n,)."""
 
     def rmse(shift: float) -> float:
         at = np.column_stack([np.interp(track.times + shift, times, positions[:, axis]) for axis in (0, 1)])

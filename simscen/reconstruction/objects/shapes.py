@@ -1,4 +1,4 @@
-"""Estimates shape, size, and poses of a tracked object from the parts of it that the lidar saw."""
+"""Estimates the shape, size, and poses of a tracked object from the parts that the lidar saw."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from simscen.reconstruction.objects.clusters import ScanCluster
 from simscen.reconstruction.reasons import windows
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
-"""An object is round if its radius, and the mean distance of its hits from a circle, are at most these."""
+"""Maximum radius of a round object, and maximum mean distance of its hits from a circle."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Upper limit of half the angle that an object covers: at 90°, the radius computed from the angle is infinite."""
+"""Upper limit of half the angle that an object covers, so that the radius computed from this angle is finite."""
 MIN_SIDE_M = 0.1
-"""Shortest side of a box."""
+"""Minimum side of a box."""
 SIZE_PERCENTILE = 90.0
-"""Percentile of the visible sizes in single scans that is taken as the size of a moving box."""
+"""Percentile of the visible sizes in single scans that is used as the size of a moving box."""
 HEADING_SPEED_M_S, HEADING_SPAN_S = 0.25, 0.8
-"""Speed above which the direction of motion is the heading, and time before and after over which it is measured."""
+"""Speed above which the direction of motion is the heading, and time before and after that is used to measure it."""
 MIN_STAND_S = 1.5
-"""An object stands if it is slower than HEADING_SPEED_M_S for at least this time."""
+"""Minimum time with a speed below HEADING_SPEED_M_S of an object that stands."""
 SMOOTHING_SCANS = 5
 """Number of scans over which positions are smoothed."""
 TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
-"""Orientations that are tried for the rectangle around a standing object."""
+"""Orientations to try for the rectangle around a standing object."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,9 @@ class ObjectShape:
 
 
 def fit_shape(clusters: list[ScanCluster], is_moving: bool) -> ObjectShape:
-    """Return the shape of an object, with a pose for each of its clusters. If it does not move, all poses are equal."""
+    """Return the shape of an object with a pose for each cluster. All poses of a standing object are equal."""
     times = np.array([cluster.time for cluster in clusters])
-    radius, error = _radius(clusters)
+    radius, error = _fit_cylinder(clusters)
     if radius <= MAX_ROUND_RADIUS_M and error <= MAX_ROUND_ERROR_M:
         centers = np.array([_circle_center(cluster, radius) for cluster in clusters])
         if not is_moving:
@@ -56,7 +56,7 @@ def fit_shape(clusters: list[ScanCluster], is_moving: bool) -> ObjectShape:
     return _moving_box(clusters, times) if is_moving else _standing_box(clusters, times)
 
 
-def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
+def _fit_cylinder(clusters: list[ScanCluster]) -> tuple[float, float]:
     """Return radius and mean error in m of the cylinder that fits the fully visible clusters; inf for few clusters."""
     whole = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
     if len(whole) < 3:
@@ -70,14 +70,14 @@ def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
 
 
 def _radius_of(cluster: ScanCluster) -> float:
-    """Return the radius in m of a circle that has the nearest hit of a cluster and covers the same angle."""
+    """Return the radius in m of the circle through the nearest hit of a cluster that covers the cluster's angle."""
     near = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
     sine = math.sin(min(cluster.angle / 2, MAX_HALF_ANGLE_RAD))
     return near * sine / (1.0 - sine)
 
 
 def _circle_center(cluster: ScanCluster, radius: float) -> Array:
-    """Return the center (2,) of a circle with this `radius` that fits the hits, in their mean direction."""
+    """Return the center (2,) of the circle with this radius that fits the hits, in the mean direction of the hits."""
     offsets = cluster.points - cluster.lidar
     distance = np.hypot(*offsets.T)
     middle = (offsets / distance[:, None]).mean(axis=0)
@@ -90,7 +90,7 @@ def _circle_center(cluster: ScanCluster, radius: float) -> Array:
 
 
 def _moving_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
-    """Return a box whose heading is its direction of motion; headings, size, and centers are refined three times."""
+    """Return a box whose heading is the direction of motion. Headings, size, and centers are refined three times."""
     centers = np.array([cluster.center for cluster in clusters])
     yaw, size = np.zeros(len(times)), np.zeros(2)
     for _ in range(3):
@@ -98,13 +98,13 @@ def _moving_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
         low, high = _extents(clusters, yaw)
         sizes = (high - low)[is_moving] if int(is_moving.sum()) >= SMOOTHING_SCANS else high - low
         size = np.maximum(np.percentile(sizes, SIZE_PERCENTILE, axis=0), MIN_SIDE_M)
-        centers = _anchored(clusters, yaw, low, high, size)
-    poses = np.column_stack((_at_rest(times, _smoothed(centers), is_moving), yaw))
+        centers = _box_centers(clusters, yaw, low, high, size)
+    poses = np.column_stack((_constant_at_rest(times, _smoothed(centers), is_moving), yaw))
     return ObjectShape((round(float(size[0]), 2), round(float(size[1]), 2)), times, poses)
 
 
-def _at_rest(times: Array, centers: Array, is_moving: Mask) -> Array:
-    """Return `centers` (n, 2), which become constant in each time in which the object stands (`is_moving` is false)."""
+def _constant_at_rest(times: Array, centers: Array, is_moving: Mask) -> Array:
+    """Return `centers` (n, 2) with a constant center in each time window in which the object stands."""
     result: Array = centers.copy()
     for rest in windows(~is_moving, times, MIN_STAND_S):
         result[rest.samples] = np.median(centers[rest.samples], axis=0)
@@ -149,9 +149,9 @@ def _orientation(points: Array) -> float:
 
 
 def _headings(times: Array, centers: Array) -> tuple[Array, Mask]:
-    """Return at each time the heading (n,) in rad, and whether the object moves (n,).
+    """Return the heading (n,) in rad at each time, and a mask (n,) of the times at which the object moves.
 
-    While the object stands, it keeps its last heading. Until it moves, it has the first heading of its motion.
+    A standing object keeps its last heading. Before the first motion, it has the heading of the first motion.
     """
     before = np.maximum(np.searchsorted(times, times - HEADING_SPAN_S), 0)
     after = np.minimum(np.searchsorted(times, times + HEADING_SPAN_S), len(times) - 1)
@@ -168,7 +168,7 @@ def _headings(times: Array, centers: Array) -> tuple[Array, Mask]:
 
 
 def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
-    """Return the smallest and largest coordinates (n, 2) of each cluster's hits, along and across its heading (n,)."""
+    """Return the lowest and the highest coordinates (n, 2) of the hits of each cluster, along and across `yaw` (n,)."""
     low, high = np.empty((len(clusters), 2)), np.empty((len(clusters), 2))
     for index, cluster in enumerate(clusters):
         c, s = math.cos(yaw[index]), math.sin(yaw[index])
@@ -177,7 +177,7 @@ def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _anchored(clusters: list[ScanCluster], yaw: Array, low: Array, high: Array, size: Array) -> Array:
+def _box_centers(clusters: list[ScanCluster], yaw: Array, low: Array, high: Array, size: Array) -> Array:
     """Return the centers (n, 2) of boxes with this `size` (2,) whose faces toward the lidar are at the hits.
 
     `low` and `high` (n, 2) are the extents of the hits along and across the headings `yaw` (n,).

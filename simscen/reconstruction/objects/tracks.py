@@ -1,4 +1,4 @@
-"""Tracks objects: assigns the clusters of successive scans that belong to the same object to one track."""
+"""Object tracking: assigns the clusters of successive scans to tracks, one track for each object."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_CENTER_DISTANCE_M = 2.5
-"""A cluster does not belong to a track if its center is farther from the predicted center."""
+"""Maximum distance between the center of a cluster and the center that the track predicts."""
 GATE_M, GATE_M_S = 0.25, 0.8
-"""Maximum distance between a track and its next cluster: fixed, and per second since the last cluster."""
+"""Maximum distance between a track and its next cluster: constant, and per second since the last cluster."""
 MAX_UNSEEN_S = 2.0
-"""Time without a cluster after which a track ends."""
+"""Maximum time without a cluster in a track."""
 CENTER_WEIGHT = 0.3
-"""Weight of the distance between centers, relative to that between hits, in the distance of a cluster from a track. It
-is low because the center depends on which part of the object is visible."""
+"""Weight of the distance between centers, relative to the distance between hits, in the distance of a cluster from a
+track."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
 """Number of clusters from which the velocity is computed, and upper limit of the speed."""
 MOVING_SPEED_M_S = 0.3
-"""A hidden object with a lower speed may also have stopped where it was last seen."""
+"""Speed below which a hidden object may also have stopped where it was last seen."""
 MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
-"""Smallest number of clusters, and shortest duration, of a track."""
+"""Minimum number of clusters, and minimum duration, of a track."""
 MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5
-"""Longest time for which an object may be hidden, and largest distance from its predicted position at which it may
-reappear: fixed, and per second hidden."""
+"""Maximum time for which an object is hidden, and maximum distance between its predicted position and the position
+where it reappears: constant, and per second hidden."""
 
 
 @dataclass(eq=False)
 class ObjectTrack:
-    """Clusters of one object in order of time, and its velocity (2,) in m/s at the last one."""
+    """Clusters of one object in order of time, and velocity (2,) in m/s at the last cluster."""
 
     clusters: list[ScanCluster] = field(default_factory=list)
     velocity: Array = field(default_factory=lambda: np.zeros(2))
@@ -59,7 +59,7 @@ class ObjectTrack:
             self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
 
     def distance_to(self, cluster: ScanCluster) -> float:
-        """Return the distance in m of a cluster from the hits and center that the track predicts; inf if it is far."""
+        """Return the distance in m between a cluster and the prediction of the track; inf if their centers are far."""
         last = self.clusters[-1]
         predicted = last.points + self.velocity * (cluster.time - last.time)
         if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:
@@ -71,7 +71,7 @@ class ObjectTrack:
 
 
 def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
-    """Return the tracks of all objects that were seen often enough in `scans`, the clusters of each scan."""
+    """Return the tracks of objects. `scans` are the clusters of each scan. Short tracks are omitted."""
     active: list[ObjectTrack] = []
     done: list[ObjectTrack] = []
     for clusters in scans:
@@ -83,11 +83,11 @@ def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
         _associate(active, clusters)
     tracks = [track for track in (*done, *active) if len(track.clusters) >= MIN_CLUSTERS]
     tracks = [track for track in tracks if track.end - track.begin >= MIN_TRACK_S]
-    return _linked(sorted(tracks, key=lambda track: (track.begin, *track.clusters[0].center.tolist())))
+    return _link_tracks(sorted(tracks, key=lambda track: (track.begin, *track.clusters[0].center.tolist())))
 
 
 def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
-    """Add each cluster of a scan to the nearest of the `active` tracks, nearest pairs first, or append a new track."""
+    """Add each cluster of a scan to the nearest of the `active` tracks (nearest pairs first), or append a new track."""
     pairs = []
     for number, track in enumerate(active):
         for index, cluster in enumerate(clusters):
@@ -108,8 +108,8 @@ def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
             active.append(track)
 
 
-def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
-    """Return the tracks; those of one object before and after it was hidden become one."""
+def _link_tracks(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
+    """Merge the tracks of an object before and after it was hidden."""
     linked: list[ObjectTrack] = []
     for track in tracks:
         before = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]
@@ -123,7 +123,7 @@ def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
 
 
 def _link_distance(before: ObjectTrack, after: ObjectTrack) -> float | None:
-    """Return how far in m a track starts from where an earlier one leads; None if that is too far or too late."""
+    """Return the distance in m between the start of `after` and the prediction of `before`; None if not linkable."""
     gap = after.begin - before.end
     if not 0.0 < gap <= MAX_LINK_S:
         return None

@@ -20,23 +20,23 @@ from simscen.reconstruction.scenario.scenario_text import ScenarioContents, Scen
 INVALID_GOAL_CODES = frozenset({"GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP"})
 """Error codes of goals that no robot can reach. The scenario expects these errors."""
 TIMEOUT_CODE = "NAVIGATE_TIMEOUT"
-"""Error code of a goal that was not reached within its timeout, so that the timeout is known."""
+"""Error code of a goal that was not reached within its timeout."""
 MAX_REFUSAL_S = 1.0
-"""Time within which a robot refuses a goal that cannot be reached. Later failures have other causes."""
+"""Maximum time until a robot refuses a goal that cannot be reached."""
 MIN_WAIT_S = 0.3
 """Minimum time between a result and the next goal that counts as a wait at the goal."""
 MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
-"""Shortest timeout of a goal, and ratio of the timeout to the time that the robot took."""
+"""Minimum timeout of a goal, and ratio of the timeout to the recorded time."""
 UNFINISHED_TIMEOUT_FACTOR = 1.1
 """Ratio of the timeout to the recorded time, for a goal that was active when the log ended."""
 MAX_TIME_LIMIT_S = 8000.0
-"""Longest time limit of the scenario."""
+"""Maximum time limit of the scenario."""
 RADIUS_STEP_M = 0.05
-"""The distance at which goals count as passed is rounded up to a multiple of this."""
+"""Step to which the distance at which goals count as passed is rounded up."""
 NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
-"""If the first belief has smaller errors than these, the scenario has the default initial estimate."""
+"""Maximum errors of the first belief with which the scenario has the default initial estimate."""
 UNKNOWN_START_STD_M = 1.5
-"""If the first belief has a larger standard deviation, the localizer did not know where the robot started."""
+"""Maximum standard deviation of the first belief of a localizer that knew where the robot started."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class EstimatedParts:
     """Parts of the scenario that the estimators found in a drive.
 
     `kidnaps` are the time in s, the new pose in the map frame, and the reason of each kidnapping. `unknowns` are
-    phrases about what the log does not show.
+    phrases about information that the log does not contain.
     """
 
     incidents: Sequence[Incident]
@@ -58,7 +58,7 @@ class EstimatedParts:
 class GivenParts:
     """Parts of the scenario that are not estimated: values of the keys `world`, `map`, `robot`, `seed`, and `stack`.
 
-    `reasons` are the reasons by key. `unknowns` are phrases about what the log does not show.
+    `reasons` are the reasons by key. `unknowns` are phrases about information that the log does not contain.
     """
 
     world: str | Mapping[str, Any]
@@ -73,7 +73,7 @@ class GivenParts:
 def scenario_contents(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, source: str
 ) -> ScenarioContents:
-    """Return the contents of a scenario file with the name `name`; `source` is the name of the log."""
+    """Return the contents of the scenario file of the scenario `name`. `source` is the name of the log."""
     start = Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
     estimate, estimate_reason = _estimate(drive, start, bool(given.map == "none"))
     goals = [*_goals(drive)]
@@ -115,8 +115,7 @@ def scenario_contents(
 def passing_radius(drive: RecordedDrive) -> float | None:
     """Return the distance in m at which goals counted as passed; None if the robot passed no goal without a stop.
 
-    A robot passes a goal in the first control step in which its estimated pose is within this distance. All recorded
-    distances are therefore a little too small, and the largest one is rounded up.
+    The result is the largest distance between a passed goal and the estimated pose at this time, rounded up.
     """
     passed = [goal for goal in drive.goals if goal.status == "passed" and goal.ended is not None]
     distances = [_believed_pose(drive, goal.ended or 0.0).distance(goal.pose) for goal in passed]
@@ -124,7 +123,7 @@ def passing_radius(drive: RecordedDrive) -> float | None:
 
 
 def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
-    """Return the pose that the robot estimated at a time in s; the best known pose if the log does not contain it."""
+    """Return the robot's estimate of its pose at a time in s; the best known pose if the log has no estimates."""
     at = np.array([time])
     if not len(drive.corrections) or not len(drive.odometry):
         return Pose2(*drive.poses.poses_at(at)[0].tolist())
@@ -135,7 +134,7 @@ def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
 def _estimate(
     drive: RecordedDrive, start: Pose2, is_mapless: bool
 ) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Reason | None]:
-    """Return the initial estimate of the localizer and the reason for it; None for both if it is the default.
+    """Return the initial estimate of the localizer and its reason; (None, None) for the default estimate.
 
     The estimate is "unknown", or a pose with the standard deviations of x, y (m), and yaw (rad).
     """
@@ -155,6 +154,7 @@ def _estimate(
 
 
 def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
+    """Yield the goals of the scenario with unique names."""
     taken: set[str] = set()
     for number, goal in enumerate(drive.goals):
         name = goal.name.replace("#", " loop ") or f"goal-{number + 1}"
@@ -178,6 +178,7 @@ def _goal_reason(goal: RecordedGoal) -> Reason:
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
+    """Return the timeout of a goal in s. `duration` is the duration of the drive in s."""
     if goal.ended is not None and goal.error == TIMEOUT_CODE:
         return goal.ended - goal.sent
     if goal.ended is None:
@@ -186,6 +187,7 @@ def _timeout(goal: RecordedGoal, duration: float) -> float:
 
 
 def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
+    """Return the time in s that the robot waits at a goal before the following goal."""
     if following is None or goal.ended is None or goal.status not in ("reached", "unknown"):
         return 0.0
     gap = following.sent - goal.ended
@@ -193,6 +195,7 @@ def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
 
 
 def _summary(drive: RecordedDrive, estimated: EstimatedParts) -> Iterator[str]:
+    """Yield sentences about the drive and its incidents."""
     yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
     for incident in estimated.incidents:
         x, y = incident.position

@@ -1,4 +1,4 @@
-"""Proposes criteria for a scenario: limits that the drive met, with a margin, and limits that an incident violated."""
+"""Proposes criteria for a scenario: limits that the drive met with a margin, and limits that an incident violated."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Inc
 TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
 """Ratios of the limits of time, path length, and localization error to the values in the drive."""
 MIN_ERROR_LIMIT_M, MIN_TIME_LIMIT_S = 0.25, 10.0
-"""Smallest limits of the localization error and of the time to the goal."""
+"""Minimum limits of the localization error and of the time to the goal."""
 MIN_STEP_M = 0.01
-"""Shorter moves do not count for the length of a path, as in the criterion path_length."""
+"""Minimum move that counts for the length of a path, as in the criterion path_length."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
-"""Percentile of the speeds that counts as the highest one, because odometry is noisy, and ratio of the limit to it."""
+"""Percentile that is used as the maximum of the noisy speeds, and ratio of the speed limit to this maximum."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
-"""Ratio of the limit to the measured time to stop, and longest time in which a stop is a reaction to a fault."""
+"""Ratio of the limit to the measured time to stop, and maximum time between a fault and a stop as a reaction."""
 REST_SPEED_M_S = 0.01
-"""The robot rests below this speed in m/s, and below the same turn rate in rad/s."""
+"""Speed in m/s, and turn rate in rad/s, below which the robot is at rest."""
 NO_SENSORS = ("cmd_vel", "wheels", "localizer")
-"""Targets of faults that are no sensors: the robot need not stop if they fail."""
+"""Targets of faults that are no sensors."""
 
 
 @dataclass(frozen=True)
 class ProposedCriterion:
-    """Criterion of the scenario language: its key, its parameters by key, and the reason for its limit."""
+    """Criterion for the scenario: YAML key, parameters by YAML key, and reason for the limit."""
 
     kind: str
     values: Mapping[str, object]
@@ -41,7 +41,7 @@ class ProposedCriterion:
 def propose_criteria(
     drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], is_refusal_expected: bool
 ) -> Iterator[ProposedCriterion]:
-    """Yield criteria for a drive. `is_refusal_expected` tells whether all goals must fail as soon as they are sent."""
+    """Yield criteria for a drive. `is_refusal_expected` states that the robot must refuse all goals."""
     broken = {incident.criterion: incident for incident in incidents}
     if drive.goals:
         yield ProposedCriterion("goals_reached", {}, _limit_reason(broken, "goals_reached", "all goals were reached"))
@@ -68,7 +68,7 @@ def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
 
 
 def _limit_reason(broken: Mapping[str, Incident], criterion: str, held: str) -> Reason:
-    """Return the incident that broke a criterion as a reason, or else the text `held`."""
+    """Return the incident that violated the criterion as a reason, or the text `held` if there is none."""
     incident = broken.get(criterion)
     if incident is None:
         return Reason(f"held: {held}")
@@ -76,6 +76,7 @@ def _limit_reason(broken: Mapping[str, Incident], criterion: str, held: str) -> 
 
 
 def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
+    """Return a limit for the localization error. `broken` are the incidents by violated criterion."""
     errors = np.hypot(*(drive.belief.values[:, :2] - drive.poses.poses_at(drive.belief.times)[:, :2]).T)
     largest = float(errors.max())
     limit = LOST_ERROR_M if "localization_error" in broken else max(MIN_ERROR_LIMIT_M, ERROR_MARGIN * largest)
@@ -86,6 +87,7 @@ def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> Propo
 
 
 def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
+    """Yield limits for the time to the goal and for the path length."""
     if not drive.goals or drive.goals[-1].ended is None:
         return
     took = drive.goals[-1].ended - drive.goals[0].sent
@@ -98,7 +100,7 @@ def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
 
 
 def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
-    """Yield a limit for the time to stop after the first outage of a sensor to which the robot reacted with a stop."""
+    """Yield a limit for the time to stop after a sensor outage, if the robot stopped after an outage."""
     for fault in faults:
         if fault.kind != "off" or fault.target in NO_SENSORS or fault.begin is None or fault.duration is None:
             continue
@@ -118,7 +120,7 @@ def time_to_rest(drive: RecordedDrive, begin: float, end: float) -> float | None
 
 
 def path_length(positions: Array) -> float:
-    """Return the length in m of the path through positions (n, 2), in moves of at least MIN_STEP_M."""
+    """Return the length in m of the path through positions (n, 2), without moves shorter than MIN_STEP_M."""
     if not len(positions):
         return 0.0
     length, last = 0.0, positions[0]

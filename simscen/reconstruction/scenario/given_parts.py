@@ -1,4 +1,4 @@
-"""Chooses world, map, robot, and stack: from the user's options, else the log header, else the messages of the log."""
+"""Chooses world, map, robot, and stack from the user's options, the log header, or the messages, in this order."""
 
 from __future__ import annotations
 
@@ -29,18 +29,21 @@ from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Height of the plane in which the walls of the world are seen, for a log without scans."""
+"""Assumed height of the lidar for a log without scans."""
 WALL_MARGIN_M = 0.05
-"""Amount by which a wall can be nearer than the center of its map cell."""
+"""Maximum distance between a wall and the center of its map cell."""
 NOISE_SCANS = 100
-"""For computing the noise of a lidar, the scans are thinned out evenly to at least this number."""
+"""Minimum number of scans from which the noise of a lidar is computed. At most twice as many scans are used."""
 MAX_EQUAL_MAP_DIFFERENCE = 0.002
-"""Largest fraction of cells in which two maps of the same world may differ."""
+"""Maximum fraction of different cells in two maps of the same world."""
 
 
 @dataclass(frozen=True)
 class GivenFiles:
-    """World, map, and robot that the user names; they replace those of the log. `robot` is a file or a name."""
+    """World, map, and robot from the user's options, which replace those in the log.
+
+    `robot` is a robot file, the name of a shipped robot, or the name of a robot in the log; "" for none.
+    """
 
     world: Path | None = None
     map: Path | None = None
@@ -49,10 +52,11 @@ class GivenFiles:
 
 @dataclass
 class WorldChoice:
-    """World and map of the scenario, each with its reason.
+    """World and map of the scenario, with reasons.
 
-    `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` tells whether the walls
-    were built from the scans of the log. `files` were written beside the scenario.
+    `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` states that the walls
+    were built from the scans. `unknowns` are phrases about missing information. `files` were written next to the
+    scenario.
     """
 
     written: str | Mapping[str, Any]
@@ -66,7 +70,7 @@ class WorldChoice:
 
 
 def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return the world and the map of the scenario file `out`, and write beside it those that need a new file.
+    """Return the world and the map for the scenario file `out`, and write new world and map files next to `out`.
 
     Raises InvalidInput for an unusable file, and OSError if a file cannot be written.
     """
@@ -94,7 +98,7 @@ def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFi
 
 
 def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return a world whose walls are those of a map: the given map, the map in the log, or one built from the scans."""
+    """Return a world with the walls of the given map, of the map in the log, or of a map built from the scans."""
     if files.map is not None:
         loaded = load_world_file(files.map, default_root([files.map]))
         if loaded.map is None:
@@ -124,6 +128,7 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
 
 
 def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
+    """Return the world in `file`, and copy the file next to `out` if it is outside of the scenario's root folder."""
     root = default_root([file])
     loaded = load_world_file(file, root)
     out_root = default_root([out])
@@ -139,7 +144,7 @@ def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
-    """Return whether the robot's map `given` has other walls than the map that is `drawn` from the world."""
+    """Return whether the walls of the robot's map `given` differ from the map `drawn` from the world."""
     if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
         return True
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
@@ -153,7 +158,7 @@ def prepare_given_parts(
     out: Path,
     static_world: StaticWorld,
 ) -> GivenParts:
-    """Return the parts of the scenario that are not estimated. Write a robot file if neither user nor log names one."""
+    """Return the parts of the scenario that are not estimated. Write a robot file if user and log name no robot."""
     reasons = {"world": choice.reason}
     if choice.map_reason is not None:
         reasons["map"] = choice.map_reason
@@ -183,7 +188,7 @@ def prepare_given_parts(
 
 
 def _lidar_noise(drive: RecordedDrive, static_world: StaticWorld) -> float:
-    """Return the median standard deviation of the range noise in m; the typical one without scans."""
+    """Return the median standard deviation of the range noise in m; the value of a typical robot without scans."""
     if drive.scans is None or len(drive.scans) < 3:
         return TYPICAL_ROBOT.lidar_noise
     return float(np.median(compare_scans(drive, drive.scans.thinned(NOISE_SCANS), static_world).noise))
@@ -195,4 +200,5 @@ def relative_path(file: Path, out: Path) -> str:
 
 
 def _stem(out: Path) -> str:
+    """Return the file name without the extension `.scenario.yaml`."""
     return out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")

@@ -13,13 +13,13 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValu
 from simscen.reconstruction.reasons import windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
-"""A robot with a goal is stuck if it stays within this radius for this time, as in Nav2's progress checker."""
+"""Radius and minimum duration of the stay of a stuck robot with a goal, as in Nav2's progress checker."""
 MAX_COMMAND_HOLD_S = 0.5
-"""A command counts for at most this time, because bases stop if no new one arrives."""
+"""Maximum time for which a base executes a command if no new command arrives."""
 LOST_ERROR_M = 0.5
 """Localization error above which the robot is lost."""
 MAX_STD_M = 1.0
-"""Standard deviation of the believed position above which the robot is lost, for logs without a ground truth."""
+"""Standard deviation of the estimated position above which the robot is lost, for logs without a ground truth."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Incident:
 
     Attributes:
         kind: "contact", "stuck", "lost", "failed goal", or "unfinished goal".
-        time: Time in s at which it began.
-        position: Position (x, y) of the robot at this time, in the map frame.
-        detail: What happened, in words.
-        criterion: Name of the criterion that it violates.
+        time: Start in s.
+        position: Position (x, y) of the robot in m in the map frame at this time.
+        detail: Description of the incident.
+        criterion: Name of the criterion that the incident violates.
     """
 
     kind: str
@@ -53,7 +53,7 @@ def _position(drive: RecordedDrive, time: float) -> tuple[float, float]:
 
 
 def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield an incident for each time in which the bumper was pressed."""
+    """Yield an incident for each time window in which the bumper was pressed."""
     for pressed in windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
         detail = f"the bumper was pressed for {max(pressed.length, 0.05):.2f} s"
         yield Incident("contact", pressed.begin, _position(drive, pressed.begin), detail, "collisions")
@@ -62,8 +62,7 @@ def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
 def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
     """Yield the longest standstill on the way to each goal if it lasts longer than STUCK_S.
 
-    At a goal that is only derived from a stop, the robot may wait or be parked. There, a standstill is an incident only
-    if the robot was commanded to drive.
+    If the goal was derived from the driven path, the robot must also have been commanded to drive away.
     """
     for goal in drive.goals:
         end = drive.duration if goal.ended is None else goal.ended
@@ -77,7 +76,7 @@ def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
 
 
 def _is_commanded_to_leave(commands: TimedValues, begin: float, end: float) -> bool:
-    """Return whether all commands together would have moved the robot out of the circle in which it stayed."""
+    """Return whether the commands between two times in s would have moved the robot out of the circle of its stay."""
     inside = (commands.times >= begin) & (commands.times <= end)
     held = np.minimum(np.diff(commands.times[inside], append=end), MAX_COMMAND_HOLD_S)
     return float(np.hypot(*(commands.values[inside, :2].T @ held))) > 2 * STUCK_RADIUS_M
@@ -86,7 +85,7 @@ def _is_commanded_to_leave(commands: TimedValues, begin: float, end: float) -> b
 def longest_stay(times: Array, positions: Array, radius: float) -> tuple[float, float]:
     """Return start and duration in s of the longest stay within `radius` m of a position; (0, 0) without positions.
 
-    `positions` (n, 2) are those at `times` (n,) in s.
+    `positions` is (n, 2) in m, `times` is (n,) in s.
     """
     best, begin = 0.0, 0.0
     at = 0
@@ -103,7 +102,7 @@ def longest_stay(times: Array, positions: Array, radius: float) -> tuple[float, 
 
 
 def _lost(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield an incident for each time in which the belief was wrong or, without a ground truth, uncertain."""
+    """Yield an incident for each time window in which the belief was wrong or, without a ground truth, uncertain."""
     if not len(drive.belief):
         return
     belief = drive.belief

@@ -1,4 +1,4 @@
-"""Reads properties of a robot from its robot file, or writes a robot file with what the log shows of the robot."""
+"""Reads properties of a robot from a robot file, or writes a robot file from the log of a robot."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class RobotProperties:
         lidar_noise: Standard deviation of the lidar's ranges in m.
         radius: Radius in m of the circle around the footprint.
         wheel_separation: Distance in m between left and right wheels.
-        skids: Whether the wheels skid sideways in turns, as those of a skid-steer robot do.
-        sensors: Name in the robot file of each sensor "lidar", "odom", or "imu"; empty if the file is unknown.
-        is_known: Whether the properties are those of the recorded robot; otherwise they are those of a typical one.
+        skids: Whether the robot is a skid-steer robot, whose wheels skid sideways in turns.
+        sensors: Names in the robot file of the sensors "lidar", "odom", and "imu"; empty if the file is unknown.
+        is_known: Whether the properties are from the file of the recorded robot.
     """
 
     lidar_noise: float = 0.01
@@ -43,13 +43,13 @@ TYPICAL_ROBOT = RobotProperties()
 """Properties that are assumed for a robot without a usable robot file."""
 
 
-def robot_properties(written: str, folder: Path, is_known: bool) -> RobotProperties:
-    """Return the properties of the robot file or shipped robot `written`; the typical ones if it cannot be loaded.
+def robot_properties(robot: str, folder: Path, is_known: bool) -> RobotProperties:
+    """Return the properties of a robot file or shipped robot; TYPICAL_ROBOT if it cannot be loaded.
 
-    `folder` is the folder of the scenario. `is_known` tells whether the file describes the recorded robot.
+    `folder` is the folder of the scenario. `is_known` states that the file describes the recorded robot.
     """
-    file = folder / written
-    name = str(file) if file.is_file() else written
+    file = folder / robot
+    name = str(file) if file.is_file() else robot
     try:
         spec = load_robot_file(name, default_root([file if file.is_file() else folder / "x"])).robot.spec
     except SimscenError:
@@ -71,26 +71,26 @@ def robot_properties(written: str, folder: Path, is_known: bool) -> RobotPropert
 TICK_RATE_HZ = 240
 """Default tick rate of scenarios, which must be a multiple of the sensor rates."""
 DEFAULT_RADIUS_M, MIN_RADIUS_M = 0.22, 0.1
-"""Assumed radius of a robot with unknown footprint, and lower limit of this radius if it drove close to walls."""
+"""Assumed radius of a robot with unknown footprint, and minimum radius of a robot that drove close to walls."""
 DEFAULT_MASS_KG, DEFAULT_ACCELERATION_M_S2, DEFAULT_TURN_ACCELERATION_RAD_S2 = 5.0, 1.0, 3.2
-"""Assumed mass and accelerations, which a log does not show."""
+"""Assumed mass and accelerations."""
 BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
-"""Assumed heights of the body, and smallest height of a lidar, which must be above the body."""
+"""Assumed heights of the top and bottom of the body, and minimum height of a lidar."""
 WHEEL_RADIUS_M, SEPARATION_PER_HALF_WIDTH = 0.033, 1.3
-"""Assumed radius of the wheels, and ratio of their separation to half the width of the robot."""
+"""Assumed radius of the wheels, and ratio of the wheel separation to half the width of the robot."""
 VELOCITY_STEP_S = 0.25
 """Time over which velocities are averaged, if only poses are known."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
-"""Percentile of the speeds that counts as the highest one, because odometry is noisy, and ratio of the limit to it."""
+"""Percentile that is used as the maximum of the noisy speeds, and ratio of the speed limit to this maximum."""
 MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
-"""Lower limits of the speed limits, for a robot that hardly moves."""
+"""Minimum of the speed limits, for a robot that hardly moves."""
 MAX_BEAMS = 4096
-"""Largest number of beams of a lidar that robot files allow."""
+"""Maximum number of beams of a lidar in a robot file."""
 
 
 @dataclass(frozen=True)
 class WrittenRobot:
-    """Written robot file, with the reason for its content and phrases about what the log does not show of the robot."""
+    """Written robot file, reason for its content, and phrases about properties of the robot that the log lacks."""
 
     file: Path
     reason: str
@@ -98,10 +98,10 @@ class WrittenRobot:
 
 
 def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clearance: float) -> WrittenRobot:
-    """Write a robot file with what a drive shows of its robot.
+    """Write a robot file with the properties of the robot in a drive.
 
     `lidar_noise` is the standard deviation of the ranges in m. `clearance` is the smallest distance in m between the
-    origin of the base and a wall, which limits the radius of the robot.
+    origin of the base and a wall, and limits the radius of the robot.
     """
     speed, turn_rate = observed_limits(drive)
     unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
@@ -142,9 +142,9 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
 
 
 def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
-    """Return limits for the speed in m/s and the turn rate in rad/s: the highest of the drive, with a margin.
+    """Return limits for the speed in m/s and the turn rate in rad/s: the maximum in the drive, with a margin.
 
-    They are computed from odometry and commands; from the poses if the log has neither.
+    Speeds are from odometry and commands, or from the poses if the log has neither.
     """
     speeds = _largest(drive.odometry, 3), _largest(drive.commands, 0)
     turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
@@ -157,6 +157,7 @@ def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
 
 
 def _largest(signal: TimedValues, column: int) -> float:
+    """Return the SPEED_PERCENTILE of the absolute values in a column; 0 without values."""
     return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
 
 
@@ -199,7 +200,7 @@ def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
 
 
 def _rate(times: Array, usual: float) -> float:
-    """Return the divisor of the tick rate, in Hz, nearest to the rate of a signal; to `usual` if it has no rate."""
+    """Return the divisor of the tick rate nearest to the rate of a signal, or to `usual` without a rate, in Hz."""
     measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else usual
     divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
     return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

@@ -1,4 +1,4 @@
-"""Formats a reconstructed scenario as YAML, with a comment for each part that gives the reason for it."""
+"""Formats a reconstructed scenario as YAML, with a comment that gives the reason for each part."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from simscen.reconstruction.scenario.criteria import ProposedCriterion
 MAX_COLUMNS = 118
 """Maximum length of a line."""
 OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
-"""Assumed heights of objects and people, which a planar lidar does not see."""
+"""Assumed heights of objects and people."""
 NO_BREAK_SPACE = "\x00"
 """Placeholder for a space at which lines must not be broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
@@ -32,7 +32,7 @@ _PLAIN = re.compile(r"[\w./ %-]+")
 class ScenarioGoal:
     """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
 
-    `expect` is the name of the error code with which the goal must fail, "" if it must be reached.
+    `expect` is the name of the error code with which the goal must fail; "" if the robot must reach the goal.
     """
 
     name: str
@@ -53,16 +53,16 @@ class ScenarioContents:
         world: World file, or an inline world.
         map: Map file or "none"; "" for the map of the world.
         robot: Robot file or name of a shipped robot.
-        start: Pose in the map frame at which the robot really starts.
-        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" if the localizer does
-            not know where the robot is; None for the default.
+        start: True initial pose of the robot in the map frame.
+        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" for global
+            localization; None for the default.
         passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
         goals: Goals in the order in which they are sent.
         stops_at_failure: Whether the run ends at the first failed goal.
         objects: Objects and pedestrians that the scenario spawns.
         kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
-        reasons: Reasons by key of the scenario, for parts without a reason of their own.
-        unknowns: Phrases about what the log does not show.
+        reasons: Reasons for world, map, robot, start, estimate, stack, and navigation, by key.
+        unknowns: Phrases about information that the log does not contain.
     """
 
     name: str
@@ -137,6 +137,7 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
 
 
 def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
+    """Return a wrapped YAML comment. `hanging` is the indentation of further lines."""
     return textwrap.wrap(
         text,
         MAX_COLUMNS,
@@ -148,6 +149,7 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
 
 
 def _reason(contents: ScenarioContents, key: str) -> list[str]:
+    """Return the reason for a key as a comment; [] if there is none."""
     reason = contents.reasons.get(key)
     return [] if reason is None else _comment(reason.comment)
 
@@ -263,7 +265,7 @@ def _pose(pose: Pose2) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a string as a YAML scalar, with quotes if it is not plain in flow style."""
+    """Return a string as a YAML scalar, with quotes if flow style requires them."""
     plain = to_yaml({"x": text}).removeprefix("x: ").rstrip("\n")
     return plain if _PLAIN.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
 

@@ -19,18 +19,18 @@ from simscen.record.mcap_reader import attached_result
 STEP_S = 0.1
 """Time between two compared positions."""
 SAME_POSITION_M = 0.3
-"""Scans of both drives are compared if the robots are nearer to each other than this."""
+"""Maximum distance between both robots at which their scans are compared."""
 SAME_RANGE_M = 0.2
 """Maximum difference between two ranges that count as equal."""
 MIN_SCANS = 3
-"""Number of scans that must show a range at most this long, because a single one may be an error."""
+"""Minimum number of scans with a range at most as long as the nearest return of a drive."""
 MAX_INCIDENT_DISTANCE_M, MAX_INCIDENT_TIME_S = 1.0, 5.0
-"""Distance and time within which an incident of the same kind counts as the same incident."""
+"""Maximum distance and time between two incidents of the same kind that count as the same incident."""
 
 
 @dataclass(frozen=True)
 class ComparedQuantity:
-    """One row of the comparison as texts: a quantity, its values in log and run, and their difference."""
+    """Row of the comparison as text: name of a quantity, values in log and run, and difference."""
 
     name: str
     log: str
@@ -40,21 +40,21 @@ class ComparedQuantity:
 
 @dataclass(frozen=True)
 class ComparedIncident:
-    """Incident of the log, and the incident of the same kind in the run that is nearest in time; None without one."""
+    """Incident of the log, and the nearest incident in time of the same kind in the run; None if there is none."""
 
     recorded: Incident
     repeated: Incident | None
 
     @property
     def distance(self) -> float:
-        """Distance in m between the positions of both incidents; inf if the run has none."""
+        """Distance in m between the positions of both incidents; inf if the run has no such incident."""
         if self.repeated is None:
             return float("inf")
         return float(np.hypot(*(np.array(self.recorded.position) - np.array(self.repeated.position))))
 
     @property
     def is_reproduced(self) -> bool:
-        """Whether the incident of the run is near the position and the time of that in the log."""
+        """Whether both incidents are close in position and time."""
         if self.repeated is None:
             return False
         late = abs(self.repeated.time - self.recorded.time)
@@ -77,8 +77,10 @@ class Verification:
 
     Attributes:
         drive: Recorded drive.
-        repeated: Drive of the run, with the log `log`.
-        incidents: Incidents of the recorded drive with those of the run.
+        repeated: Drive of the run.
+        log: Log of the run.
+        quantities: Rows of the comparison.
+        incidents: Incidents of the recorded drive with the matching incidents of the run.
         new_incidents: Incidents of the run without a match in the recorded drive.
         failed: Names of the criteria that did not pass in the run.
     """
@@ -110,7 +112,7 @@ def compare_with_run(made: Reconstruction, log: Path) -> Verification:
 def compare_incidents(
     recorded: Sequence[Incident], repeated: Sequence[Incident]
 ) -> tuple[list[ComparedIncident], list[Incident]]:
-    """Return each recorded incident with its match in the run, and the incidents of the run without a match."""
+    """Return the recorded incidents with their matches in the run, and the incidents of the run without a match."""
     left = [*repeated]
     compared = []
     for incident in recorded:
@@ -123,7 +125,7 @@ def compare_incidents(
 
 
 def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator[ComparedQuantity]:
-    """Yield the rows that compare paths, times, clearances, and scans."""
+    """Yield rows that compare paths, times, clearances, and scans."""
     times = common_times(recorded, repeated)
     apart = distances_between(recorded, repeated, times)
     if len(apart):
@@ -173,20 +175,20 @@ def common_times(recorded: RecordedDrive, repeated: RecordedDrive) -> Array:
 
 
 def distances_between(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> Array:
-    """Return the distances (n,) in m between both robots at `times` (n,)."""
+    """Return the distances (n,) in m between the robots of both drives at `times` (n,)."""
     apart: Array = np.hypot(*(recorded.poses.poses_at(times)[:, :2] - repeated.poses.poses_at(times)[:, :2]).T)
     return apart
 
 
 def distances_to_path(points: Array, path: Array) -> Array:
-    """Return the distances (n,) in m of `points` (n, 2) from the nearest of the points (m, 2) of a path."""
+    """Return the distances (n,) in m between `points` (n, 2) and the nearest point of `path` (m, 2)."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(path).query(points)[0], dtype=np.float64)
 
 
 def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
-    """Return times (n,) in s and smallest ranges (n,) in m of all scans with a return; None with few scans."""
+    """Return times (n,) in s and smallest ranges (n,) in m of all scans with a return; None without enough scans."""
     if drive.scans is None or len(drive.scans) < MIN_SCANS:
         return None
     nearest = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
@@ -195,7 +197,7 @@ def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
 
 
 def nearest_return(drive: RecordedDrive) -> float | None:
-    """Return the MIN_SCANS-th smallest of the smallest ranges of all scans, in m; None with fewer scans."""
+    """Return the nearest return of a drive in m, robust against single errors; None without enough scans."""
     found = nearest_returns(drive)
     if found is None or len(found[1]) < MIN_SCANS:
         return None
@@ -203,15 +205,14 @@ def nearest_return(drive: RecordedDrive) -> float | None:
 
 
 def _hits(scans: Scans) -> Array:
-    """Return the ranges (n, beams) in m; nan where nothing returned, for which lidars write 0, inf, or nan."""
+    """Return the ranges (n, beams) in m, with nan for beams without a return."""
     return np.where(scans.is_hit(), scans.ranges, np.nan)
 
 
 def fraction_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
     """Return the fraction of beams with equal ranges at the `times` (n,) at which both robots are near each other.
 
-    Beams with the same direction on the map are compared, because the robots may have different headings. Returns None
-    without these beams.
+    Beams with the same direction in the map frame are compared. Return None if there are none.
     """
     one, other = recorded.scans, repeated.scans
     if one is None or other is None or not len(one) or not len(other) or len(other.angles) < 2:

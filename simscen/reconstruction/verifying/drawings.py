@@ -1,4 +1,4 @@
-"""Draws a verification as SVG: a drive on its map, and charts of values over time."""
+"""SVG drawings for the comparison of two drives: a drive on the map, and charts of values over time."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from simscen.reconstruction.scenario.incidents import Incident
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
-"""RGBA colors of occupied and unknown cells, and of cells in which the lidar measured something that is not a wall."""
+"""RGBA colors of occupied cells, of unknown cells, and of cells with a lidar return that is not from a wall."""
 WALL_DISTANCE_M = 0.15
-"""Distance from a wall up to which a return belongs to the wall."""
+"""Maximum distance from a wall of a return that belongs to the wall."""
 TARGET_SCANS, TARGET_POINTS = 300, 600
-"""Scans and points of lines are thinned out evenly to at least these numbers, and less than twice as many."""
+"""Minimum number of drawn scans, and of drawn points per line. At most twice as many are drawn."""
 MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
-"""Largest number of time marks on a path, and their smallest distance as a fraction of the larger side of the map."""
+"""Maximum number of time marks on a path, and minimum distance of marks as a fraction of the larger side of the map."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
-"""Distance between the edge of a map and what it shows, and smallest ratio of its sides."""
+"""Distance between the edge of a map and the drawn points, and minimum ratio of the shorter to the longer side."""
 FONT_FRACTION = 0.026
 """Height of the text in a map as a fraction of the larger side."""
 CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
-"""Size of a chart, and of its left and bottom margin with labels, in units of the SVG."""
+"""Size of a chart, and size of the left and bottom margins with labels, in units of the SVG."""
 TICK_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-"""Possible distances between the marks of an axis or of a path, in the unit of the axis or in s."""
+"""Possible distances between the ticks of an axis in the unit of the axis, or between the time marks of a path in s."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """Part of the world that is drawn: its smallest coordinates and its size in m, in the map frame."""
+    """Drawn rectangle of the world: lowest x and y in the map frame, width, and height in m."""
 
     x: float
     y: float
@@ -74,9 +74,9 @@ def drive_map(
     world: StaticWorld,
     box: Box,
 ) -> str:
-    """Return an SVG with a drive, its goals, incidents, and objects on the map, and with the path of the other drive.
+    """Return an SVG with a drive, goals, incidents, and objects on the map, and with the path of the other drive.
 
-    `name` is the CSS class of the drive: "log" or "run".
+    `title` is for screen readers. `name` is the CSS class of the drive: "log" or "run".
     """
     grid = world.grid
     height, width = (cells * grid.resolution for cells in grid.shape)
@@ -106,14 +106,14 @@ def drive_map(
 
 
 def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
-    """Return an SVG text with the CSS class `kind`, centered on a point but inside of the box."""
+    """Return an SVG text with the CSS class `kind`, centered at (x, y) in m and moved into the box."""
     half = 0.27 * box.font * len(label)
     x = min(max(x, box.x + half), box.x + box.width - half)
     return f'<text class="{kind}" x="{x:.2f}" y="{-y:.2f}" font-size="{box.font:.3f}">{escape(label)}</text>'
 
 
 def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
-    """Yield dots with times on the path, and an arrow at its end."""
+    """Yield dots with times on the path, and an arrow at the end of the path."""
     step = next((step for step in TICK_STEPS if drive.duration / step <= MAX_TIME_MARKS), TICK_STEPS[-1])
     step = max(step, 1.0)
     times = np.append(np.arange(0.0, drive.duration, step), drive.duration)
@@ -154,7 +154,7 @@ def _points(poses: Array) -> str:
 
 
 def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
-    """Return the data URL of a PNG with the map and the returns that are not from walls; the rest is transparent."""
+    """Return the data URL of a PNG with the map and the lidar returns that are not from walls."""
     grid = world.grid
     colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
     colors[grid.cells == UNKNOWN] = UNSEEN
@@ -168,7 +168,7 @@ def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
 
 
 def _returns_off_the_map(world: StaticWorld, drive: RecordedDrive) -> Array:
-    """Return the ends (n, 2) in the map frame of the beams that did not end at walls."""
+    """Return the ends (n, 2) in the map frame of beams that did not end at walls."""
     if drive.scans is None or not len(drive.scans):
         return np.empty((0, 2))
     scans = drive.scans.thinned(TARGET_SCANS)
@@ -178,7 +178,7 @@ def _returns_off_the_map(world: StaticWorld, drive: RecordedDrive) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Line of a chart: values (n,) at times (n,) in s. `name` is its CSS class."""
+    """Line of a chart: values (n,) at times (n,) in s. `name` is the CSS class of the line."""
 
     name: str
     times: Array
@@ -186,7 +186,7 @@ class Series:
 
 
 def chart(label: str, series: Sequence[Series], unit: str) -> str:
-    """Return an SVG chart of lines over time, with axes that start at 0. `unit` is that of the values."""
+    """Return an SVG chart of lines over time, with axes that start at 0. `label` is for screen readers."""
     series = [line for line in series if len(line.times)]
     end = max((float(line.times[-1]) for line in series), default=1.0) or 1.0
     top = max(0.1, *(float(np.max(line.values)) for line in series)) if series else 1.0

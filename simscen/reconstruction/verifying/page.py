@@ -1,9 +1,7 @@
-"""Creates an HTML page that shows a recorded drive and the run of its reconstructed scenario side by side."""
+"""HTML page that shows a recorded drive and the run of the reconstructed scenario side by side."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Iterator, Sequence
 from html import escape
 
@@ -16,6 +14,7 @@ from simscen.reconstruction.verifying.comparison import (
     nearest_returns,
 )
 from simscen.reconstruction.verifying.drawings import Series, box_around, chart, drive_map
+from simscen.report.display_text import csp_hash
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d2330; --quiet: #5b6475; --page: #fff; --map: #f4f5f7; --line: #ccd1da;
@@ -54,9 +53,8 @@ text.goalname { fill: var(--good); } text.objectname { fill: var(--object); } te
 
 
 def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> str:
-    """Return the page as one HTML text that loads nothing from the network. `name` is that of the scenario."""
-    digest = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+    """Return the HTML page, which loads nothing from the network. `name` is the name of the scenario."""
+    policy = f"default-src 'none'; img-src data:; style-src '{csp_hash(STYLE)}'; base-uri 'none'; form-action 'none'"
     parts = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
@@ -73,6 +71,7 @@ def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObje
 
 
 def _result(verified: Verification) -> Iterator[str]:
+    """Yield the statement whether the run reproduced the incidents, a list of incidents, and the failed criteria."""
     count = len(verified.incidents)
     again = sum(incident.is_reproduced for incident in verified.incidents)
     if not count:
@@ -95,6 +94,7 @@ def _result(verified: Verification) -> Iterator[str]:
 
 
 def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
+    """Yield the legend and a map of each drive."""
     recorded = [incident.recorded for incident in verified.incidents]
     repeated = [incident.repeated for incident in verified.incidents if incident.repeated is not None]
     drives = verified.drive, verified.repeated
@@ -130,7 +130,7 @@ def _legend(has_objects: bool, has_incidents: bool) -> Iterator[str]:
 
 
 def _charts(verified: Verification) -> Iterator[str]:
-    """Yield charts of the distance between both robots, and of the clearance in both drives."""
+    """Yield charts of the distance between both robots, and of the smallest range of each scan in both drives."""
     yield "<h2>Timing and clearance</h2>"
     yield '<div class="pair">'
     times = common_times(verified.drive, verified.repeated)

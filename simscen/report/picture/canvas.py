@@ -1,6 +1,6 @@
 """Canvas for drawing anti-aliased shapes and text in world coordinates with Pillow.
 
-The canvas also keeps a list of what was drawn, from which the legend is made, and by which tests compare pictures.
+The canvas also keeps a list of the drawn parts, from which the legend is made.
 """
 
 import math
@@ -23,13 +23,12 @@ Fill = tuple[int, ...]
 """Red, green, and blue from 0 to 255, optionally followed by the opacity from 0 to 255."""
 
 SUPERSAMPLING = 2
-"""Shapes are drawn at this scale and reduced at the end. A scale of 3 takes twice the time without a visible gain."""
+"""Factor by which shapes are drawn larger than the final image, which is reduced at the end (anti-aliasing)."""
 LABEL_CELL_PX = 4
-"""Size of the square label cells, in which the canvas tracks what labels should not cover."""
+"""Side of the square label cells: the grid in which the canvas tracks the areas that labels should not cover."""
 
-MAX_ELLIPSE_RADIUS_PX = 4000.0
-"""Larger discs are drawn as polygons: Pillow's time for an ellipse grows with its area, also outside of the image."""
-_SIDES_OF_LARGE_DISC = 2000
+MAX_ELLIPSE_RADIUS_PX, _SIDES_OF_LARGE_DISC = 4000.0, 2000
+"""Maximum radius of a disc that is drawn as an ellipse, and number of sides of the polygon for a larger disc."""
 
 
 @lru_cache(maxsize=16)
@@ -40,9 +39,9 @@ def font(size: int) -> Font:
 
 @dataclass(frozen=True)
 class TextItem:
-    """Text of a font size in pixels at pixel (x, y), which is the point of the text that `anchor` names as in Pillow.
+    """Text to draw at pixel (x, y) with the font `size` in pixels. `anchor` is the text anchor of Pillow.
 
-    `box` is the color of a box behind the text, `halo` the color of an outline around the letters.
+    `box` is the color of a box behind the text, `halo` the color of an outline around the letters; None for none.
     """
 
     x: float
@@ -56,7 +55,7 @@ class TextItem:
 
 
 class DrawnPart(NamedTuple):
-    """Entry in the list of what was drawn: a name such as "door meeting room", and points (n, 2) in m."""
+    """Entry in the list of drawn parts: a name such as "door meeting room", and points (n, 2) in m."""
 
     name: str
     points: Array
@@ -65,7 +64,7 @@ class DrawnPart(NamedTuple):
 class Canvas:
     """Image of the rectangle `bounds` of the world, with `scale` pixels per meter; y points up.
 
-    Points of shapes are in m, widths and radii in pixels. Labels avoid shapes that are drawn with `busy=True`.
+    Points of shapes are in m, widths and radii in pixels. Labels avoid shapes with `blocks_labels`.
     """
 
     def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
@@ -75,13 +74,13 @@ class Canvas:
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
         if background is not None:
             self.set_image(Image.new("RGB", self.supersampled_size, background))
-        self._busy = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
-        self._busy_draw = ImageDraw.Draw(self._busy)
+        self._blocked = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
+        self._block_pen = ImageDraw.Draw(self._blocked)
         self.texts: list[TextItem] = []
         self.parts: list[DrawnPart] = []
 
     def set_image(self, image: Image.Image) -> None:
-        """Draw on this image, which must have the size `supersampled_size`. The image is not copied."""
+        """Draw on this image, without a copy. Its size must be `supersampled_size`."""
         self._image, self._draw = image, ImageDraw.Draw(image, "RGBA")
 
     @property
@@ -90,9 +89,9 @@ class Canvas:
         return self.width * SUPERSAMPLING, self.height * SUPERSAMPLING
 
     @property
-    def busy(self) -> Array:
-        """Fraction, from 0 to 1, of each label cell that labels should not cover; rows from the top of the image."""
-        return np.asarray(self._busy, dtype=np.float64) / 255
+    def blocked_fractions(self) -> Array:
+        """Fraction (0 to 1) of each label cell that labels should not cover, in rows from the top of the image."""
+        return np.asarray(self._blocked, dtype=np.float64) / 255
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
         """Return the pixel (column, row) of a point in m. It can be outside of the image."""
@@ -104,11 +103,16 @@ class Canvas:
         return 0 <= u < self.width and 0 <= v < self.height
 
     def add_part(self, name: str, points: Array | Sequence[tuple[float, float]]) -> None:
-        """Add an entry to the list of what was drawn."""
+        """Add an entry to the list of drawn parts."""
         self.parts.append(DrawnPart(name, np.array(points, dtype=np.float64).reshape(-1, 2)))
 
     def polygon(
-        self, points: Array, fill: Fill | None, outline: Color | None = None, width: float = 1.5, busy: bool = False
+        self,
+        points: Array,
+        fill: Fill | None,
+        outline: Color | None = None,
+        width: float = 1.5,
+        blocks_labels: bool = False,
     ) -> None:
         """Draw a polygon of points (n, 2) in meters, with an outline of `width` pixels."""
         corners = self._corners(points)
@@ -116,15 +120,15 @@ class Canvas:
             self._draw.polygon(corners, fill=fill)
         if outline is not None:
             self._draw.line([*corners, corners[0]], fill=outline, width=_line_width(width), joint="curve")
-        if busy:
-            self._busy_draw.polygon(
+        if blocks_labels:
+            self._block_pen.polygon(
                 [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners], fill=255
             )
 
     def hatch(
         self, outlines: Sequence[Array], color: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
     ) -> None:
-        """Fill polygons with slanted lines, `gap` pixels apart, that rise to the right if `rising`, or else fall."""
+        """Fill polygons with slanted lines, `gap` pixels apart. With `rising`, the lines rise to the right."""
         corners = [self._corners(outline) for outline in outlines]
         points = np.array([corner for outline in corners for corner in outline]).reshape(-1, 2)
         if not len(points):
@@ -150,13 +154,13 @@ class Canvas:
         lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
         self._image.paste(color[:3], (int(left), int(top)), lines)
 
-    def line(self, points: Array, color: Fill, width: float = 1.5, busy: bool = False) -> None:
+    def line(self, points: Array, color: Fill, width: float = 1.5, blocks_labels: bool = False) -> None:
         """Draw a line through points (n, 2) in meters."""
         if len(points) > 1:
             corners = self._corners(points)
             self._draw.line(corners, fill=color, width=_line_width(width), joint="curve")
-            if busy:
-                self._busy_draw.line(
+            if blocks_labels:
+                self._block_pen.line(
                     [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners],
                     fill=255,
                     width=2,
@@ -181,26 +185,26 @@ class Canvas:
         fill: Fill | None,
         outline: Color | None = None,
         width: float = 1.5,
-        busy: bool = False,
+        blocks_labels: bool = False,
     ) -> None:
         """Draw a disc of `radius` pixels around a point in meters."""
         if radius > MAX_ELLIPSE_RADIUS_PX:
             angles = np.linspace(0.0, 2.0 * math.pi, _SIDES_OF_LARGE_DISC, endpoint=False)
             ring = radius / self.scale * np.column_stack((np.cos(angles), np.sin(angles)))
-            self.polygon(np.array((x, y)) + ring, fill, outline, width, busy)
+            self.polygon(np.array((x, y)) + ring, fill, outline, width, blocks_labels)
             return
         u, v = (SUPERSAMPLING * part for part in self.pixel(x, y))
         r = SUPERSAMPLING * radius
         box = (u - r, v - r, u + r, v + r)
         self._draw.ellipse(box, fill=fill, outline=outline, width=_line_width(width))
-        if busy:
-            self._busy_draw.ellipse([part / SUPERSAMPLING / LABEL_CELL_PX for part in box], fill=255)
+        if blocks_labels:
+            self._block_pen.ellipse([part / SUPERSAMPLING / LABEL_CELL_PX for part in box], fill=255)
 
     def symbol(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Color) -> None:
-        """Draw a filled polygon at a point in meters. Its corners are at `offsets` in pixels from the point, y down."""
+        """Draw a filled polygon at a point in meters. Corners are `offsets` in pixels from the point, y down."""
         u, v = self.pixel(x, y)
         self._draw.polygon([((u + dx) * SUPERSAMPLING, (v + dy) * SUPERSAMPLING) for dx, dy in offsets], fill=fill)
-        self._busy_draw.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
+        self._block_pen.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
 
     def leader(self, start: tuple[float, float], end: tuple[float, float], color: Color) -> None:
         """Draw a thin line that connects a label with its object. `start` and `end` are pixels."""
@@ -228,7 +232,7 @@ class Canvas:
 
 
 def printable(text: str) -> str:
-    """Return a text on one line, in which simscen's symbols that the built-in font lacks are replaced by ASCII."""
+    """Return a text on one line, with "<=" and ">=" instead of symbols that the built-in font lacks."""
     return one_line(text).replace("≤", "<=").replace("≥", ">=")
 
 

@@ -14,7 +14,7 @@ from simscen.report.picture.canvas import Canvas, TextItem, printable
 from simscen.report.picture.palette import AMBER, FAINT_INK, GREEN, INK, PAGE, ROBOT, RULE
 
 DrivePaths = tuple[str, Sequence[Pose2], Sequence[Pose2], Sequence[Pose2]]
-"""Name of a test drive, and three paths: as commanded, as estimated by odometry, and the true one."""
+"""Name of a test drive, and three paths: commanded, estimated by odometry, and true."""
 PANEL_SIZE_PX, PANEL_MARGIN_M = 420, 0.25
 """Width and height of a panel, and minimum distance of paths from its edges."""
 GRID_SPACING_M = 0.5
@@ -34,6 +34,7 @@ def draw_drives(title: str, drives: Sequence[DrivePaths], footprint: Polygon) ->
 
 
 def _panel(title: str, drive: DrivePaths, footprint: Array) -> Image.Image:
+    """Draw the panel of one test drive. `footprint` are the corners (n, 2) in m."""
     name, *paths = drive
     footprints = [end.apply(footprint) for end in (paths[2][0], paths[2][-1])]
     points = np.concatenate([*footprints, *(_points(path) for path in paths)])
@@ -65,7 +66,7 @@ def _points(path: Sequence[Pose2]) -> Array:
 def write_localization_picture(grid: OccupancyGrid, belief: Array, reference: Array, path: Path) -> None:
     """Draw two paths on a map, and save the picture as PNG at `path`.
 
-    The `reference` (n, 2) is a wide line, the `belief` (m, 2) a dashed line; both are positions in the map frame in m.
+    `reference` (n, 2) is drawn as a wide line, `belief` (m, 2) as a dashed line. Positions are in m in the map frame.
     """
     bounds = map_layer.map_extent(grid, np.vstack((belief, reference)))
     canvas = Canvas(bounds, map_layer.map_scale(bounds), palette.UNKNOWN)

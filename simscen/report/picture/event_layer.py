@@ -1,6 +1,6 @@
 """Goals, faults, events, marks, collisions, violations, and places on the picture of a run.
 
-Each function draws one kind of thing on the canvas, and yields labels that are placed later.
+Each function `draw_…` draws one layer on the canvas, and yields its labels.
 """
 
 import math
@@ -27,8 +27,8 @@ _GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL
 class GoalOutcome:
     """Outcome of a goal on the picture.
 
-    `word` is reached, failed, canceled, "not reached", or "not tried". `text` is shown behind the name of the goal; ""
-    for a goal that was reached.
+    `word` is reached, failed, canceled, "not reached", or "not tried". `text` is the label behind the name of the goal;
+    "" for a goal that was reached.
     """
 
     word: str
@@ -76,7 +76,7 @@ def _is_false_success(goal: Goal, scene: Scene) -> bool:
 def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw each goal with its tolerance as a ring, and with its heading and outcome.
 
-    Goals at the same position have one label. Goals of events that were not sent are omitted.
+    Goals at the same position have one label. Goals of actions `new_goal` that did not take place are omitted.
     """
     sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
@@ -92,10 +92,10 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         x, y, yaw = goal.pose
         radius = max(goal.xy_tolerance * canvas.scale, 5.0)
         is_hollow = outcome.word in ("not tried", "canceled")
-        canvas.disc(x, y, radius, None if is_hollow else (*outcome.color, 46), outcome.color, 1.8, busy=True)
+        canvas.disc(x, y, radius, None if is_hollow else (*outcome.color, 46), outcome.color, 1.8, blocks_labels=True)
         tip = (radius + 10) / canvas.scale
         heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
-        canvas.line(heading, outcome.color, 2.2, busy=True)
+        canvas.line(heading, outcome.color, 2.2, blocks_labels=True)
         if outcome.word == "failed":
             bar = 0.72 * radius / canvas.scale
             for dy in (bar, -bar):
@@ -108,13 +108,13 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             yield Label(1, x, y, printable(scene.label(", ".join(texts))), outcome.color, 14, rim)
 
 
-# The corners of symbols, in pixels from their center (x right, y down).
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
 _FLAG = [(0, 0), (0, -18), (12, -13), (1.5, -9), (1.5, 0)]
 _BOLT = [(1, -10), (-6, 2), (-1, 2), (-2, 10), (6, -3), (1, -3)]
 _DIAMOND = [(0, -6), (6, 0), (0, 6), (-6, 0)]
+"""Corners of the symbols in pixels from the center, x right and y down."""
 
 
 def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -135,14 +135,14 @@ def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         ends = [(start, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
         for tick, text, color in ends if ended < trace.end else ends[:1]:
             x, y = trace.place(tick)
-            canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, busy=True)
+            canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, blocks_labels=True)
             canvas.symbol(x, y, _BOLT, color)
             label = printable(scene.label(f"{text} {trace.seconds(tick):.1f} s"))
             yield Label(2, x, y, label, palette.AMBER, 12, 12.0)
 
 
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
-    """Return the start tick, end tick, and name of each fault; the end of the run if the fault did not end before."""
+    """Return the start tick, end tick, and name of each fault. A fault that does not end has the last tick."""
     ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
     faults = []
     for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
@@ -193,7 +193,7 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         if verdict.status is Status.PASS or finding is None or finding.place is None:
             continue
         x, y = finding.place
-        canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0, busy=True)
+        canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0, blocks_labels=True)
         canvas.symbol(x, y, _CROSS, palette.RED)
         canvas.add_part(f"violation {verdict.id}", [(x, y)])
         text = _truncate(printable(f"{subject(verdict, finding)}: {comparison(finding)}"))
@@ -201,7 +201,7 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a small diamond with the name for each place of the world at which no goal is."""
+    """Draw a small diamond and the name of each place (named pose) of the world, except at goals."""
     goals = [goal.pose for robot in scene.per_robot for goal in robot.case.every_goal]
     goal_positions = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
@@ -212,5 +212,5 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _truncate(text: str, limit: int = 60) -> str:
-    """Truncate a text to `limit` characters. The sidebar contains the full text."""
+    """Truncate a text to `limit` characters."""
     return text if len(text) <= limit else f"{text[: limit - 1].rstrip()}…"

@@ -13,22 +13,21 @@ from simscen.report.picture.palette import Color
 _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
 """Distances between the rim of an object and its label, in the order in which they are tried."""
 _ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
+"""Directions from an object to its label, in the order in which they are tried."""
 _LEADER_DISTANCE_PX = 16.0
-"""If a label is further away, a line connects it with its object."""
-_WALL_COST, _COST_PER_PX = 0.25, 0.0015
-"""Cost of a label that is completely on walls, and of each pixel of distance. On busy cells, the cost is 1."""
-_OCCUPIED_BY_LABEL = 3.0
-"""Cost of a label that is completely on another label."""
+"""Distance between label and object above which a line connects them."""
+_WALL_COST, _LABEL_COST, _COST_PER_PX = 0.25, 3.0, 0.0015
+"""Cost of a label on walls, on another label, and per pixel of distance. On shapes that block labels, the cost is 1."""
 _MAX_OPTIONAL_COST = 0.2
-"""Maximum cost of an optional label; more expensive ones are omitted."""
+"""Maximum cost of an optional label. Optional labels with a higher cost are omitted."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text in font size `size` px for an object at (x, y) in m, which has a radius of `rim` pixels.
+    """Text with the font `size` in pixels for an object at (x, y) in m with a radius of `rim` pixels.
 
-    Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for an outline around
-    the letters. An `optional` label is omitted if there is no free space.
+    Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for no box. An
+    `optional` label is omitted if there is no free space.
     """
 
     rank: int
@@ -47,7 +46,7 @@ def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
 
     `walls` is the fraction, from 0 to 1, of walls in each label cell of the canvas.
     """
-    occupied = canvas.busy + _WALL_COST * walls
+    occupied = canvas.blocked_fractions + _WALL_COST * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
@@ -58,7 +57,7 @@ def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
             slice(int(top // LABEL_CELL_PX), int(bottom // LABEL_CELL_PX) + 1),
             slice(int(left // LABEL_CELL_PX), int(right // LABEL_CELL_PX) + 1),
         )
-        occupied[rows, columns] = _OCCUPIED_BY_LABEL
+        occupied[rows, columns] = _LABEL_COST
         u, v = canvas.pixel(label.x, label.y)
         end = min(max(u, left), right), min(max(v, top), bottom)
         distance = math.dist((u, v), end)
@@ -76,7 +75,7 @@ Box = tuple[float, float, float, float]
 
 
 def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
-    """Return the lowest cost of a label, and its box with this cost. `occupied` is the cost of each label cell."""
+    """Return the lowest cost of a label, and the box with this cost. `occupied` is the cost of each label cell."""
     sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
     sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
     width, height = text_size(label.text, label.size)
@@ -95,9 +94,9 @@ def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box
 
 
 def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: float, size: tuple[float, float]) -> Box:
-    """Return the box of a `size` (width, height) at a distance in px and an angle in rad from the pixel `center`.
+    """Return a box of `size` (width, height) at `distance` in px and `angle` in rad from the pixel `center`.
 
-    A box that extends beyond the canvas is moved onto it.
+    A box that extends beyond the canvas is moved onto the canvas.
     """
     c, s = math.cos(angle), -math.sin(angle)
     middle = center[0] + c * (distance + abs(c) * size[0] / 2), center[1] + s * (distance + abs(s) * size[1] / 2)
@@ -109,7 +108,7 @@ def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: fl
 
 
 def _mean_cost(sums: Array, box: Box) -> float:
-    """Return the mean cost of the label cells in a box. `sums[r, c]` is the cost of all cells above r and left of c."""
+    """Return the mean cost of the label cells in a box. `sums` is the summed-area table of the costs."""
     left, top, right, bottom = (int(part // LABEL_CELL_PX) for part in box)
     right, bottom = min(right + 1, sums.shape[1] - 1), min(bottom + 1, sums.shape[0] - 1)
     inside = float(sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left])

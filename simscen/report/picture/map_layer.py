@@ -1,4 +1,4 @@
-"""Map of the world and coordinate grid, on which all pictures with a map draw."""
+"""Map of the world and grid of coordinates: the background of all pictures with a map."""
 
 import math
 from functools import cache
@@ -15,11 +15,11 @@ from simscen.report.picture.canvas import SUPERSAMPLING, Bounds, Canvas, TextIte
 MAX_MAP_SIZE_PX = (1000, 800)
 """Maximum width and height of the map on a picture."""
 MARGIN_M = 0.4
-"""Margin around the map and the required points."""
+"""Margin around the known cells and the required points."""
 
 
 def map_extent(grid: OccupancyGrid, points: Array) -> Bounds:
-    """Return the rectangle that contains every known cell of the map and all `points` (n, 2) in m, with a margin."""
+    """Return the rectangle around all known cells of the map and all `points` (n, 2) in m, with a margin."""
     rows, columns = np.nonzero(grid.cells != UNKNOWN)
     if len(rows):
         corners = np.array([(r, c) for r in (rows.min(), rows.max() + 1) for c in (columns.min(), columns.max() + 1)])
@@ -38,7 +38,7 @@ def map_scale(bounds: Bounds) -> float:
 
 
 def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
-    """Set the image of the canvas to the map, with one affine transform from cells to pixels."""
+    """Set the image of the canvas to the map."""
     image, resolution = _colored(grid, 1 / (canvas.scale * SUPERSAMPLING))
     per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
     x0, _, _, y1 = canvas.bounds
@@ -56,10 +56,7 @@ def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
 
 
 def _colored(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
-    """Return the map as a colored image, and the size of its pixels in m.
-
-    Cells smaller than `pixel_m` are merged, so that thin walls have no gaps.
-    """
+    """Return the map as a colored image, and the size of a pixel in m. Cells smaller than `pixel_m` are merged."""
     cells, merge = grid.cells, max(1, int(pixel_m / grid.resolution))
     if merge > 1:
         cells = _downsample(cells, merge)
@@ -68,7 +65,7 @@ def _colored(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
 
 @cache
 def _colors() -> npt.NDArray[np.uint8]:
-    """Return a table (256, 3) with the color for each cell value, read as an unsigned byte."""
+    """Return the colors (256, 3) of the cell values, indexed by the value as an unsigned byte."""
     table = np.empty((256, 3), dtype=np.uint8)
     for value in range(256):
         occupancy = min(value, OCCUPIED) / OCCUPIED
@@ -93,7 +90,7 @@ _MIN_GRID_SPACING_PX = 55
 
 
 def grid_spacing(canvas: Canvas) -> float:
-    """Return the smallest round distance in m (1, 2, or 5 times a power of ten) with which grid lines are legible."""
+    """Return the distance of grid lines in m: the smallest legible one that is 1, 2, or 5 times a power of ten."""
     min_spacing = _MIN_GRID_SPACING_PX / canvas.scale
     power = 10.0 ** math.floor(math.log10(min_spacing))
     return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= min_spacing)

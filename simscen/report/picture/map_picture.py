@@ -36,19 +36,19 @@ HEADER_HEIGHT_PX = 66
 _MARGIN_PX = 14
 """Margin above the map and to its right."""
 
-Draw = Callable[[Canvas, Scene], Iterator[Label]]
-"""Function that draws one kind of thing on the canvas, and yields labels, which are placed when all is drawn."""
+DrawLayer = Callable[[Canvas, Scene], Iterator[Label]]
+"""Function that draws one layer on the canvas, and yields its labels."""
 # The layers in drawing order: ground, below the robots, objects, and above the robots. Those below and above the robots
 # are drawn for each robot.
-_GROUND_LAYERS: tuple[Draw, ...] = (world_layer.draw_ground, world_layer.draw_floors)
-_OBJECT_LAYERS: tuple[Draw, ...] = (event_layer.draw_places, world_layer.draw_objects)
-_LAYERS_BELOW_ROBOT: tuple[Draw, ...] = (
+_GROUND_LAYERS: tuple[DrawLayer, ...] = (world_layer.draw_ground, world_layer.draw_floors)
+_OBJECT_LAYERS: tuple[DrawLayer, ...] = (event_layer.draw_places, world_layer.draw_objects)
+_LAYERS_BELOW_ROBOT: tuple[DrawLayer, ...] = (
     world_layer.draw_zones,
     event_layer.draw_fault_bands,
     path_layer.draw_plans,
     event_layer.draw_goals,
 )
-_LAYERS_ABOVE_ROBOT: tuple[Draw, ...] = (
+_LAYERS_ABOVE_ROBOT: tuple[DrawLayer, ...] = (
     path_layer.draw_truth,
     path_layer.draw_belief,
     path_layer.draw_robot,
@@ -62,7 +62,7 @@ _LAYERS_ABOVE_ROBOT: tuple[Draw, ...] = (
 
 def draw_map_picture(scene: Scene) -> Image.Image:
     """Draw the picture of a run: header, map with events, and sidebar with criteria and legend."""
-    canvas = _map_canvas(scene)
+    canvas = draw_map_canvas(scene)
     map_ = canvas.finish()
     width = LEFT_MARGIN_PX + map_.width + _MARGIN_PX
     height = _MARGIN_PX + map_.height + BOTTOM_MARGIN_PX
@@ -83,8 +83,8 @@ def write_picture(scene: Scene, path: Path) -> None:
     draw_map_picture(scene).save(path, format="PNG", compress_level=3)
 
 
-def _map_canvas(scene: Scene) -> Canvas:
-    """Draw the map with all layers and labels."""
+def draw_map_canvas(scene: Scene) -> Canvas:
+    """Draw the map with all layers and labels, without header and sidebar."""
     bounds = map_extent(scene.map, _required_points(scene))
     canvas = Canvas(bounds, map_scale(bounds), None)
     draw_map(canvas, scene.map)
@@ -99,8 +99,8 @@ def _map_canvas(scene: Scene) -> Canvas:
 
 
 def _wall_fractions(canvas: Canvas, scene: Scene) -> Array:
-    """Return for each label cell 1.0 if the map is occupied at its center, otherwise 0.0."""
-    rows, columns = canvas.busy.shape
+    """Return 1.0 for each label cell whose center is occupied on the map, and 0.0 for the others."""
+    rows, columns = canvas.blocked_fractions.shape
     v, u = np.mgrid[:rows, :columns] * LABEL_CELL_PX + LABEL_CELL_PX / 2
     x, y = canvas.bounds[0] + u / canvas.scale, canvas.bounds[3] - v / canvas.scale
     values = scene.map.values_at(np.column_stack((x.ravel(), y.ravel())))
@@ -109,17 +109,14 @@ def _wall_fractions(canvas: Canvas, scene: Scene) -> Array:
 
 
 def _required_points(scene: Scene) -> Array:
-    """Return the points (n, 2) that the picture must show even if they are outside of the map: goals and true paths.
-
-    Objects are omitted, because some wait far outside until they appear.
-    """
+    """Return the points (n, 2) that the picture must show even if they are outside of the map: goals and true paths."""
     goals = [(goal.pose.x, goal.pose.y) for robot in scene.per_robot for goal in robot.case.every_goal]
     paths = [robot.trace.truth.values[:, :2] for robot in scene.per_robot]
     return np.vstack((np.array(goals).reshape(-1, 2), *paths))
 
 
 def _draw_header(image: Image.Image, scene: Scene) -> None:
-    """Draw the outcome, the name of the scenario, and the facts of the run at the top of the picture."""
+    """Draw the outcome, the name of the scenario, and the line of `_facts_text` at the top of the picture."""
     result, pen = scene.result, ImageDraw.Draw(image)
     word, color = result.outcome.value.replace("-", " ").upper(), palette.OUTCOME_COLORS[result.outcome]
     width = math.ceil(font(16).getlength(word)) + 24
@@ -131,7 +128,7 @@ def _draw_header(image: Image.Image, scene: Scene) -> None:
 
 
 def _facts_text(scene: Scene) -> str:
-    """Return the seed, variation, stack, simulated time, driven distance, and reason of the end in one line."""
+    """Return the seed, variation, stack, simulated time, driven distance, and reason for the end in one line."""
     result = scene.result
     length = result.metrics.get("path_length")
     key = result.key
@@ -141,7 +138,7 @@ def _facts_text(scene: Scene) -> str:
 
 
 def end_reason(scene: Scene) -> str:
-    """Return why the run ended: its error, or the reason and the result of each robot whose navigation failed."""
+    """Return the error of the run, or why the run ended and the results of robots whose navigation failed."""
     if scene.result.outcome is Outcome.ERROR and scene.result.error is not None:
         return f"{scene.result.error.kind}: {scene.result.error.message}"
     reasons = [scene.result.ended]

@@ -37,7 +37,7 @@ AMBER: Color = (150, 98, 0)
 GREEN: Color = (0, 113, 86)
 GRAY: Color = (98, 103, 111)
 ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
-"""Colors of the paths' outlines with several robots, in the order of their names; further robots repeat them."""
+"""Outline colors of the paths of several robots, in the order of the robot names. Further robots repeat the colors."""
 
 OUTCOME_COLORS = {
     Outcome.PASSED: GREEN,
@@ -74,7 +74,7 @@ DARK = {
 def css_variables() -> str:
     """Return both themes as CSS variables (`--good`, …).
 
-    The attribute `data-theme` of the root element selects a theme, and without it the settings of the system.
+    The attribute `data-theme` of the root element selects a theme. Without it, the setting of the browser does.
     """
     light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
     return (

@@ -1,6 +1,6 @@
 """Paths on the picture of a run: true path, belief, plans, and the robot at the start and the end.
 
-Each function `draw_…` draws one kind of thing on the canvas, and yields labels that are placed later.
+Each function `draw_…` draws one layer on the canvas, and yields its labels.
 """
 
 import math
@@ -18,18 +18,19 @@ from simscen.report.picture.labels import Label
 from simscen.report.picture.scene import Scene
 
 MAX_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
-"""Two samples with a larger distance and a higher speed between them are a jump and not a motion."""
+"""Limits of a motion. Between two samples, a larger distance at a higher speed is a jump."""
 _TIME_COLOR_COUNT = 48
 """Number of colors of the true path, each for an equal part of the duration of the run."""
-_DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
+_DEFAULT_FOOTPRINT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
 _LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
 _SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
+"""Corners of the arrows at a kidnapping in pixels from the center, x right and y down."""
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
     """Split poses at jumps, and at `placement_ticks`, at which the robot was moved to another place.
 
-    `tick_rate` is the number of ticks per second.
+    `tick_rate` is in ticks per second.
     """
     if len(samples) < 2:
         return [samples] if len(samples) else []
@@ -73,9 +74,8 @@ def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         for k in range(_TIME_COLOR_COUNT):
             first, last = np.searchsorted(piece.ticks, (edges[k], edges[k + 1]), side="left")
             band = points[max(first - 1, 0) : last + 1]
-            canvas.line(
-                _drop_close_points(band, canvas), palette.time_color((k + 0.5) / _TIME_COLOR_COUNT), 3.2, busy=True
-            )
+            color = palette.time_color((k + 0.5) / _TIME_COLOR_COUNT)
+            canvas.line(_drop_close_points(band, canvas), color, 3.2, blocks_labels=True)
     step = round_time_step(trace.seconds(trace.end))
     for number in range(1, int(trace.seconds(trace.end) / step) + 1) if pieces else ():
         tick = round(number * step * trace.tick_rate)
@@ -91,7 +91,7 @@ def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         ends = (before.values[-1], _LIFTED_SYMBOL, "lifted"), (after.values[0], _SET_DOWN_SYMBOL, "set down")
         for pose, symbol, text in ends:
             x, y = pose[:2].tolist()
-            canvas.disc(x, y, 12, (255, 255, 255, 225), palette.AMBER, 1.6, busy=True)
+            canvas.disc(x, y, 12, (255, 255, 255, 225), palette.AMBER, 1.6, blocks_labels=True)
             canvas.symbol(x, y, symbol, palette.AMBER)
             canvas.add_part(scene.label(text), [(x, y)])
             yield Label(1, x, y, printable(scene.label(f"{text} at {when}")), palette.AMBER, 12, 13.0)
@@ -110,7 +110,7 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     if not len(scene.trace.truth):
         return
     first, last = (Pose2(*row) for row in scene.trace.truth.values[[0, -1]].tolist())
-    footprint = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DOT
+    footprint = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DEFAULT_FOOTPRINT
     radius = float(np.hypot(*footprint.T).max()) * canvas.scale
     nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (
         float(footprint[:, 0].max()),
@@ -118,7 +118,7 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     )
     has_moved = first.distance(last) * canvas.scale > radius
     for pose, color, opacity, text in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
-        canvas.polygon(pose.apply(footprint), (*color, opacity), color, busy=True)
+        canvas.polygon(pose.apply(footprint), (*color, opacity), color, blocks_labels=True)
         canvas.polygon(pose.apply(nose), palette.PAGE if opacity > 100 else color)
         canvas.add_part(scene.label(f"robot at the {text}"), pose.apply(footprint))
         if text == "end" or has_moved:
@@ -134,7 +134,7 @@ def round_time_step(seconds: float) -> float:
 
 
 def _drop_close_points(points: Array, canvas: Canvas) -> Array:
-    """Return the points without successive points in the same pixel, to save time; the last point is kept."""
+    """Return the points without successive points in the same pixel, but with the last point."""
     if len(points) < 3:
         return points
     pixels = np.floor(points * canvas.scale)

@@ -1,4 +1,4 @@
-"""Data that the picture of a run is drawn from, and the outlines of the objects in it."""
+"""Data from which the picture of a run is drawn, and the outlines of objects."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,13 +16,13 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run to draw: its world and the data of one robot.
+    """A finished run to draw: the world and the data of one robot.
 
-    With several robots, each robot has a scene of its own, and a common scene contains these scenes in `robots`.
+    With several robots, each robot has a scene, and `robots` of the common scene contains these scenes.
 
     Attributes:
         trace: Recorded run of the robot.
-        case: Goals, regions, and masks of the scenario, by which the run was judged.
+        case: Goals, regions, and masks of the scenario.
         map: Map of the world, which can differ from the robot's map.
         result: Result of the run with the verdicts.
         scenery: Objects, zones, ramps and places of the world.
@@ -54,7 +54,7 @@ class Scene:
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """Return a common scene with a scene for each robot; `robots` are the trace and the case of each by name."""
+    """Return a common scene with a scene for each robot. `robots` maps each name to a trace and a case."""
     parts = {name: replace(scene, trace=trace, case=case, robot_name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 
@@ -62,14 +62,11 @@ def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) ->
 _DEFAULT_RADIUS_M = 0.2
 """Radius of an object whose shape is unknown."""
 Outlines = tuple[Array, ...]
-"""Polygons (n, 2) in m in the frame of an object, one for each of its parts."""
+"""Polygons (n, 2) in m in the frame of an object, one for each part of the object."""
 
 
 def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dict[str, Outlines]:
-    """Return the outlines of `world_objects` and of all spawned objects by name.
-
-    An object whose shape is unknown has a circle.
-    """
+    """Return the outlines of `world_objects` and of all spawned objects by name; a circle for an unknown shape."""
     outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in world_objects if thing.outlines}
     outlines.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:

@@ -1,4 +1,4 @@
-"""Sidebar of the picture of a run: reason of an error, criteria with their results, and legend."""
+"""Sidebar of the picture of a run: error, criteria with their results, and legend."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ _LINE_HEIGHT_PX = 17
 _STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
-"""Function that draws the symbol of a legend entry: pen, x of its left edge and y of its center in px."""
+"""Function that draws the symbol of a legend entry. Parameters: pen, x of the left edge and y of the center in px."""
 Row = tuple[Status, Color, list[str]]
 """Status of a criterion, its color, and lines of text."""
 
@@ -28,7 +28,7 @@ Row = tuple[Status, Color, list[str]]
 def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.Image:
     """Return the sidebar, which is at least `min_height` pixels high.
 
-    `parts` are the names of what was drawn on the map; the legend explains only these.
+    `parts` are the names of the drawn parts of the map. The legend explains only these parts.
     """
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
@@ -51,16 +51,12 @@ def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.I
 
 
 def _is_drawn(parts: Sequence[str], word: str) -> bool:
-    """Return whether something was drawn that the entry of the legend with this `word` explains.
-
-    This is the case if a name in `parts` starts or ends with the word. The word "" stands for an entry that is always
-    in the legend.
-    """
+    """Return whether one of the names in `parts` starts or ends with `word`."""
     return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
 def _reasons(scene: Scene) -> list[str]:
-    """Return the lines with the error of a run, or the reason of a skipped run or expected failure; otherwise []."""
+    """Return the error of a run, or the reason of a skipped run or expected failure, as lines; otherwise []."""
     result = scene.result
     if result.error is not None:
         return _wrap(printable(f"{result.error.kind}: {result.error.message}"), _PADDING_PX)
@@ -104,7 +100,7 @@ def _draw_criteria(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
 
 
 def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
-    """Wrap a text in the font `size`, starting at the pixel `left`. Words that are longer than a line are split."""
+    """Wrap a text in the font `size` that starts at the pixel column `left`. Words longer than a line are split."""
     available = WIDTH_PX - left - 12
     lines, current = [], ""
     for word in text.split(" "):
@@ -132,7 +128,7 @@ def _draw_cross(draw: Pen, x: float, y: float, color: Color) -> None:
 
 
 def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
-    """Return the entries of the legend: word by which `_is_drawn` selects the entry, text, and symbol.
+    """Return the entries of the legend: name of the drawn part ("" for any), text, and symbol.
 
     `step` is the time between two dots on the true path in s.
     """

@@ -1,6 +1,6 @@
 """World on the picture of a run: ramps, floors, zones of costmap filters, objects, doors, and pedestrians.
 
-Each function `draw_…` draws one kind of thing on the canvas, and yields labels that are placed later.
+Each function `draw_…` draws one layer on the canvas, and yields its labels.
 """
 
 import math
@@ -20,7 +20,7 @@ from simscen.report.picture.path_layer import split_at_jumps
 from simscen.report.picture.scene import Outlines, Scene, object_outlines, spawn_pose
 
 LABEL_RANK = 6
-"""Rank of the labels of ramps and floors: they are placed after those of robots, goals, and objects."""
+"""Rank of the labels of ramps and floors. They are placed after the labels of robots, goals, and objects."""
 
 
 def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -98,7 +98,7 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
-    """Yield the zones of the robot that were enabled at any time, each with the text of its label."""
+    """Yield the zones of the robot that were enabled at any time, and the text of the label for each zone."""
     initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.robot_name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
@@ -118,7 +118,7 @@ def _added_zone(scene: Scene, key: tuple[str, str]) -> FilterZone | None:
 def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
     """Return the text of a label, for example "gate: keep out, on at 2.0 s" or "ward: at most 0.25 m/s".
 
-    `events` are those that enabled or disabled the zone.
+    `events` are the events that enabled or disabled the zone.
     """
     limits = [zone.speed_limit, *(event.data.get("speed_limit") for event in events)]
     limit = next((value for value in reversed(limits) if isinstance(value, int | float) and value), 0.0)
@@ -129,7 +129,7 @@ def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
 
 
 def _mask_outlines(zone: FilterZone) -> list[Array]:
-    """Return the blocks of a mask in which the robot is restricted, as rectangles (4, 2) in m."""
+    """Return the blocks of a filter mask that restrict the robot, as rectangles (4, 2) in m."""
     cells = zone.cells or MaskBlocks(1.0)
     restricted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
     boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in restricted]
@@ -137,20 +137,20 @@ def _mask_outlines(zone: FilterZone) -> list[Array]:
 
 
 def _label_distance(canvas: Canvas, outline: Array) -> float:
-    """Return half of the shorter side of the bounding box of an outline, in pixels."""
+    """Return the distance of a label from the center of an outline in pixels: half of the outline's shorter side."""
     return float(np.ptp(outline, axis=0).min()) * canvas.scale / 2
 
 
 _EARLIER_POSE_COUNT = 6
 """Maximum number of earlier poses at which a moving object is drawn."""
 _MIN_MOTION_M = 0.02
-"""Minimum motion of an object for which its path and earlier poses are drawn; a rotation counts 0.3 m per rad."""
+"""Minimum motion of an object whose path and earlier poses are drawn. A rotation counts 0.3 m per rad."""
 
 
 def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw each object at its last pose, with its path and earlier poses.
+    """Draw each object at its last pose, with its path and earlier poses colored by time.
 
-    Earlier poses have the color of their time, as on the path of the robot. Removed objects have only an outline.
+    Removed objects are drawn without a fill.
     """
     trace = scene.trace
     shapes = object_outlines(trace, scene.scenery.things)
@@ -175,9 +175,8 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         is_removed = removed.get(name, -1) >= (event.tick if event else 0)
         outlines = [last.apply(outline) for outline in shapes[name]]
         for outline in outlines:
-            canvas.polygon(
-                outline, None if is_removed else (*color, 150), color, 1.0 if is_removed else 1.5, busy=not is_removed
-            )
+            fill, width = (None, 1.0) if is_removed else ((*color, 150), 1.5)
+            canvas.polygon(outline, fill, color, width, blocks_labels=not is_removed)
             canvas.add_part(f"{kind} {name}{' removed' if is_removed else ''}", outline)
         if person:
             _draw_heading(canvas, last, outlines[0])
@@ -215,10 +214,7 @@ def _draw_heading(canvas: Canvas, pose: Pose2, outline: Array) -> None:
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
-    """Return the indices of samples that are evenly spread over the path of an object, without its end.
-
-    Return [] if the object hardly moved.
-    """
+    """Return the indices of samples evenly spread over the path of an object without its end; [] without motion."""
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))

@@ -1,7 +1,7 @@
-"""Compact encoding of arrays of numbers for the replay page, and selection of samples to limit its size.
+"""Compact encoding of arrays of numbers for the replay page, and selection of samples to limit the size of the page.
 
 Numbers are rounded to multiples of a step. The differences between successive numbers are stored as zigzag varints, as
-in Protocol Buffers, and the scripts of the page decode them.
+in Protocol Buffers.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from simscen.core.geometry import Array
 from simscen.core.records.trace import Ticks
 
 INFINITE_STEPS = 2**30
-"""Number of steps that stands for infinity; one more stands for nan."""
+"""Number of steps that encodes infinity. INFINITE_STEPS + 1 encodes nan."""
 
 Column = list[float]
-"""Reference to an encoded array: offset of its first byte, number of its elements, and step."""
+"""Reference to an encoded array: offset of the first byte, number of elements, and step."""
 
 
 class PackedColumns:
-    """Collects encoded arrays. `reductions` are notes for the page on data of which only a part was added."""
+    """Collects encoded arrays. `reductions` are notes about data of which the page contains only a part."""
 
     def __init__(self) -> None:
         self.reductions: list[str] = []
@@ -26,7 +26,7 @@ class PackedColumns:
         self._size = 0
 
     def add(self, values: "npt.ArrayLike", step: float = 1.0) -> Column:
-        """Add the numbers of an array in C order, rounded to multiples of `step`, and return the reference to them."""
+        """Add the numbers of an array in C order, rounded to multiples of `step`, and return a reference."""
         steps = quantize(np.asarray(values, dtype=np.float64).ravel(), step)
         data = varints(zigzag(np.diff(steps, prepend=0)))
         start = self._size
@@ -91,9 +91,9 @@ def evenly_spaced(count: int, max_count: int) -> Indices:
 
 
 def spaced_in_time(ticks: Ticks, period: int) -> Indices:
-    """Return the indices of samples that are at least `period` ticks apart, and of the last sample before each pause.
+    """Return the indices of samples at least `period` ticks apart, and of the last sample before each longer gap.
 
-    A pause is a gap of more than two periods.
+    A longer gap is more than two periods.
     """
     indices: list[int] = []
     last = None
@@ -106,10 +106,7 @@ def spaced_in_time(ticks: Ticks, period: int) -> Indices:
 
 
 def keep_extremes(values: Array, max_count: int) -> Indices:
-    """Return the indices of at most `max_count` samples: the minimum and the maximum of segments of equal length.
-
-    In contrast to evenly spaced samples, these include short peaks.
-    """
+    """Return the indices of at most `max_count` samples: the minimum and the maximum of segments of equal length."""
     if len(values) <= max_count:
         return np.arange(len(values))
     segments = np.array_split(np.arange(len(values)), max(1, max_count // 2))

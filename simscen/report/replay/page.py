@@ -1,11 +1,9 @@
 """Replay page, replay.html: a single file that plays one run, or two runs side by side.
 
-HTML, CSS, and JavaScript modules are files of the package. The modules are joined to one script in the order of their
-imports, because a page without a server cannot load modules.
+The JavaScript modules are joined to one script, because a page without a server cannot load modules.
 """
 
 import base64
-import hashlib
 import json
 import re
 import struct
@@ -22,7 +20,7 @@ from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE
 from simscen.record.log_header import scenery_from_header
 from simscen.record.log_reader import Log
-from simscen.report.display_text import escape_control, one_line
+from simscen.report.display_text import csp_hash, escape_control, one_line
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
@@ -51,16 +49,16 @@ def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
 
 
 def page_html(title: str, data: bytes, numbers: bytes) -> str:
-    """Return the HTML with a content security policy that allows only its own script and style.
+    """Return the HTML with a content security policy that allows only the script and style of the page.
 
-    `data` is a JSON document, `numbers` the bytes of PackedColumns. Both are compressed.
+    `data` is a JSON document, `numbers` are the bytes of PackedColumns.
     """
     compressed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _COMPRESSION_LEVEL)
     packed = compressed[2:-4]  # deflate without header
     parts = {name: (PAGE_FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
     parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
     policy = (
-        f"default-src 'none'; script-src '{_digest(parts['js'])}'; style-src '{_digest(parts['css'])}'; "
+        f"default-src 'none'; script-src '{csp_hash(parts['js'])}'; style-src '{csp_hash(parts['css'])}'; "
         "img-src data:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"
     )
     values = {"policy": policy, "title": escape(title), "style": parts["css"], "script": parts["js"]}
@@ -77,7 +75,7 @@ def script() -> str:
 
 
 def _in_order(texts: Mapping[str, str]) -> list[str]:
-    """Return the names of the modules, each after the modules that it imports. `texts` is their source by name."""
+    """Return the names of the modules in the order of their imports. `texts` is the source of each module by name."""
     ordered: list[str] = []
 
     def visit(name: str) -> None:
@@ -95,17 +93,12 @@ def _title(run: Mapping[str, Any]) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def _digest(text: str) -> str:
-    """Return the hash of a script or style as a source of the content security policy."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
-
-
 MAX_MASK_BLOCKS = 2000
 """Maximum number of blocks of a filter mask to draw, the largest first."""
 
 
 def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
-    """Return the objects, places, ramps, floors, and zones of a log, and the map of the world, as JSON data."""
+    """Return the objects, places, ramps, floors, zones, and map of the world in a log as JSON data."""
     scenery = scenery_from_header(log.header)
     return {
         "things": {
@@ -149,10 +142,7 @@ MAX_SCENARIO_CHARACTERS = 400_000
 
 
 def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, Any]:
-    """Return the JSON data of a run. Its key `robots` has the data of each robot.
-
-    References to encoded arrays are in `columns`, to which the arrays are added.
-    """
+    """Return the JSON data of a run. Long arrays are added to `columns`; the data contains references to them."""
     parts: Mapping[str, Log] = log.robots or {"": log}
     sources = {name: read_source_lines(log.header.scenario, name) for name in parts}
     lines = {name: source_lines for name, (source_lines, _) in sources.items()}
@@ -198,7 +188,7 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
 
 
 def _spawned(event: Event) -> dict[str, Any]:
-    """Return the JSON data of a spawned object: tick, pose, and outlines in its own frame."""
+    """Return the JSON data of a spawned object: tick, pose, and outlines in the frame of the object."""
     parts: Any = event.data.get("parts")
     outlines = parts if isinstance(parts, list) and parts else []
     return {

@@ -1,7 +1,7 @@
 """Data of one robot for the replay page: poses, scans, particles, plans, and costmaps.
 
-Functions return JSON data in which a long array is a reference to PackedColumns, to which the array is added. Data that
-exceeds a limit of this module is reduced, and the page gets a note about this.
+Functions return JSON data. Long arrays are added to `columns`; the data contains references to them. Data that exceeds
+a limit of this module is reduced, with a note on the page.
 """
 
 from collections.abc import Sequence
@@ -26,26 +26,26 @@ from simscen.report.replay.stack_report import behavior_tree_data, log_lines_dat
 from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
-"""Maximum number of beams per scan, and of ranges of all scans of a lidar together."""
+"""Maximum number of beams per scan, and of ranges in all scans of a lidar."""
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
 """Maximum number of particles per cloud, and of clouds per robot."""
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
-"""Maximum number of points per plan, and of points of all plans together; each plan keeps at least 8 points."""
+"""Maximum number of points per plan, and in all plans together. Each plan keeps at least 8 points."""
 MAX_LOCAL_PLANS = 1500
 """Maximum number of local plans per robot."""
 MAX_GRID_CELLS = 2_000_000
-"""Maximum number of cells of all grids on a costmap topic together."""
+"""Maximum number of cells in all grids of a costmap topic."""
 _POINT_STEP_M, _PARTICLE_YAW_STEP_RAD = 0.01, 0.02
-"""Steps to which positions and ranges, and the headings of particles, are rounded."""
+"""Steps to which positions and ranges, and headings of particles, are rounded."""
 
 
 def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the scans of each lidar with the ticks at which they were received and measured."""
+    """Return the scans of each lidar, with the ticks at which the scans were received and measured."""
     return [_lidar(topic, messages, sensors, columns) for topic, messages in sorted(sensors.scans.items()) if messages]
 
 
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
-    """Return the scans of one lidar. Scans whose number of beams differs from that of the first one are omitted."""
+    """Return the scans of one lidar that have as many beams as the first scan."""
     first = sensors.scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
@@ -71,7 +71,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
 
 
 def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the particle clouds, each reduced to MAX_PARTICLES; None if the log has none."""
+    """Return the particle clouds with at most MAX_PARTICLES particles; None if the log has none."""
     if not sensors.particles:
         return None
     indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
@@ -90,19 +90,19 @@ def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str,
 
 
 def plans_data(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the plans with the ticks at which they were made; None without plans."""
+    """Return the planner's plans, with the ticks at which they were made; None without plans."""
     return _paths([(plan.tick, plan.points[:, :2]) for plan in plans], columns)
 
 
 def local_plans_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the local plans of the controller; None without any."""
+    """Return the controller's local plans; None without local plans."""
     indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
     return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in indices], columns)
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
-    """Return paths, each a tick and positions (n, 2) in m; None without paths."""
+    """Return `paths`, pairs of a tick and positions (n, 2) in m, as JSON data; None without paths."""
     if not paths:
         return None
     max_points = max(8, min(MAX_PLAN_POINTS, MAX_PATH_POINTS // len(paths)))
@@ -117,7 +117,7 @@ def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, 
 
 
 def occupancy_grid_data(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
-    """Return a grid; its cells are listed row by row, starting at the pose of its origin."""
+    """Return a grid with the cells in row-major order, as in nav_msgs/OccupancyGrid."""
     rows, width = grid.shape
     return {
         "width": width,
@@ -136,7 +136,7 @@ def costmaps_data(sensors: SensorMessages, trace: Trace, columns: PackedColumns)
 def _costmap(
     topic: str, messages: LoggedMessages, sensors: SensorMessages, trace: Trace, columns: PackedColumns
 ) -> dict[str, Any]:
-    """Return the grids of a topic; a grid with the same origin as the previous one is stored as differences."""
+    """Return the grids of a topic. A grid with the same origin as the previous grid is stored as differences."""
     _, first = sensors.costmap(messages[0][1])
     indices = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
     columns.note_reduction(f"grids on {one_line(topic)}", len(indices), len(messages))
@@ -188,8 +188,8 @@ def robot_data(
 ) -> dict[str, Any]:
     """Return the data of one robot.
 
-    `name` is "" for a single robot. `lines` are the positions of its goals in the scenario file. `spec` is the
-    specification of the scenario, whose temporal criteria select further signals; None if it is invalid.
+    `name` is "" for a single robot. `lines` are line numbers in the scenario file. `spec` is the specification of the
+    scenario, for plots of the signals in temporal criteria; None if the scenario is invalid.
     """
     trace, case = log.trace, log.header.case
     return {
@@ -215,7 +215,7 @@ def robot_data(
 
 
 def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
-    """Return each goal once, even if it is repeated in several loops."""
+    """Return each goal once, even if the robot drives to the goal in several loops."""
     goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
         base = goal.name.partition("#")[0] if goal.name.partition("#")[0] in lines.goals else goal.name
@@ -234,7 +234,7 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
 
 
 def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
-    """Return at most MAX_POSES of the poses with their ticks. Headings are continuous beyond 180 degrees."""
+    """Return at most MAX_POSES poses with their ticks. Headings are unwrapped."""
     indices = evenly_spaced(len(samples), MAX_POSES)
     columns.note_reduction("poses", len(indices), len(samples))
     x, y, yaw = samples.values[indices, :3].T
@@ -257,7 +257,7 @@ def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
 
 
 def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str]) -> list[dict[str, Any]]:
-    """Return the poses of moving objects, at most 20 per second, without the objects that are `robots`."""
+    """Return the poses of moving objects, at most 20 per second. `robots` are the names of objects to omit."""
     objects = []
     for name, samples in sorted(trace.objects.items()):
         if name in robots or not len(samples):

@@ -1,4 +1,4 @@
-"""Signal plots on the replay page: the signals over time, and the limits that criteria set on them."""
+"""Signal plots on the replay page: signals (quantities over time), and the limits that criteria set on signals."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
 
 MAX_SAMPLES = 6000
-"""Maximum number of samples per plot: twice the columns of a wide screen."""
+"""Maximum number of samples per plot."""
 _STEP_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
-"""Step to which values are rounded, by their unit."""
+"""Step to which values are rounded, by unit."""
 _EXCLUDED_SIGNALS = frozenset({"time", "started"})
-"""Signals without interest as a plot."""
+"""Signals that are not plotted."""
 _SIGNAL_OF_CRITERION = {
     ("clearance", "m"): "clearance",
     ("speed", "m/s"): "speed",
@@ -36,12 +36,12 @@ _SIGNAL_OF_CRITERION = {
     ("recoveries", ""): "recovery_count",
     ("collisions", ""): "collision_count",
 }
-"""Signal that a criterion limits, by criterion and unit of the finding."""
+"""Signal that a criterion limits, by criterion and by unit of the finding (checked bound)."""
 
 
 @dataclass(frozen=True)
 class SignalPlot:
-    """Signal to plot, with its arguments by name, such as the object of a distance."""
+    """Signal to plot, with the arguments of the signal by name, such as the object of `distance_to`."""
 
     signal: SignalName
     arguments: SignalArguments
@@ -54,9 +54,9 @@ class SignalPlot:
 
 
 def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the data of all plots: signals without arguments, and signals with the arguments in temporal criteria.
+    """Return the data of all plots: signals without arguments, and signals in the temporal criteria of `spec`.
 
-    Signals that the trace does not contain are omitted. `spec` is None if the scenario is not valid.
+    Signals that the trace (recorded run) does not contain are omitted. `spec` is None if the scenario is invalid.
     """
     in_criteria = dict.fromkeys(_signals_in_criteria(spec)) if spec is not None else {}
     without_arguments = [
@@ -70,7 +70,7 @@ def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: P
 
 
 def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, Any]]:
-    """Return the limits of signals in the findings about a robot ("" for a single one), with the verdict and status."""
+    """Return the limits of signals in the findings about `robot` ("" for a single robot), with verdict and status."""
     limits = []
     for verdict in verdicts:
         owner, _, _ = verdict.id.rpartition("/")
@@ -100,7 +100,7 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
 
 
 def _step(unit: str, values: Array) -> float:
-    """Return the step to which the values of a signal are rounded; 1 for whole numbers without a unit."""
+    """Return the step to which the values of a signal are rounded: 1 for whole numbers without a unit."""
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
@@ -108,7 +108,7 @@ def _step(unit: str, values: Array) -> float:
 
 
 def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str, Any], ...]]]:
-    """Yield each signal in temporal criteria, with the names and values of its arguments."""
+    """Yield each signal in temporal criteria, and pairs of name and value of the signal's arguments."""
     for entry in spec.pass_:
         chosen = entry.chosen
         for one in chosen.all_comparisons() if isinstance(chosen, TemporalCriterion) else ():

@@ -12,12 +12,12 @@ from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 
 MAX_TREE_CHANGES = 20_000
-"""Maximum number of changes of a behavior tree. If there are more, conditions are omitted, then the first changes."""
+"""Maximum number of changes of a behavior tree. If there are more, conditions and the first changes are omitted."""
 _RUNNING = "RUNNING"
 MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
-"""Maximum number of log lines, and maximum length of each."""
+"""Maximum number of log lines, and maximum length of a line."""
 MAX_PARAMETERS, MAX_VALUE_CHARACTERS = 3000, 300
-"""Maximum number of parameters of all nodes together, and maximum length of each value."""
+"""Maximum number of parameters of all nodes together, and maximum length of a value."""
 _WARNING, _ERROR = 30, 40
 """Levels in rcl_interfaces/msg/Log."""
 _TREE_CHANGE = re.compile(r"(.*): (\w+) -> (\w+)", re.DOTALL)
@@ -26,7 +26,7 @@ NODE_ORDER = (
     *("bt_navigator", "controller_server", "planner_server", "smoother_server", "behavior_server"),
     *("local_costmap", "global_costmap", "amcl", "map_server", "waypoint_follower"),
 )
-"""Nodes of Nav2 that the page lists first, because most failures depend on their parameters."""
+"""Nodes of Nav2 that the page lists first."""
 MAIN_PARAMETERS = frozenset(
     (
         *("plugin", "plugins", "filters", "planner_plugins", "controller_plugins", "behavior_plugins"),
@@ -41,11 +41,11 @@ MAIN_PARAMETERS = frozenset(
         *("update_min_a", "update_min_d", "recovery_alpha_fast", "recovery_alpha_slow"),
     )
 )  # fmt: skip
-"""Last parts of the names of main parameters, which the page lists first: plugins, speeds, tolerances, and sizes."""
+"""Main parameters (last part of the name), which the page lists first: plugins, speeds, tolerances, and sizes."""
 
 
 def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the changes of the behavior tree in order: tick, node, previous status, and status; None without any."""
+    """Return the changes of the behavior tree in order: tick, node, previous and new status; None without changes."""
     changes = list(_tree_changes(log))
     if not changes:
         return None
@@ -68,13 +68,14 @@ def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | Non
 
 
 def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
+    """Yield tick, node, previous status, and new status of each change of the behavior tree."""
     for tick, line in log.sensors.stack_lines():
         if line.name == BEHAVIOR_TREE_LOGGER and (found := _TREE_CHANGE.fullmatch(line.text)):
             yield tick, found[1], found[2], found[3]
 
 
 def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
-    """Return the log lines of the stack without changes of its behavior tree: tick, severity, logger, and text."""
+    """Return the last log lines of the stack (tick, severity, logger, text) without changes of the behavior tree."""
     lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _is_tree_change(line)]
     kept = lines[-MAX_LINES:]
     columns.note_reduction("log lines of the stack, the last ones", len(kept), len(lines))
@@ -95,8 +96,8 @@ def _severity(level: int) -> str:
 def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the parameters of each node; [] if the stack reported none.
 
-    The `values` of a node are lists of a name, a value as text, and whether it is a main parameter. Its `total` is the
-    number of its parameters, of which some may be omitted.
+    `values` of a node lists the name, the value as text, and whether the parameter is a main parameter. `total` is the
+    number of parameters before the reduction to MAX_PARAMETERS.
     """
     nodes = _reported_parameters(log)
     total = sum(map(len, nodes.values()))
@@ -112,7 +113,7 @@ def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
 
 
 def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
-    """Return the parameter values by node and name that the stack reported in `about`; malformed ones are ignored."""
+    """Return the reported parameter values by node and name, without malformed ones."""
     try:
         about = json.loads(log.stack.get("about", "{}"))
     except ValueError:
@@ -124,18 +125,18 @@ def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
 
 
 def is_main_parameter(name: str) -> bool:
-    """Return whether the page lists a parameter first, for example `FollowPath.desired_linear_vel`."""
+    """Return whether a parameter such as `FollowPath.desired_linear_vel` is one of MAIN_PARAMETERS."""
     return name.rpartition(".")[2] in MAIN_PARAMETERS
 
 
 def _node_rank(node: str) -> tuple[int, str]:
-    """Return a key for sorting nodes: the order of NODE_ORDER, then the name."""
+    """Return the sort key of a node: index in NODE_ORDER, then name."""
     name = node.rpartition("/")[2]
     return NODE_ORDER.index(name) if name in NODE_ORDER else len(NODE_ORDER), node
 
 
 def _value_text(value: object) -> str:
-    """Return a value as in a YAML file: strings without quotes, except for empty ones."""
+    """Return a parameter value as text, at most MAX_VALUE_CHARACTERS long. Only empty strings have quotes."""
     text = value if isinstance(value, str) and value.strip() else json.dumps(value, ensure_ascii=False)
     return _shortened(escape_control(text), MAX_VALUE_CHARACTERS)
 

@@ -1,4 +1,7 @@
-"""Timeline, verdicts, and disturbances for the replay page, each with its line in the scenario file."""
+"""Timeline, verdicts, and disturbances of a run for the replay page, with line numbers in the scenario file.
+
+A disturbance is an event or a fault of the scenario.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,6 @@ from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
 
 K = EventKind
-# Lane of the timeline for each kind of event; others are in the lane "events".
 _LANES = {
     K.GOAL_ACCEPTED: "goals", K.GOAL_REACHED: "goals", K.GOAL_PASSED: "goals", K.GOAL_FAILED: "failures",
     K.GOAL_CANCELED: "goals", K.NAVIGATION_ENDED: "goals", K.PLAN_MADE: "plans", K.PLAN_FAILED: "plans",
@@ -29,6 +31,7 @@ _LANES = {
     K.COLLISION_ENDED: "failures", K.FAULT_STARTED: "faults", K.FAULT_TOOK_EFFECT: "faults", K.FAULT_ENDED: "faults",
     K.ROBOT_HELD: "recoveries", K.ROBOT_RELEASED: "recoveries",
 }  # fmt: skip
+"""Lane (row) of the timeline by kind of event. Other kinds are in the lane "events"."""
 _INTERVAL_KINDS = {
     K.GOAL_ACCEPTED: (K.GOAL_REACHED, K.GOAL_PASSED, K.GOAL_FAILED, K.GOAL_CANCELED),
     K.RECOVERY_STARTED: (K.RECOVERY_ENDED,),
@@ -37,7 +40,7 @@ _INTERVAL_KINDS = {
     K.FAULT_STARTED: (K.FAULT_ENDED,),
     K.EVENT_STARTED: (K.EVENT_ENDED,),
 }
-"""Kinds of events that start an interval, each with the kinds that end it."""
+"""Kinds of events that end an interval, by the kind of event that starts it."""
 _FAILURE_KINDS = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
 _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
 """Keys of event data that are not shown as text."""
@@ -45,7 +48,7 @@ _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index
 
 @dataclass(frozen=True)
 class TimelineEntry:
-    """One entry of a lane of the timeline: an event, or an interval between two events.
+    """Entry of the timeline: an event, or an interval between two events.
 
     Attributes:
         tick: Tick of the event, or the first tick of the interval.
@@ -55,7 +58,7 @@ class TimelineEntry:
         ended: Kind of the event that ended the interval; "" if the run ended first.
         is_failure: Whether the event is a failure, such as a collision.
         line: Line in the scenario file; 0 if unknown.
-        name: Name of the goal, fault, object, or event that the entry is about.
+        name: Name of the goal, fault, object, or event.
         text: Further data of the event as text.
         place: Position (x, y) in m; () if the event has none.
         about: Data of a zone.switched event, which the page needs to draw the zone; otherwise {}.
@@ -74,7 +77,7 @@ class TimelineEntry:
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def as_data(self, robot: str) -> dict[str, Any]:
-        """Return the entry as JSON data without empty values. `robot` is the name of its robot; "" for a single one."""
+        """Return the entry as JSON data without empty values. `robot` is "" in a run with a single robot."""
         data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
         more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.is_failure, "line": self.line}
         more |= {"place": self.place, "about": self.about}
@@ -82,10 +85,7 @@ class TimelineEntry:
 
 
 def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
-    """Return the entries for the events of a robot in order, and with `with_world` also those of the world.
-
-    `lines` are the line numbers in the scenario file.
-    """
+    """Return the entries for the events of a robot in order. With `with_world`, include the events of the world."""
     entries: list[TimelineEntry] = []
     open_intervals: dict[tuple[EventKind, str], int] = {}
     for event in trace.events:
@@ -143,7 +143,7 @@ def _is_number(value: object) -> bool:
 
 
 def _line(event: Event, lines: SourceLines) -> int:
-    """Return the line of the event, fault, or goal of a scenario that an event is about; 0 if unknown."""
+    """Return the line of the scenario's event, fault, or goal to which a recorded event belongs; 0 if unknown."""
     entry = event.data.get("entry")
     if isinstance(entry, int):
         return (lines.faults if str(event.kind).startswith("fault.") else lines.events).get(entry, 0)
@@ -153,7 +153,7 @@ def _line(event: Event, lines: SourceLines) -> int:
 
 
 def verdict_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """Return the JSON data of all verdicts in order, each with its robot. `lines` are the line numbers by robot."""
+    """Return the JSON data of all verdicts in order. `lines` are the line numbers by robot."""
     return [_verdict(verdict, result, lines) for verdict in result.verdicts]
 
 
@@ -197,7 +197,7 @@ def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines])
 
 
 def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
-    """Return the line of the disturbance that a verdict on a missing disturbance is about; 0 for other verdicts."""
+    """Return the line of the disturbance for a verdict about a missing disturbance; 0 for other verdicts."""
     if verdict.criterion != DISTURBANCE:
         return 0
     ordered = [one.disturbance for one in result.disturbances]
@@ -218,7 +218,7 @@ def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SourceLines:
-    """Line numbers in the text of a scenario: of criteria and goals by name, of events and faults by index."""
+    """Line numbers in a scenario file: of criteria and goals by name, of events and faults by index."""
 
     criteria: dict[str, int] = field(default_factory=dict)
     goals: dict[str, int] = field(default_factory=dict)
@@ -227,10 +227,9 @@ class SourceLines:
 
 
 def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
-    """Return the line numbers of a robot and the specification of a scenario, from its text.
+    """Return the line numbers for a robot ("" for a single robot) and the specification of a scenario, from its text.
 
-    Return no line numbers and None if the scenario is invalid, for example because a package that it needs is not
-    installed. `robot` is "" for a single robot.
+    Return no line numbers and None if the scenario is invalid.
     """
     if not text:
         return SourceLines(), None
@@ -254,10 +253,7 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
 
 
 def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """Return the names of all goals as ScenarioSpec.goal_names does.
-
-    In contrast to that function, the pose of a goal can still be the name of a place.
-    """
+    """Return the names of all goals. In contrast to ScenarioSpec.goal_names, a pose can be the name of a place."""
     used_names, names = {goal.name for goal in spec.goals}, list[str]()
     for number, goal in enumerate(spec.goals, start=1):
         pose: Any = goal.pose

@@ -1,4 +1,4 @@
-"""Small HTML elements of report.html: links, outcome symbols, line charts, and pictures. All their text is escaped."""
+"""HTML elements of report.html: links, outcome symbols, line charts, and pictures. Text in the elements is escaped."""
 
 import base64
 import re
@@ -20,7 +20,7 @@ OUTCOME_SYMBOLS = {
 
 
 def outcome_badge(outcome: Outcome) -> str:
-    """Return an outcome as a word with a symbol, so that it can be recognized without color."""
+    """Return an outcome as a symbol and a word."""
     word = outcome.value.replace("-", " ")
     return (
         f'<span class="pill {outcome.value}"><span aria-hidden="true">{OUTCOME_SYMBOLS[outcome]} </span>{word}</span>'
@@ -28,17 +28,14 @@ def outcome_badge(outcome: Outcome) -> str:
 
 
 def outcome_symbols(outcomes: Sequence[Outcome | None], label: str) -> str:
-    """Return one symbol per outcome in this order; None (the run did not take place) is a dot.
-
-    Screen readers read `label` and the outcomes as words.
-    """
+    """Return one symbol per outcome in order, with a dot for None (no run). `label` is for screen readers."""
     symbols = "".join(OUTCOME_SYMBOLS[outcome] if outcome else "·" for outcome in outcomes)
     words = ", ".join(outcome.value.replace("-", " ") if outcome else "not run" for outcome in outcomes)
     return f'<span class="marks" role="img" aria-label="{label}: {words}">{symbols}</span>'
 
 
 def link(path: str, folder: str, label: str) -> str:
-    """Return a link to a file in the output `folder` of the session; "" for a file outside of it."""
+    """Return a link to a file in the output `folder` of the session; "" for a file outside of the folder."""
     if not path or not folder or not PurePath(path).is_relative_to(folder) or ".." in PurePath(path).parts:
         return ""
     return f'<a href="./{quote(relative_path(path, folder))}">{html_text(label)}</a>'
@@ -51,10 +48,7 @@ def anchor(key: RunKey) -> str:
 
 
 def sparkline(values: Sequence[float], label: str, low: float, high: float) -> str:
-    """Return a small line chart (SVG) of values from left to right, with an axis from `low` to `high`.
-
-    Screen readers read `label`.
-    """
+    """Return a small line chart (SVG) with a vertical axis from `low` to `high`. `label` is for screen readers."""
     span, step = (high - low) or 1.0, 72 / max(1, len(values) - 1)
     points = [(4 + step * k, 18 - 14 * (value - low) / span) for k, value in enumerate(values)]
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
@@ -67,13 +61,13 @@ def sparkline(values: Sequence[float], label: str, low: float, high: float) -> s
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 MAX_EMBEDDED_BYTES = 6 * 2**20
-"""Maximum size of all embedded pictures together. CI systems truncate larger pages."""
+"""Maximum size of all embedded pictures together."""
 
 
 def embedded_pictures(runs: Sequence[RunFinished], folder: str) -> dict[RunKey, str]:
-    """Return the HTML of the picture of each run by its key, without runs that have no picture.
+    """Return the HTML of each run's picture by run key, without runs that have no picture.
 
-    The pictures are embedded in the order of `runs` until MAX_EMBEDDED_BYTES are reached; the others are links.
+    Pictures are embedded in the order of `runs` until MAX_EMBEDDED_BYTES are reached. Further pictures become links.
     """
     pictures, available = {}, MAX_EMBEDDED_BYTES
     for run in runs:
@@ -86,7 +80,7 @@ def embedded_pictures(runs: Sequence[RunFinished], folder: str) -> dict[RunKey, 
 
 
 def _embedded_picture(path: Path, run: RunFinished) -> str:
-    """Return the picture as a data URL; "" for a file that is not a PNG."""
+    """Return an <img> element with the picture as a data URL; "" for a file that is not a PNG."""
     content = path.read_bytes()
     if not content.startswith(PNG_MAGIC):
         return ""  # do not embed other files that a manipulated journal names
@@ -96,5 +90,6 @@ def _embedded_picture(path: Path, run: RunFinished) -> str:
 
 
 def _picture_link(path: Path, folder: str) -> str:
+    """Return a link to a picture that is not embedded."""
     target = link(str(path), folder, "picture") or f"picture: <code>{html_text(str(path))}</code>"
     return f'<p class="quiet">{target} (not embedded, because the page would be too large)</p>'

@@ -16,7 +16,7 @@ _GOOD = tuple(outcome for outcome in Outcome if outcome.good)
 
 
 def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return the section; "" without earlier sessions. `past` are the earlier sessions, newest first."""
+    """Return the section; "" without earlier sessions. `past` are these sessions, newest first."""
     if not past:
         return ""
     rows = "".join(_session_row(session) for session in past)
@@ -40,7 +40,7 @@ def _session_row(session: PastSession) -> str:
 
 
 def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return a line chart of the rate of good outcomes in the earlier sessions and this one."""
+    """Return a line chart of the fraction of good outcomes in the earlier sessions and in this session."""
     shares = [session.count(*_GOOD) / max(1, len(session.runs)) for session in reversed(past)]
     shares.append(sum(run.outcome.good for run in runs) / max(1, len(runs)))
     values = ", ".join(f"{share:.0%}" for share in shares)

@@ -1,7 +1,5 @@
-"""Page of the HTML report: headline, filters, and entries of all runs, in one file without other resources."""
+"""HTML report of a session, report.html: headline, filters, and entries of all runs in a single file."""
 
-import base64
-import hashlib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,7 +12,7 @@ from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
 from simscen.report.comparison_markup import comparison_html
-from simscen.report.display_text import html_text, number_with_noun
+from simscen.report.display_text import csp_hash, html_text, number_with_noun
 from simscen.report.picture.palette import css_variables
 from simscen.report.session_history import PastSession, outcome_change, past_outcomes
 from simscen.report.suite import elements
@@ -26,7 +24,7 @@ from simscen.report.suite.study_section import study_html
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 """Order of runs on the page, by outcome."""
 MAX_SYMBOLS = 200
-"""Maximum number of runs of a scenario for which its heading shows a symbol for the outcome of each."""
+"""Maximum number of runs of a scenario whose outcomes the heading shows as symbols."""
 MAX_LISTED_RUNS = 2000
 """Maximum number of runs on the page."""
 _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
@@ -34,7 +32,7 @@ _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
 
 @dataclass(frozen=True)
 class RunningSession:
-    """Progress of a running session: the number of all its runs, and the keys of the runs that workers simulate now."""
+    """Progress of a running session: total number of runs, and keys of the runs that are simulated now."""
 
     total: int
     current: tuple[RunKey, ...] = ()
@@ -49,7 +47,7 @@ class SessionReport:
         past: Earlier sessions, newest first.
         comparison: Comparison of several stacks; None for one stack.
         folder: Output folder of the session, for links; "" for a page without links.
-        files: Names of other reports in the folder, to which the page links.
+        files: Names of other reports in the folder, for links.
         live: Progress of a running session; None for one that has ended.
         study: Result of `simscen study`; None for other sessions.
         title: Title of the page.
@@ -66,7 +64,7 @@ class SessionReport:
 
 
 def to_html(report: SessionReport) -> str:
-    """Return the page, with failures first and expanded. Reads the pictures of the runs from their files."""
+    """Return the page, with failures first and expanded. The pictures of the runs are read from their files."""
     totals = Totals(report.runs)
     listed = listed_runs(report.runs)
     ordered = sorted(listed, key=lambda run: run.key)
@@ -85,7 +83,7 @@ def to_html(report: SessionReport) -> str:
         f'<!doctype html>\n<html lang="en"{" data-live" if report.live else ""}>\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
-        f"style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'\">\n"
+        f"style-src '{csp_hash(style)}'; script-src '{csp_hash(script)}'; base-uri 'none'; form-action 'none'\">\n"
         f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if report.live else ''}"
         f"<title>{html_text(report.title)}: {counts}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f"<header>{_headline(report, totals, counts, len(listed))}</header>\n<main>\n"
@@ -98,7 +96,7 @@ def to_html(report: SessionReport) -> str:
 
 
 class Totals:
-    """Sums over all runs, also over those that the page does not list.
+    """Sums over all runs of the session, including runs that the page does not list.
 
     Attributes:
         outcomes: Number of runs by outcome.
@@ -120,7 +118,7 @@ class Totals:
 
 
 def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
-    """Return at most MAX_LISTED_RUNS of the runs. If there are more, failures and errors come first."""
+    """Return at most MAX_LISTED_RUNS runs. If some are omitted, the failures and errors come first."""
     if len(runs) <= MAX_LISTED_RUNS:
         return runs
     bad, good = list[int](), list[int]()
@@ -148,7 +146,7 @@ def _headline(report: SessionReport, totals: Totals, counts: str, listed: int) -
 
 
 def _outcome_bar(totals: Totals) -> str:
-    """Return a bar of colored segments, whose lengths are the numbers of runs by outcome."""
+    """Return a bar with one colored segment per outcome. The length of a segment is its number of runs."""
     parts, start = "", 0
     for outcome in reversed(ORDER):
         number = totals.outcomes[outcome]
@@ -159,7 +157,7 @@ def _outcome_bar(totals: Totals) -> str:
 
 
 def _progress(live: RunningSession, done: int) -> str:
-    """Return a progress bar and the names of the current runs; `done` is the number of finished runs."""
+    """Return a progress bar and the names of the current runs. `done` is the number of finished runs."""
     names = ", ".join(html_text(full_run_name(key)) for key in live.current)
     return (
         f'<p id="live" role="status"><progress max="{live.total}" value="{done}" aria-label="runs done"></progress> '
@@ -171,7 +169,7 @@ def _progress(live: RunningSession, done: int) -> str:
 def _group_element(group: list[RunFinished], report: SessionReport, totals: Totals, pictures: dict[RunKey, str]) -> str:
     """Return the entries of the runs of one scenario, below a heading if there are several.
 
-    `pictures` is the HTML of the picture of each run that has one.
+    `pictures` is the HTML of the pictures by run key.
     """
     ranked = sorted(group, key=_severity_order)
     elements = "\n".join(
@@ -211,11 +209,6 @@ def _asset(name: str) -> str:
     return files("simscen").joinpath("data").joinpath("suite").joinpath(name).read_text("utf-8")
 
 
-def _hash(part: str) -> str:
-    """Return the hash of a style or script as a source of the content security policy."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(part.encode()).digest()).decode()}'"
-
-
 _ORDERS = {
     "": "failures first",
     "name": "by name",
@@ -223,13 +216,11 @@ _ORDERS = {
     "wall": "longest wall time first",
     "margin": "smallest margin first",
 }
+"""Labels of the orders of runs, by value of the option in the form."""
 
 
 def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return the search field, filters for properties of runs that have several values, and the choice of the order.
-
-    The form is hidden until the script of the page shows it.
-    """
+    """Return a form with a search field, filters for properties that differ between runs, and the order of runs."""
     number = Counter(run.outcome for run in runs)
     statuses = "".join(
         f'<label class="{outcome.value}"><input type="checkbox" name="status" value="{outcome.value}" checked> '
@@ -260,7 +251,7 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
 
 
 def _select(name: str, counts: Counter[str]) -> str:
-    """Return a filter for a property; "" if all runs have the same value. `counts` is the number of runs by value."""
+    """Return a filter for a property. `counts` is the number of runs by value. Return "" if there is only one value."""
     named = sorted(value for value in counts if value)
     if not named or len(counts) < 2:
         return ""

@@ -42,8 +42,8 @@ def run_element(
     """Return the entry of a run. Failures and errors are expanded.
 
     `folder` is the output folder of the session. `picture` is the HTML of the picture of the run; "" for none. `past`
-    are the outcomes of the run in earlier sessions, oldest first; None for a session without the run. `is_one_of_many`
-    omits the scenario from the name, because a heading above several runs contains it.
+    are the outcomes of the run in earlier sessions, oldest first, with None for a session without the run.
+    `is_one_of_many` omits the scenario from the name of the run.
     """
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if is_one_of_many else run.key.test
@@ -79,14 +79,14 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
 
 
 def theme(key: RunKey) -> str:
-    """Return the theme of a scenario, a filter of the page: its folder, "faults" for "scenarios/faults/lidar_off"."""
+    """Return the folder of a scenario, by which the page filters: "faults" for "scenarios/faults/lidar_off"."""
     return key.scenario.rpartition("/")[0].rpartition("/")[2]
 
 
 def smallest_margin(run: RunFinished) -> float | None:
-    """Return the smallest margin of all findings, as a fraction of the limit; None if no finding has one.
+    """Return the smallest margin of all findings as a fraction of the limit; None if no finding has a margin.
 
-    It is negative if the limit is violated. Findings without a unit, such as counts, are ignored.
+    The margin is negative if the limit is violated. Findings without a unit, such as counts, are ignored.
     """
     findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
     return min((margin for finding in findings if (margin := _relative_margin(finding)) is not None), default=None)
@@ -183,7 +183,7 @@ def _has_content(path: str) -> bool:
 
 
 def _details(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
-    """Return the command that repeats a run, its earlier durations, tags, metrics, and console output."""
+    """Return the command that repeats a run, simulated times in earlier sessions, tags, metrics, and console output."""
     again = f'<p class="again">again: <code>{escape(shell_command_text(run.again))}</code></p>' if run.again else ""
     tags = "".join(f'<span class="tag">{html_text(tag)}</span> ' for tag in run.tags)
     known = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
@@ -193,7 +193,7 @@ def _details(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
 
 
 def _console_output(run: RunFinished) -> str:
-    """Return the lines that the console shows below a run, as text that can be copied; "" without lines."""
+    """Return the lines that the console prints below a run; "" without lines."""
     text = "\n".join(plain_text(line).rstrip() for line in violation_lines(run))
     return (
         _collapsible("console output", f'<pre tabindex="0">{escape(escape_control(dedent(text)))}</pre>')
@@ -203,12 +203,12 @@ def _console_output(run: RunFinished) -> str:
 
 
 def _collapsible(title: str, inside: str) -> str:
-    """Return a section that is collapsed at first. `inside` is HTML."""
+    """Return a section that is initially collapsed. `inside` is HTML."""
     return f'<details class="metrics"><summary>{title}</summary>{inside}</details>'
 
 
 def _duration_sparkline(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
-    """Return a line chart of the simulated time in the last sessions and this one; "" for fewer than three values."""
+    """Return a line chart of the simulated times in the last sessions; "" for fewer than three values."""
     known = [one.simulated for one in past if one is not None] + [run.result.simulated]
     if len(known) < 3:
         return ""

@@ -1,4 +1,7 @@
-"""Section of the HTML report about a study: claim, pass rates, effects, and plots whose points link to replays."""
+"""Section of the HTML report about a study (many runs of a scenario): claim, pass rates, effects, and plots.
+
+A claim is a minimum pass rate that the study tests.
+"""
 
 from collections.abc import Sequence
 
@@ -16,18 +19,15 @@ from simscen.report.study import (
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
-"""Maximum number of parameters with a plot, those with the strongest effects first."""
+"""Maximum number of parameters with a plot. Parameters with the strongest effects come first."""
 MAX_POINTS = 2000
-"""Maximum number of runs in a plot; runs that did not pass have priority."""
+"""Maximum number of runs in a plot. Runs that did not pass have priority."""
 WIDTH, HEIGHT, MARGIN = 420, 220, 44
 """Size of a plot, and space for the axis labels to the left and below, in SVG units."""
 
 
 def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return the section. Each point of a plot is a run, and links to its replay or log.
-
-    `folder` is the output folder of the session, to which the links are relative.
-    """
+    """Return the section. Each point of a plot is a run and links to the replay or log in the output `folder`."""
     remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in pass_rate_notes(study))
     claim = ""
     if study.claim is not None:
@@ -72,7 +72,7 @@ def _effect_table(study: Study) -> str:
 
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return plots of a margin against a parameter: for each parameter, the margin on which it has most effect."""
+    """Return for each parameter a plot of the margin that depends on it most."""
     criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
     order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
     plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])

@@ -12,7 +12,7 @@ def drawn(x: float, radius_px: float) -> np.ndarray:
     """Return the pixels of a canvas of 10 m x 10 m, 50 pixels per meter, with a disc at (x, 5)."""
     canvas = Canvas((0.0, 0.0, 10.0, 10.0), 50.0, WHITE)
     image = canvas._image
-    canvas.disc(x, 5.0, radius_px, RED, BLUE, 1.0, busy=True)
+    canvas.disc(x, 5.0, radius_px, RED, BLUE, 1.0, blocks_labels=True)
     return np.asarray(image)
 
 

@@ -13,7 +13,7 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import SessionStarted
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import GitHubReporter, annotations, summary_markdown
-from simscen.report.results_json import JsonReporter, to_json
+from simscen.report.results_json import JsonReporter, json_parts
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers
@@ -208,7 +208,7 @@ def test_github_output_holds_the_plain_lines_too(session):
 def test_the_machine_format_is_the_results_file_and_nothing_else(session, passed, failed, crashed):
     out = io.StringIO()
     told(JsonReporter(out), session)
-    assert json.loads(out.getvalue()) == json.loads(to_json([passed, failed, crashed], "out"))
+    assert json.loads(out.getvalue()) == json.loads("".join(json_parts([passed, failed, crashed], "out")))
     assert "##[" not in out.getvalue()
 
 

@@ -10,7 +10,7 @@ from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations
-from simscen.report.junit import to_xml
+from simscen.report.junit import xml_parts
 from simscen.report.suite import SessionReport, to_html
 
 FELL = DisturbanceOutcome(
@@ -56,7 +56,7 @@ def test_a_run_that_passed_stays_one_line(passed):
 
 
 def test_junit_tells_all_of_them_and_names_the_one_that_failed(disturbed):
-    case = next(ElementTree.fromstring(to_xml([disturbed])).iter("testcase"))
+    case = next(ElementTree.fromstring(b"".join(xml_parts([disturbed]))).iter("testcase"))
     assert case.find("failure").get("type") == "disturbance"
     assert "lidar_off.scenario.yaml:9: disturbance did not happen" in case.find("failure").text
     assert case.find("system-out").text.splitlines()[1:4] == [

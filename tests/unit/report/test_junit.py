@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import RunFinished
-from simscen.report.junit import to_xml
+from simscen.report.junit import xml_parts
 
 JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
     "testsuites": {"name", "time", "tests", "failures", "errors"},
@@ -31,7 +31,7 @@ def of(run, **changes):
 
 
 def read(runs, **options):
-    return junitparser.JUnitXml.fromstring(to_xml(runs, **options))
+    return junitparser.JUnitXml.fromstring(b"".join(xml_parts(runs, **options)))
 
 
 def cases(document):
@@ -62,7 +62,7 @@ def test_another_reader_sees_known_failures_and_what_was_not_run_as_skipped(pass
 
 
 def test_a_failure_says_where_and_what_for_every_criterion(failed):
-    (element,) = ElementTree.fromstring(to_xml([failed])).iter("failure")
+    (element,) = ElementTree.fromstring(b"".join(xml_parts([failed]))).iter("failure")
     message = "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"
     assert element.get("message") == message
     assert element.text.splitlines() == [
@@ -73,11 +73,11 @@ def test_a_failure_says_where_and_what_for_every_criterion(failed):
 
 
 def test_file_line_properties_and_attachments_are_there(failed):
-    (case,) = ElementTree.fromstring(to_xml([failed])).iter("testcase")
+    (case,) = ElementTree.fromstring(b"".join(xml_parts([failed]))).iter("testcase")
     properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
     assert case.get("file") == failed.result.path
     called_elsewhere = replace(failed, file="../scenarios/lidar_off.scenario.yaml")
-    suite = ElementTree.fromstring(to_xml([called_elsewhere]))[0]
+    suite = ElementTree.fromstring(b"".join(xml_parts([called_elsewhere])))[0]
     assert (suite.get("name"), suite[0].get("file")) == (called_elsewhere.file,) * 2
     assert case.get("line") == "27", "where the first failed criterion is written"
     assert case.get("time") == "0.350"
@@ -95,7 +95,7 @@ def test_file_line_properties_and_attachments_are_there(failed):
 def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed):
     known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
     skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
-    root = ElementTree.fromstring(to_xml([passed, failed, crashed, known, skipped], family="xunit2"))
+    root = ElementTree.fromstring(b"".join(xml_parts([passed, failed, crashed, known, skipped], family="xunit2")))
     for element in root.iter():
         assert set(element.keys()) <= JENKINS[element.tag]
         if (seconds := element.get("time")) is not None:
@@ -107,7 +107,7 @@ def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed)
 )
 def test_a_run_that_could_not_be_completed_is_an_error_of_its_kind(crashed, kind):
     run = of(crashed, error=RunFailure(kind, "why", "worker's last words"))
-    (element,) = ElementTree.fromstring(to_xml([run])).iter("error")
+    (element,) = ElementTree.fromstring(b"".join(xml_parts([run]))).iter("error")
     assert element.get("type") == kind
     assert "worker's last words" in element.text
 
@@ -118,7 +118,7 @@ def test_names_are_unique_even_when_runs_are_not(passed):
 
 
 def test_the_order_in_which_runs_end_does_not_show(passed, failed, crashed):
-    assert to_xml([passed, failed, crashed]) == to_xml([crashed, passed, failed])
+    assert b"".join(xml_parts([passed, failed, crashed])) == b"".join(xml_parts([crashed, passed, failed]))
 
 
 @settings(max_examples=60)
@@ -126,12 +126,12 @@ def test_the_order_in_which_runs_end_does_not_show(passed, failed, crashed):
 def test_whatever_the_text_the_document_is_well_formed_and_reads_back(name, tail, kind):
     failure = RunFailure(kind, tail, tail)
     run = RunFinished(RunResult(RunKey(name, 1), name, Outcome.ERROR, error=failure, ended=name), again=tail)
-    root = ElementTree.parse(io.BytesIO(to_xml([run]))).getroot()
+    root = ElementTree.parse(io.BytesIO(b"".join(xml_parts([run])))).getroot()
     assert len(list(root.iter("testcase"))) == 1
 
 
 def test_escape_sequences_and_lone_surrogates_become_visible(crashed):
     run = of(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
-    text = to_xml([run]).decode()
+    text = b"".join(xml_parts([run])).decode()
     assert r"\x1b[31m \ud800 \u202e" in text
     assert r"\x00" in text

@@ -16,6 +16,7 @@ from simscen.report.picture.map_layer import MARGIN_M, MAX_MAP_SIZE_PX, draw_map
 from simscen.report.picture.map_picture import (
     _MARGIN_PX,
     HEADER_HEIGHT_PX,
+    draw_map_canvas,
     draw_map_picture,
     write_picture,
 )
@@ -98,7 +99,7 @@ def test_a_collision_has_a_red_star():
 
 def test_a_mark_has_a_flag_where_the_robot_was():
     marked = scene(events=[[7.5, "mark", "now"]])
-    assert dict(map_picture._map_canvas(marked).parts)["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
+    assert dict(draw_map_canvas(marked).parts)["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
     assert near(pixel(draw_map_picture(marked), 4.53, 2.66), palette.AMBER)
     assert near(pixel(draw_map_picture(scene()), 4.5, 2.5), palette.time_color(0.75), 60), "the robot is there then"
 

@@ -87,8 +87,7 @@ def everything(**changes):
 
 
 def drawn_parts(scene):
-    """The parts of the map, without the header and the sidebar."""
-    return map_picture._map_canvas(scene).parts
+    return map_picture.draw_map_canvas(scene).parts
 
 
 def told(scene):
@@ -152,8 +151,8 @@ def test_a_failure_is_reported_with_the_code_and_name_that_nav2_gives_it():
 
 
 def test_labels_keep_off_ways_robots_goals_and_each_other():
-    canvas = map_picture._map_canvas(everything())
-    busy, boxes = canvas.busy, []
+    canvas = map_picture.draw_map_canvas(everything())
+    busy, boxes = canvas.blocked_fractions, []
     for note in canvas.texts:
         wide = map_picture.font(note.size).getlength(note.text)
         left, right = (note.x - wide / 2) / LABEL_CELL_PX, (note.x + wide / 2) / LABEL_CELL_PX

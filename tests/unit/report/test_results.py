@@ -2,11 +2,11 @@ import json
 from dataclasses import replace
 
 from simscen.judge.result_json import from_data
-from simscen.report.results_json import as_document, to_json
+from simscen.report.results_json import as_document, json_parts
 
 
 def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
-    document = json.loads(to_json([failed, passed, crashed], "out"))
+    document = json.loads("".join(json_parts([failed, passed, crashed], "out")))
     assert (document["total"], document["passed"], document["failed"], document["error"]) == (3, 1, 1, 1)
     assert [run["scenario"] for run in document["runs"]] == [
         "evil/[red]::error::x",
@@ -24,12 +24,12 @@ def test_the_figures_of_the_session_are_in_it(passed, failed, crashed):
 
 
 def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(failed):
-    (run,) = json.loads(to_json([failed], "out"))["runs"]
+    (run,) = json.loads("".join(json_parts([failed], "out")))["runs"]
     assert run["artifacts"] == {"mcap": "x/run.mcap", "picture": "x/map.png", "result": "x/result.json"}
 
 
 def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
-    assert to_json([passed, failed]) == to_json([replace(failed, wall=99.0), passed])
+    assert "".join(json_parts([passed, failed])) == "".join(json_parts([replace(failed, wall=99.0), passed]))
 
 
 def test_second_runs_of_a_comparison_are_no_evidence(passed, failed):

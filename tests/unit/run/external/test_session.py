@@ -14,7 +14,7 @@ from stack_programs import DRIVE
 from simscen.cli.session.backends import backend_of
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunStarted
-from simscen.report.junit import to_xml
+from simscen.report.junit import xml_parts
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
 HELLO = 'peer = Peer("mine", topics=["/odom", "/scan"])\n'
@@ -62,7 +62,10 @@ def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbors_log_stays_th
     assert log_of(answers["fine"]) == log_of(alone)
     said = json.loads(Path(alone.artifacts.folder, "stack.json").read_text())
     assert said == {"external": "mine", "name": "mine", "version": "", "protocol": "1", "about": {}}
-    cases = {case.get("classname"): case for case in ET.fromstring(to_xml(list(answers.values()))).iter("testcase")}
+    cases = {
+        case.get("classname"): case
+        for case in ET.fromstring(b"".join(xml_parts(list(answers.values())))).iter("testcase")
+    }
     told = {name: [error.get("type") for error in cases[name].findall("error")] for name in BROKEN}
     assert told == {**{name: [kind] for name, kind in KINDS.items()}, "fine": []}
     printed = Path(answers["flood"].artifacts.folder, "stack.log")
