@@ -59,6 +59,7 @@ pass: []
 """
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("start", "end", "before", "after"),
     [

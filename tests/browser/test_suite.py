@@ -166,6 +166,7 @@ def test_page_is_readable_without_javascript(browser: object, report: Path) -> N
     context.close()
 
 
+@pytest.mark.slow
 def test_report_of_two_thousand_runs_is_usable(open_page: Opener, tmp_path: Path) -> None:
     answers = [run(f"many/{k // 20}", k % 20 + 1, 0.01 * (k % 97) - 0.02, k % 60) for k in range(2000)]
     page = tmp_path / "report.html"

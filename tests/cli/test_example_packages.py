@@ -48,6 +48,7 @@ def test_contract_tests_accept_an_entry_point_name(call, tmp_path: Path) -> None
     assert "1 passed" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("stack", "used", "scenarios"),
@@ -74,6 +75,7 @@ def test_shipped_scenarios_pass_with_it_twice_with_equal_logs(
     assert record["plugins"].keys() == {used}
 
 
+@pytest.mark.slow
 def test_keys_of_the_package_are_explained_and_in_the_schema(call) -> None:
     assert "Lazy Theta*" in call("-c", SIMSCEN, "explain", "theta_star").stdout
     assert "Room that is kept around the hull." in call("-c", SIMSCEN, "explain", "vfh_plus").stdout

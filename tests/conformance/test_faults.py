@@ -111,6 +111,7 @@ def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> 
     return Session(done.returncode, home / "out", {run["scenario"]: run for run in runs}, done.stdout)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.number} {case.name}")
 def test_fault_of_a_worker_is_reported_with_its_type(session: Session, case: Case) -> None:
     run = session.runs[f"{case.number}-{case.fault}"]

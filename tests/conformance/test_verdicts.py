@@ -135,6 +135,7 @@ def test_104_a_run_of_a_single_sample_is_refused(with_scenario) -> None:
     assert "bad.scenario.yaml:4:13: error[SC036] nothing can be judged: the second sample" in told
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "criterion",
     [
@@ -258,6 +259,7 @@ def test_109_a_comparison_with_sparse_references_says_how_much_was_compared(sims
     assert "2.7% of the beliefs" in simscen("localize", "drive.csv", "--map", "room.yaml", "--robot", "turtlebot").out
 
 
+@pytest.mark.slow
 def test_110_a_run_whose_log_was_deleted_or_replaced_is_repeated(folder: Path) -> None:
     def run(*options: str) -> None:
         command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", *options]

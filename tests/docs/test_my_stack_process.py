@@ -32,7 +32,7 @@ def called(command: str, home: Path, **variables: str) -> subprocess.CompletedPr
     return subprocess.run(command, shell=True, cwd=home, env=env, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("command", "says"), COMMANDS)
 def test_command_prints_the_output_of_the_tutorial(home: Path, command: str, says: str) -> None:
     ended = called(command, home)

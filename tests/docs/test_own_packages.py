@@ -19,6 +19,7 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("page", ["own-criterion", "own-planner-and-stack"])
 def test_every_step_of_the_tutorial_works(tmp_path: Path, page: str) -> None:

@@ -76,6 +76,7 @@ def test_plan_never_crosses_an_unknown_cell(kind: str) -> None:
         assert np.isfinite(costs_along(TraversalCosts(view, ROBOT, 2.0, False), points)).all(), (world, number)
 
 
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("space", "kind", "world", "numbers"),

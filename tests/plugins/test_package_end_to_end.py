@@ -162,6 +162,7 @@ def test_mistake_is_reported_at_its_position_with_a_suggestion(yard, old, new, w
     assert told in done.stdout and hint in done.stdout
 
 
+@pytest.mark.slow
 def test_schema_and_explain_include_the_package_but_committed_files_do_not(yard) -> None:
     schema = json.loads(simscen("schema", "scenario").stdout)
     jsonschema.Draft7Validator(schema).validate(yaml.safe_load(DRIVE))

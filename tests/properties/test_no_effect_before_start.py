@@ -185,7 +185,7 @@ def assert_the_same_until(moments: list[Moment], other: list[Moment], tick: int)
         assert same(moment, known), f"tick {moment.tick}"
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
 def test_run_is_unchanged_until_a_fault_starts(play, quiet, name: str, fault: str) -> None:
     start = drawn(name)
@@ -193,6 +193,7 @@ def test_run_is_unchanged_until_a_fault_starts(play, quiet, name: str, fault: st
     assert_the_same_until(moments, quiet[True], begun(moments, EventKind.FAULT_STARTED))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "event"), EVENTS, ids=[name for name, _ in EVENTS])
 def test_run_is_unchanged_until_an_event_starts(play, quiet, name: str, event: str) -> None:
     start, shut = drawn(name), name != "close"

@@ -118,6 +118,7 @@ def test_the_remapping_for_a_topic_with_another_name_is_suggested(ros, run) -> N
     assert "--remap /scan:=/front" in ended.said
 
 
+@pytest.mark.slow
 def test_the_output_of_a_launch_command_that_exits_is_shown(ros, run) -> None:
     ended = run("--launch", "echo no such package: nav >&2; exit 7")
     assert ended.code == 3

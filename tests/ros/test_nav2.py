@@ -38,6 +38,7 @@ def test_a_bringup_may_take_longer_than_the_limits_of_a_stack_if_ready_says_so(w
     assert ended.code == 0, ended.said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
@@ -65,6 +66,7 @@ def test_an_unusable_nav2_is_an_error_that_names_the_node(
     assert alive(tag) == []
 
 
+@pytest.mark.slow
 def test_an_aborted_bring_up_is_started_again_once(with_interfaces, run, tmp_path: Path) -> None:
     aborted = with_interfaces.node("nav2_like", *ACTION, aborts="behavior_server")
     complete = with_interfaces.node("nav2_like", *ACTION)
@@ -87,6 +89,7 @@ def test_a_bring_up_that_is_aborted_twice_is_an_error(with_interfaces, run, aliv
     assert alive(tag) == []
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_during_the_run_is_named(with_interfaces, run, alive) -> None:
     launch = with_interfaces.node("nav2_like", *ACTION, dies="planner_server", dies_at=2.0)
     ended = run("nav2", "--answer", "2", "--launch", launch, scenario="short.scenario.yaml")

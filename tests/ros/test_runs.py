@@ -44,6 +44,7 @@ def test_the_navigator_passes_a_scenario_of_the_library(ros, run, name: str) -> 
     assert ended.code == 0, ended.said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "action",
     [
@@ -134,6 +135,7 @@ def test_a_ros_without_tf2_msgs_can_drive_nodes_that_do_not_need_tf(ros, run, mo
     assert ended.about["not_published"] == ["/tf (tf2_msgs/msg/TFMessage)", "/tf_static (tf2_msgs/msg/TFMessage)"]
 
 
+@pytest.mark.slow
 def test_a_node_that_needs_tf_is_named_if_the_adapter_has_no_tf2_msgs(
     with_interfaces, run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,6 +171,7 @@ pass: [{goals_reached: {goals: [near]}}, {result: {status: CANCELED}}, {collisio
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "action",
     ["", *map(slow_value, ("navigate_to_pose", "navigate_through_poses"))],

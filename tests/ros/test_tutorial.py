@@ -14,6 +14,7 @@ FILES = dict(re.findall(r"^```(?:python|yaml)\n# (\S+)\n(.*?)^```", PAGE, re.MUL
 COMMANDS = re.findall(r"^\$ (simscen .*)$", PAGE, re.MULTILINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [COMMANDS[0], pytest.param(COMMANDS[1], marks=pytest.mark.slow)],
@@ -32,6 +33,7 @@ def test_a_command_of_the_tutorial_works(ros, tmp_path: Path, command: str) -> N
     assert "1 passed" in done.stdout or "2 passed" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -146,6 +146,7 @@ def test_a_success_that_is_not_expected_fails(tmp_path):
     assert [(f.what, f.measured, f.limit) for f in result.verdicts[0].findings] == [("goal a", "reached", "failed")]
 
 
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("text", [THROUGH, WAYPOINTS, MISSED % "failed"], ids=["through", "waypoints", "missed"])
 def test_a_stack_behind_the_protocol_takes_goals_in_the_same_way(tmp_path, text):

@@ -28,6 +28,7 @@ NAMES = (
 CASES = [pytest.param(name, marks=[pytest.mark.slow] if number % 10 else []) for number, name in enumerate(NAMES)]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", CASES)
 def test_a_scenario_survives_the_way_through_its_log(name, tmp_path):
     log = tmp_path / "run.mcap"

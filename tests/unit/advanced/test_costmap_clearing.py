@@ -32,6 +32,7 @@ def test_wall_across_a_hall_fails_with_no_valid_path() -> None:
     assert d.min_clearance > 0.02
 
 
+@pytest.mark.slow
 def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
     assert not in_a_hall(45, entirely=True).events_of_kind("goal.failed")
 

@@ -71,6 +71,7 @@ def test_sigterm_ends_it_with_the_usual_exit_code(tmp_path: Path) -> None:
         assert process.returncode == 143
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["ros map", "world", "sdf"])
 def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp_path: Path, kind: str) -> None:
     if kind == "ros map":

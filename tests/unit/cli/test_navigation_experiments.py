@@ -23,6 +23,7 @@ def test_experiment_groups_are_listed_in_order(tmp_path: Path) -> None:
     assert {offer.name for offer in experiment_groups(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", MADE_QUICKLY)
 def test_group_lists_the_names_of_its_experiments(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)

@@ -33,6 +33,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return opened
 
 
+@pytest.mark.slow
 def test_live_page_opens_first_and_becomes_the_report(
     simscen, pages: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

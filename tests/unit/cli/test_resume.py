@@ -56,7 +56,7 @@ def test_kept_verdicts_are_marked_in_console_and_reports(session):
     assert [mark.get("value") for mark in marks] == ["true", "true"]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("damage", ["deleted", "replaced", "cut", "emptied"])
 def test_run_with_missing_or_changed_log_is_repeated(session, damage):
     folder, resume = session

@@ -203,6 +203,7 @@ def test_suggested_turning_scale_passes_the_check(figures):
     assert right["value"] < 0.5
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("axles", [(-0.15, 0.15), (-0.25, 0.25), (-0.3, 0.3), (-0.25, 0, 0.25), (-0.3, -0.1, 0.1, 0.3)])
 def test_inferred_skid_steer_robot_turns_as_commanded(figures, axles):
     """Without the factor, robots with four wheels turned up to 31 % too little, with six up to twice as far."""

@@ -58,6 +58,7 @@ def _errors(text: str) -> list[str]:
     return [f"{'.'.join(map(str, error.absolute_path))}: {error.message}" for error in errors]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("text", "expected_text"),
     [
@@ -123,6 +124,7 @@ BASES = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("base", "fits"), BASES)
 def test_base_file_matches_the_base_schema(base: dict[str, Any], fits: bool) -> None:
     assert jsonschema.Draft7Validator(schema_of("base")).is_valid(base) is fits

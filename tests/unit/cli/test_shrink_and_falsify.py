@@ -149,6 +149,7 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, met
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
 
 
+@pytest.mark.slow
 def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
     done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")

@@ -112,6 +112,7 @@ def test_a_claim_has_its_own_exit_code_and_testcase(
     assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> None:
     text = SCENARIO.replace("{x: 1,", "{x: 2,") + "acceptance: {pass_rate: {min: 80 %, method: anytime, runs: 500}}\n"
     assert study(tmp_path, text, "--out", "out").returncode == 0

@@ -101,6 +101,7 @@ def scan(time, ranges):
     )  # fmt: skip
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_path):
     bag = logs.write_bag(tmp_path / "bag", messages(), plugin)

@@ -199,6 +199,7 @@ def test_software_and_processor_change_the_digest(of: Digest, monkeypatch: pytes
     assert of() != before
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("file", "old", "new", "is_other_definition"),
     [

@@ -26,6 +26,7 @@ def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: 
     return limit
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", PLANTS)
 def test_tpe_finds_rare_failures_in_sixty_runs(name: str) -> None:
     plant = PLANTS[name]

@@ -140,6 +140,7 @@ def test_the_odom_frame_is_that_of_the_wheels() -> None:
     assert OdometryFilter(Spec(), RATE).fuse(first) is first
 
 
+@pytest.mark.slow
 def test_the_heading_is_several_times_as_good_as_that_of_the_wheels() -> None:
     ends = [drive(seed, 20)[-1] for seed in range(7000, 7020)]
     fused, wheels = (np.std([error(end, getattr(end, name))[2] for end in ends]) for name in ("filtered", "wheels"))

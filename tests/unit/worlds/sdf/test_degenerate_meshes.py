@@ -122,7 +122,7 @@ def load_and_use(folder: Path, geometry: str, pose: str) -> None:
         assert all(problem.message for problem in error.problems)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("pose", ["0 0 0 0 0 0", "1000.1 2000.3 0.1 0.3 0.2 0.3"])
 @pytest.mark.parametrize("file_name", WRITERS)
 @pytest.mark.parametrize("triangle", TRIANGLES)
