@@ -145,7 +145,7 @@ MOVABLE = (
 )
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_editing_a_shipped_file_changes_no_byte_that_was_not_edited(edit: Edit, tmp_path: Path, name: str) -> None:
     for folder in ("scenarios", "worlds"):

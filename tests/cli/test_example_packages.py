@@ -39,6 +39,7 @@ def test_tests_of_example_package_pass(call, name: str) -> None:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_contract_tests_accept_an_entry_point_name(call, tmp_path: Path) -> None:
     plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin")  # whether or not this simscen was installed anew
     asked = ("-k", "without and goal and zero", "--simscen-contract", "vfh_plus")

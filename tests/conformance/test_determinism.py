@@ -92,6 +92,7 @@ def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, m
     assert results(pair / "out")["runs/b/seed-7"] == reference["runs/b/seed-7"]
 
 
+@pytest.mark.slow
 def test_world_that_never_finishes_preparing_times_out_its_run_only(pair: Path, simscen, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (pair / "a.scenario.yaml").read_text()

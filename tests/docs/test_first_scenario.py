@@ -41,6 +41,7 @@ def test_scenario_of_the_tutorial_passes(clone: Path) -> None:
     assert code == 0, told
 
 
+@pytest.mark.slow
 def test_harder_scenario_fails_only_by_the_tight_bound_and_writes_the_named_files(clone: Path) -> None:
     before, after = "stopped_within: {time: 1 s, after: lidar.off}", "stopped_within: {time: 0.1 s, after: lidar.off}"
     assert before in HARDER and after in PARTS["4"]

@@ -61,6 +61,7 @@ def test_a_sensor_without_a_frame_is_named_with_the_option(with_interfaces, run)
     assert "no node publishes the frame lidar, and /tf_static of simscen is left out: --frame lidar:=NAME" in ended.said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flaws",
     [

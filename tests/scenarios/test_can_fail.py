@@ -37,6 +37,7 @@ def test_every_shipped_scenario_is_in_the_table():
     assert shipped - {name for name in shipped if name.startswith("corner_cases/")} == set(CHANGES)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("scenario", "criterion", "changes"), CASES)
 def test_a_broken_scenario_fails_for_the_stated_reason(scenario, criterion, changes, tmp_path):
     result = run(changed(scenario, changes), scenario, tmp_path)

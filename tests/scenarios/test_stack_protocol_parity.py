@@ -135,6 +135,7 @@ def test_stack_protocol_matches_for_two_robots(tmp_path: Path) -> None:
     assert there == here
 
 
+@pytest.mark.slow
 def test_comparison_detects_another_stack(tmp_path: Path) -> None:
     """The comparison can fail."""
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))

@@ -66,6 +66,7 @@ def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in judged.out
 
 
+@pytest.mark.slow
 def test_session_with_only_expected_outcomes_passes(simscen, project: Path) -> None:
     assert simscen("run", ".", "-k", "known or skipped", "--check-determinism", "--fail-fast").code == 0
 
@@ -85,6 +86,7 @@ def test_session_with_only_skipped_scenarios_selects_nothing(simscen, project: P
     assert [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]] == ["skipped"]
 
 
+@pytest.mark.slow
 def test_aborted_run_is_an_error_despite_an_expected_failure(simscen, project: Path) -> None:
     ended = simscen("run", ".", "-k", "known", "--stack", "mine=/bin/false")
     assert ended.code == 3

@@ -56,6 +56,7 @@ def test_merged_results_are_those_of_a_single_session(sessions: Path, monkeypatc
     assert Path("all/run.json").is_file()
 
 
+@pytest.mark.slow
 def test_merged_folder_can_be_reported_again(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
     simscen("merge", "s1", "s2", "--out", "again")

@@ -186,6 +186,7 @@ def test_wrong_wheel_radius_is_reported_with_the_right_one(check):
 SKID = "{{type: skid_steer, wheel_radius: 0.16, wheel_separation: 0.56, wheel_base: 0.5, turning_scale: {}}}"
 
 
+@pytest.mark.slow
 def test_suggested_turning_scale_passes_the_check(figures):
     """Wheels that skid turn a heavy base as if they stood further apart."""
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")

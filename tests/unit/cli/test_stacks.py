@@ -150,6 +150,7 @@ def test_installed_stack_type_is_a_valid_stack(packages, simscen, project: Path)
     assert "did you mean `tame`" in simscen("validate", ".", "--stack", "tam").err
 
 
+@pytest.mark.slow
 def test_determinism_is_checked_for_each_stack(simscen, project: Path) -> None:
     ended = simscen("run", "a.scenario.yaml", *BOTH, "--check-determinism", "--out", "out")
     assert ended.code == 0, ended.out
@@ -177,6 +178,7 @@ def test_resume_repeats_runs_of_a_changed_stack_file_only(simscen, project: Path
 JUMP = "faults: [{sensor: localizer, jump: {y: 0.5 m}, for: 0.2 s}]\n"
 
 
+@pytest.mark.slow
 def test_scenario_of_a_folder_that_the_stack_cannot_run_is_skipped(simscen, project: Path) -> None:
     scenario = (project / "a.scenario.yaml").read_text()
     (project / "jump.scenario.yaml").write_text(scenario + JUMP)

@@ -153,7 +153,7 @@ def _at(value: Any, keys: tuple[Key, ...]) -> Any:
     return value
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
@@ -175,7 +175,7 @@ def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -
     assert all(_at(plain(after), leaf) == _at(plain(text), leaf) for leaf in others)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_what_is_added_to_a_shipped_file_can_be_removed_without_a_trace(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")

@@ -130,6 +130,7 @@ def test_without_a_map_the_walls_are_built_from_the_scans(tmp_path):
     assert np.percentile(far, 95) < 0.15
 
 
+@pytest.mark.slow
 def test_the_user_can_give_the_map(tmp_path):
     save_map(drives.room().grid, tmp_path / "office.yaml")
     bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))

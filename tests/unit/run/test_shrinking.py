@@ -64,6 +64,7 @@ def first_failure(plant: Callable[[Array], Array], threshold: float, seed: int) 
         search.tell(points, margins)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_found_failure_is_shrunk_in_sixty_runs(name: str) -> None:
     plant = PLANTS[name]

@@ -336,7 +336,7 @@ def counts(other: Other, value: Any) -> bool:
 OTHERS = list(others())
 
 
-@pytest.mark.sample(30)
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("other", OTHERS, ids=str)
 def test_another_value_changes_a_decision(other: Other) -> None:
     assert any(counts(other, value) for value in other.values)

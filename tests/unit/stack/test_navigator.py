@@ -115,6 +115,7 @@ def test_a_goal_that_can_never_be_reached_fails_at_once(goal: Pose2, code: str) 
     assert not d.events_of_kind("recovery.started")
 
 
+@pytest.mark.slow
 def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails() -> None:
     world = rooms()
     world.discs.append((9.0, 1.0, 0.1))

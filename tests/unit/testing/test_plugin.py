@@ -60,6 +60,7 @@ def test_every_promise_of_a_component_is_an_item_and_nothing_else_is_run(run) ->
     assert "test_theirs" not in told
 
 
+@pytest.mark.slow
 def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
     code, told = run("-p", "no:xdist", "--simscen-contract", 'own:Spec={"part": 3.0}', "test_theirs.py")
     assert code == 1, told
