@@ -18,7 +18,7 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
-from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
+from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
 from simscen.stack.plan_manager import PlanManager, PlanResult
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
@@ -71,7 +71,7 @@ def meets_moving_obstacle(
     Obstacles are predicted for HORIZON_S. Too close means that `MovingObstacles.nearness` is positive. The `speed` is
     in m/s, and the robot's `radius` in m.
     """
-    moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON_S)
+    moving = moving.near(robot.x, robot.y, radius + MAX_INFLATION_M, speed, HORIZON_S)
     if not moving.obstacles:
         return False
     position, driven = complex(robot.x, robot.y), 0.0
@@ -81,7 +81,7 @@ def meets_moving_obstacle(
         if time >= HORIZON_S:
             return False
         for obstacle in moving.obstacles:
-            distance = min(MIN_DISTANCE_M + obstacle.position_std(time, moving.acceleration), MAX_UNCERTAINTY_M)
+            distance = min(MIN_DISTANCE_M + obstacle.position_std(time, moving.acceleration), MAX_INFLATION_M)
             if abs(point - obstacle.position - time * obstacle.velocity) - obstacle.radius < radius + distance:
                 return True
     return False
@@ -115,7 +115,7 @@ class ClearancePlan(FollowedPlan):
         self._initial_clearance = np.minimum(distances(costmap, path.points[:, :2]), np.float32(WATCH_DISTANCE_M))
         super().__init__(path, radius, costmap)
 
-    def compare(self, costmap: CostmapView) -> None:
+    def update_occupied(self, costmap: CostmapView) -> None:
         """Determine which points of the plan are occupied, and which have lost clearance."""
         clearance = distances(costmap, self.path.points[:, :2])
         self._occupied = clearance <= np.float32(self._radius)
@@ -154,13 +154,13 @@ class AdvancedPlanManager(PlanManager):
         costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
-        steered: bool = False,
+        is_car: bool = False,
         latency: int = 0,
         speed: float = 0.5,
     ) -> None:
         """Take the arguments of PlanManager, and the `speed` in m/s at which plans will be driven."""
         self._speed = speed
-        super().__init__(spec, planner, costmap, plan_seed, radius, steered, latency)
+        super().__init__(spec, planner, costmap, plan_seed, radius, is_car, latency)
 
     def reset(self, now: float) -> None:
         """Prepare for a new goal."""
@@ -234,7 +234,7 @@ class AdvancedPlanManager(PlanManager):
                 return alternative
         return path
 
-    def _followed(self, path: Path) -> ClearancePlan:
+    def _make_followed_plan(self, path: Path) -> ClearancePlan:
         return ClearancePlan(path, self._radius, self._costmap.view)
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:

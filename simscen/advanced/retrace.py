@@ -197,10 +197,12 @@ class TrailFollower:
         edge = costmap.resolution
         cells = lethal_near(costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * HORIZON_S + edge)
         known_poses = self._trail.poses[self._window()][: max(0, self._trail.known_count - self._index)]
-        passed = self._footprint.gaps(cells, known_poses).min(axis=0, initial=edge)
-        current = self._footprint.gaps(cells, np.array([pose]))[0]
+        passed = self._footprint.point_distances(cells, known_poses).min(axis=0, initial=edge)
+        current = self._footprint.point_distances(cells, np.array([pose]))[0]
         limits = np.minimum(np.where(passed < -edge, edge, passed), np.maximum(current, -edge / 2))
-        is_nearer = self._footprint.gaps(cells, poses) < np.minimum(limits - SLACK_CELLS * edge, edge / math.sqrt(2.0))
+        is_nearer = self._footprint.point_distances(cells, poses) < np.minimum(
+            limits - SLACK_CELLS * edge, edge / math.sqrt(2.0)
+        )
         return np.asarray(blocked & is_nearer.any(axis=1))
 
     def _scores(self, pose: Pose2) -> Array:

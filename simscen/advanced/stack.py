@@ -99,7 +99,7 @@ class AdvancedStack(ReferenceStack):
             return
         moving = self._prediction.moving_obstacles_in_frame(tick, ROBOT_FRAME)
         self._has_moving_obstacles = len(moving) > 0
-        self._monitor.on_moving(moving)
+        self._monitor.set_moving_obstacles(moving)
         self._costmaps.local_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.odometry)
         self._costmaps.global_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.pose)
 
@@ -138,7 +138,7 @@ class AdvancedStackBuilder(StackBuilder):
             costmaps.global_costmap,
             self.plan_seed,
             self.robot.inscribed_radius,
-            steered=self.robot.turning_radius > 0.0,
+            is_car=self.robot.turning_radius > 0.0,
             latency=self.latency["planner"],
             speed=controller.full_speed,
         )

@@ -1,1 +1,1 @@
-"""The navigation stack under test. It cannot see the truth: nothing here imports the simulator."""
+"""Navigation stack under test. It does not import the simulator, so that it cannot use the true state."""

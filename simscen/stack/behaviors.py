@@ -14,11 +14,11 @@ from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 SPIN_TOLERANCE_RAD = 0.01
-"""A turn is done when its remaining angle is at most this: about half a degree, the accuracy of odometry."""
+"""Remaining angle at which a spin is done: half a degree, the accuracy of odometry."""
 
 
 class Spin:
-    """Turn in place by `spin_dist`, so that the lidar sees all surroundings."""
+    """Recovery behavior that turns in place by `spin_dist` rad, so that the lidar sees all surroundings."""
 
     name = "spin"
 
@@ -32,7 +32,10 @@ class Spin:
         self._turned, self._yaw = 0.0, pose.yaw
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command to continue; None when done. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
+        """Return the command `seconds` after the start; None when done or if the robot is a car, which cannot spin.
+
+        Raises NavigationFailure with SPIN_COLLISION_AHEAD or SPIN_TIMEOUT.
+        """
         self._turned += wrap(pose.yaw - self._yaw)
         self._yaw = pose.yaw
         remaining = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
@@ -51,10 +54,10 @@ class Spin:
 
 
 class BackUp:
-    """Drive straight back by `backup_dist` or, with `backup_partial`, as far as possible.
+    """Recovery behavior that drives straight back by `backup_dist` m.
 
-    Nav2's behavior fails if it predicts a collision within simulate_ahead_time, and so does this one without
-    `backup_partial`. But a few centimeters are often enough for the robot to turn afterwards.
+    It fails if a collision is predicted within `simulate_ahead_time`. With `backup_partial`, it stops before the
+    obstacle instead, and fails only if it cannot move by one costmap cell.
     """
 
     name = "backup"
@@ -68,9 +71,10 @@ class BackUp:
         self._from = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command to back up; None when done.
+        """Return the command `seconds` after the start; None when done.
 
-        Raises BACKUP_COLLISION_AHEAD, BACKUP_TIMEOUT, or BACKUP_INVALID_INPUT (the robot cannot drive backward).
+        Raises NavigationFailure with BACKUP_COLLISION_AHEAD, BACKUP_TIMEOUT, or, if the robot cannot drive backward,
+        BACKUP_INVALID_INPUT.
         """
         remaining = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
@@ -91,7 +95,7 @@ class BackUp:
 
 
 class Wait:
-    """Stand still for `wait_duration`, so that a moving obstacle can leave."""
+    """Recovery behavior that stands still for `wait_duration` s, so that a moving obstacle can leave."""
 
     name = "wait"
 
@@ -102,12 +106,15 @@ class Wait:
         """Do nothing."""
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the stop command; None when the time is over."""
+        """Return the stop command; None when the time is over. `seconds` is the time since the start."""
         return STOP if seconds < self._duration else None
 
 
 class ClearCostmap:
-    """Clear obstacles that current readings do not show: around the robot or, with `clear_entirely`, everywhere."""
+    """Recovery behavior that clears obstacles around the robot or, with `clear_entirely`, everywhere.
+
+    Obstacles in the latest sensor readings remain.
+    """
 
     name = "clear_costmap"
 
@@ -119,37 +126,38 @@ class ClearCostmap:
         self._clear()
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return None, since clearing is done at once."""
+        """Return None: `start` has cleared the costmaps."""
         return None
 
 
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
-PROGRESS_M = 1.0
-"""A recovery that starts this much nearer to the goal than any earlier one counts as progress: it restores retries."""
+MIN_PROGRESS_M = 1.0
+"""With `retries_since_progress`, a recovery restores all retries if it starts nearer to the goal by this distance than
+all earlier recoveries."""
 
 
 class BehaviorSequence:
-    """Recovery behaviors in a fixed cyclic order (Nav2's RoundRobin), with a limited number of retries per goal."""
+    """Recovery behaviors in cyclic order (Nav2's RoundRobin). Each retry of a goal uses the next behavior."""
 
     def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
-        """Take the behaviors and the parameters of the recovery."""
+        """Take the behaviors in order, and the parameters, such as `number_of_retries` per goal."""
         self._behaviors, self._max_retries = tuple(behaviors), spec.number_of_retries
         self._final_codes = PLANNER_CODES.difference(spec.planner_codes)
         self._resets_on_progress = spec.retries_since_progress
         self._next, self._used, self._nearest = 0, 0, math.inf
 
     def can_help(self, failure: NavigationFailure) -> bool:
-        """Return False if the code of the failure is a planner code for which no recovery is configured."""
+        """Return whether to try a recovery: False for errors of planners that are not in `planner_codes`."""
         return getattr(failure.code, "name", "") not in self._final_codes
 
     def reset(self) -> None:
-        """Restore all retries for a new goal. The next behavior stays the same, as in Nav2."""
+        """Restore all retries for a new goal. The cyclic order continues, as in Nav2."""
         self._used, self._nearest = 0, math.inf
 
     def next(self, goal_distance: float) -> Behavior | None:
-        """Use up one retry and return the next behavior; None if no retry is left. `goal_distance` is in m."""
-        if self._resets_on_progress and goal_distance <= self._nearest - PROGRESS_M and self._used:
+        """Return the next behavior and count a retry; None if no retry is left. `goal_distance` is in m."""
+        if self._resets_on_progress and goal_distance <= self._nearest - MIN_PROGRESS_M and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, goal_distance)
         if not self._behaviors or self._used >= self._max_retries:

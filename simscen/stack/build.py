@@ -1,4 +1,4 @@
-"""Construction of a reference stack with all its components from its specification."""
+"""Construction of the reference stack and its components from a specification."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -47,10 +47,10 @@ def build_stack(
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
 ) -> CheckedStack:
-    """Build the stack that a specification describes, with checks of its decisions. Call `start` on it next.
+    """Build a stack from its specification, in a wrapper that checks its decisions.
 
-    `wrap_localizer` replaces the localizer for the rest of the stack by a wrapper, for example to inject faults.
-    Raises ValueError if a rate does not divide the tick rate.
+    `wrap_localizer` returns a wrapper of the localizer, for example one that injects faults. The rest of the stack uses
+    the wrapper. Raises ValueError if a rate does not divide the tick rate.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
@@ -66,22 +66,21 @@ def build_stack(
 
 
 def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
-    """Build the stack with the StackBuilder that `spec.builder` names: for the reference or the advanced stack."""
+    """Build a reference or an advanced stack with the StackBuilder class that `spec.builder` names."""
     module, _, name = spec.builder.partition(":")
     stack: ReferenceStack = getattr(import_module(module), name)(spec, setting).build()
     return stack
 
 
 class StackBuilder:
-    """Builder of the reference stack. Subclasses replace components by overriding the methods that make them.
+    """Builder of the reference stack. Subclasses override the methods `make_…` to replace components.
 
-    The map is refined to cells no larger than those of the costmap. Each component has its own random stream, for
-    example "localizer", and each plan has one ("planner#1", "planner#2", …). So adding a component does not change the
-    random numbers of the others.
+    The stack gets the map with cells no larger than those of the costmap. Each component has its own random stream, for
+    example "localizer". Each plan has one, too: "planner#1", "planner#2", ….
     """
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
-        """Take the specification and the setting of the stack."""
+        """Take the specification, and the setting: robot, map, random streams, and callbacks."""
         surroundings = setting.surroundings
         if surroundings.map is not None:
             surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
@@ -93,7 +92,7 @@ class StackBuilder:
         """Build all components and the stack."""
         spec, setting, robot = self.spec, self.setting, self.robot
         period = setting.clock.period(spec.controller_frequency)
-        odometry = OdometryHistory(self.surroundings.tick_rate, trail=TRAIL_S)
+        odometry = OdometryHistory(self.surroundings.tick_rate, trail_s=TRAIL_S)
         driving = replace(
             setting,
             surroundings=self.surroundings,
@@ -107,7 +106,10 @@ class StackBuilder:
         )
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
         driving = replace(
-            driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, limit_command=monitor.allow
+            driving,
+            clear_costmap=costmaps.clear,
+            clear_around=costmaps.clear_around,
+            limit_command=monitor.limit_command,
         )
         planning = replace(driving, name="planner", resolution=costmaps.global_costmap.view.resolution)
         plans = self.make_plan_manager(CheckedPlanner(spec.planner, planning), costmaps, controller)
@@ -145,14 +147,14 @@ class StackBuilder:
         )
 
     def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
-        """Make the plan manager."""
+        """Make the plan manager, which requests plans from the planner and monitors them."""
         return PlanManager(
             self.spec.planner,
             planner,
             costmaps.global_costmap,
             self.plan_seed,
             self.robot.inscribed_radius,
-            steered=self.robot.turning_radius > 0.0,
+            is_car=self.robot.turning_radius > 0.0,
             latency=self.latency["planner"],
         )
 
@@ -161,7 +163,7 @@ class StackBuilder:
         return self.streams.library_seed(f"planner#{number}")
 
     def make_odometry_filter(self) -> "OdometryFilter | None":
-        """Make the filter that fuses wheel odometry and IMU; None if the wheel odometry is used unfiltered."""
+        """Make the filter that fuses wheel odometry and IMU; None if the stack uses unfiltered wheel odometry."""
         if not self.spec.filters_odometry(self.surroundings.has_imu):
             return None
         from simscen.stack.localizers.odometry_filter import OdometryFilter
@@ -172,18 +174,19 @@ class StackBuilder:
         """Make the policy that decides how much of the global costmap is cleared when planning has failed."""
         return ClearEntirely()
 
-    def make_stack(self, *parts: Any) -> ReferenceStack:
-        """Make the stack from the arguments of `ReferenceStack`."""
-        return ReferenceStack(*parts)
+    def make_stack(self, *arguments: Any) -> ReferenceStack:
+        """Call the constructor of the stack with these arguments."""
+        return ReferenceStack(*arguments)
 
 
 def _latency_ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
-    """Return the latency of each component in ticks. `latency: robot` has been replaced by the robot's values."""
+    """Return the latency of each component, by its name, in ticks."""
     latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
-    return {part: clock.ticks(getattr(latency, part)) for part in Latency.model_fields}
+    return {name: clock.ticks(getattr(latency, name)) for name in Latency.model_fields}
 
 
-def _behaviors(spec: Recovery, shared: Setting) -> list[Behavior]:
+def _behaviors(spec: Recovery, setting: Setting) -> list[Behavior]:
     """Build the recovery behaviors that the robot can execute, each with its own random stream."""
-    possible = [each for each in spec.behavior_specs() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
-    return [CheckedBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)]
+    can_turn = setting.robot.turning_radius == 0.0
+    possible = [each for each in spec.behavior_specs() if can_turn or not each.turns_in_place]
+    return [CheckedBehavior(each, setting.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)]

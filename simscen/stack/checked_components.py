@@ -1,4 +1,4 @@
-"""Wrappers that check the return values of planners, controllers, and other stack components of installed packages."""
+"""Wrappers of planners, controllers, and other stack components of installed packages, which check return values."""
 
 import math
 import traceback
@@ -37,27 +37,22 @@ S = TypeVar("S", bound=Component)
 
 
 def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Setting) -> T:
-    """Build a component, inside its `wrapper` only if it comes from another package.
-
-    Components that ship with simscen need no wrapper, because CheckedStack checks the decisions of the whole stack.
-    """
+    """Build a component from its specification. If it comes from another package, return it inside `wrapper`."""
     component: T = (spec.implementation() if spec.component.startswith("simscen.") else wrapper)(spec, setting)
     return component
 
 
 class CheckedPlugin:
-    """Base class of wrappers around an installed component, whose `role` is for example "planner".
+    """Base class of the wrappers. An invalid return value or an unexpected exception raises RunError.
 
-    An exception other than NavigationFailure, or an invalid return value (not finite, wrong shape), is a defect of the
-    component. Since it says nothing about the scenario, it ends the run with an error instead of a verdict.
-
-    `what` of the methods is the verb phrase in front of the wrong value in an error message, such as "returned".
+    `prefix` is the start of an error message, such as "returned".
     """
 
     may_fail: ClassVar[bool] = True
     """Whether a component of this role may raise NavigationFailure."""
 
     def __init__(self, role: str, spec: Component, setting: Setting, protocol: type) -> None:
+        """Build the component. Raises RunError if it lacks a method of `protocol`. `role` is for example "planner"."""
         self.role, self._spec = role, spec
         self.inner: Any = self.call(lambda: spec.implementation()(spec, setting))
         for name in method_names(protocol):
@@ -71,14 +66,14 @@ class CheckedPlugin:
         return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
 
     def call(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a method. Any exception other than NavigationFailure becomes a RunError that names the component."""
+        """Call a method of the component. Exceptions are converted by `raise_as_run_error`."""
         try:
             return method(*args, **kwargs)
         except Exception as error:  # code of other packages can raise anything
             self.raise_as_run_error(error)
 
     def raise_as_run_error(self, error: Exception) -> NoReturn:
-        """Raise the exception itself if the component may raise it, otherwise a RunError that names the component."""
+        """Raise the exception itself if this role may raise it, otherwise a RunError that names the component."""
         if isinstance(error, RunError | MemoryError):
             raise error
         if isinstance(error, NavigationFailure) and self.may_fail:
@@ -88,19 +83,19 @@ class CheckedPlugin:
         message = f"{self.label}: {type(error).__name__}: {error} ({self._location(error)})"
         raise RunError("crashed", message, by_stack=True) from error
 
-    def raise_invalid(self, what: str) -> NoReturn:
-        """Raise a RunError for an invalid value. Its message is the component's label, followed by `what`."""
-        raise RunError(BROKEN_COMPONENT, f"{self.label} {what}", by_stack=True)
+    def raise_invalid(self, problem: str) -> NoReturn:
+        """Raise a RunError with the message "<label> <problem>"."""
+        raise RunError(BROKEN_COMPONENT, f"{self.label} {problem}", by_stack=True)
 
-    def checked_path(self, path: object, what: str) -> Path:
+    def checked_path(self, path: object, prefix: str) -> Path:
         """Return the path if it consists of finite poses (n, 3); otherwise raise RunError."""
         if not isinstance(path, Path):
-            self.raise_invalid(f"{what} {type(path).__name__} instead of a Path")
+            self.raise_invalid(f"{prefix} {type(path).__name__} instead of a Path")
         points = path.points
         if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3:
-            self.raise_invalid(f"{what} a path whose points are {_shape(points)} instead of (n, 3): x, y, yaw")
+            self.raise_invalid(f"{prefix} a path whose points are {_shape_text(points)} instead of (n, 3): x, y, yaw")
         if points.dtype.kind != "f" or not all_finite(points):
-            self.raise_invalid(f"{what} a path with points that are not finite numbers")
+            self.raise_invalid(f"{prefix} a path with points that are not finite numbers")
         return path
 
     def checked_twist(self, command: object) -> Twist:
@@ -111,14 +106,14 @@ class CheckedPlugin:
             self.raise_invalid(f"commanded {tuple(command)}, which is not a finite velocity")
         return command
 
-    def checked_pose(self, pose: object, what: str) -> Pose2:
+    def checked_pose(self, pose: object, prefix: str) -> Pose2:
         """Return the pose if it consists of three finite numbers; otherwise raise RunError."""
         if not isinstance(pose, Pose2) or not are_numbers(pose):
-            self.raise_invalid(f"{what} {pose!r}, which is not a finite pose")
+            self.raise_invalid(f"{prefix} {pose!r}, which is not a finite pose")
         return pose
 
     def _location(self, error: Exception) -> str:
-        """Return "file:line" of the innermost traceback entry in the component's package, if any, or else of all."""
+        """Return "file:line" of the traceback: if possible, of the innermost entry in the component's package."""
         package = self._spec.component.partition(":")[0].partition(".")[0]
         frames = list(traceback.walk_tb(error.__traceback__))
         own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
@@ -127,12 +122,12 @@ class CheckedPlugin:
 
 
 def method_names(protocol: type) -> list[str]:
-    """Return the names of the methods of a protocol."""
+    """Return the names of the public methods of a protocol."""
     return [name for name, value in vars(protocol).items() if callable(value) and not name.startswith("_")]
 
 
 def are_numbers(values: Iterable[object]) -> bool:
-    """Return whether these are real, finite numbers."""
+    """Return whether all values are real numbers and finite."""
     try:
         return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # other types raise
     except TypeError:
@@ -140,11 +135,11 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 
 def all_finite(values: Array) -> bool:
-    """Return whether all numbers of an array are finite. The sum of squares is tried first, because it is fast."""
-    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+    """Return whether all numbers of an array are finite."""
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())  # the sum of squares is faster
 
 
-def _shape(points: object) -> str:
+def _shape_text(points: object) -> str:
     return str(points.shape) if isinstance(points, np.ndarray) else type(points).__name__
 
 
@@ -162,22 +157,24 @@ class CheckedPlanner(CheckedPlugin):
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return the planner's path. Raises RunError if it is invalid or leads through a lethal cell.
 
-        Lethal cells within the circumscribed radius of the start are ignored, since the robot already stands there.
+        Lethal cells within the circumscribed radius of the start are allowed, since the robot already stands there.
         """
         path = self.checked_path(self.call(self.inner.plan, costmap, start, goal, seed), "returned")
         points = path.points
         if not len(points):
             self.raise_invalid("returned a path without points instead of failing with NO_VALID_PATH")
         if np.hypot(points[0, 0] - start.x, points[0, 1] - start.y) > START_TOLERANCE_M:
-            self.raise_invalid(f"returned a path from {_at(points[0])} instead of the start {_at(np.array(start))}")
+            begin = _position_text(points[0])
+            self.raise_invalid(f"returned a path from {begin} instead of the start {_position_text(np.array(start))}")
         outside = points[np.hypot(points[:, 0] - start.x, points[:, 1] - start.y) > self._radius]
         if len(outside) and (is_lethal := on_lethal_cells(costmap, outside)).any():
-            self.raise_invalid(f"returned a path through the lethal cell at {_at(outside[is_lethal.argmax()])}")
+            position = _position_text(outside[is_lethal.argmax()])
+            self.raise_invalid(f"returned a path through the lethal cell at {position}")
         return path
 
 
 def on_lethal_cells(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, 2 or 3) are on a lethal cell; points outside the costmap are not."""
+    """Return which of the points (n, 2) or (n, 3) are on a lethal cell; False outside the costmap."""
     cells = np.floor((points[:, :2] - costmap.origin) / costmap.resolution)[:, ::-1]
     inside: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < costmap.costs.shape), axis=1)
     rows, columns = np.where(inside[:, None], cells, 0).astype(np.int64).T
@@ -185,7 +182,7 @@ def on_lethal_cells(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_
     return is_lethal
 
 
-def _at(point: Array) -> str:
+def _position_text(point: Array) -> str:
     return f"({point[0]:.2f}, {point[1]:.2f})"
 
 
@@ -208,7 +205,7 @@ class CheckedController(CheckedPlugin):
         return float(speed)
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Drive no faster than this in m/s from now on; None lifts the limit."""
+        """Set the speed limit in m/s; None removes it."""
         self.call(self.inner.set_speed_limit, limit)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
@@ -217,7 +214,7 @@ class CheckedController(CheckedPlugin):
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory that the controller expects to drive, for the log."""
+        """Trajectory that the controller expects to drive; None if it has none."""
         plan = self.call(lambda: self.inner.local_plan)
         return None if plan is None else self.checked_path(plan, "returned as `local_plan`")
 
@@ -235,7 +232,7 @@ class CheckedGoalChecker(CheckedPlugin):
         self.call(self.inner.reset)
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
-        """Return whether the goal is reached. Raises RunError if the goal checker does not return a boolean."""
+        """Return whether the goal is reached. Raises RunError if the result is not a boolean."""
         reached = self.call(self.inner.reached, goal, pose, twist)
         if reached not in (True, False):
             self.raise_invalid(f"returned {reached!r} instead of True or False")
@@ -243,7 +240,7 @@ class CheckedGoalChecker(CheckedPlugin):
 
 
 class CheckedBehavior(CheckedPlugin):
-    """Calls the behavior and checks its commands. `name` is its `type`, or its own `name` if it has no type."""
+    """Calls the recovery behavior and checks its commands. `name` is the `type` in its specification, if any."""
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
@@ -297,22 +294,22 @@ class CheckedLocalizer(CheckedPlugin):
 
 
 def checked_belief(plugin: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
-    """Return the belief if it is finite and has the right shape; otherwise raise RunError of the plugin.
+    """Return the belief if it is finite and has the right shapes; otherwise raise RunError, which names the plugin.
 
-    Parts that are the same objects as in `before`, the last valid belief, are not checked again.
+    `before` is the previous valid belief: arrays and transforms that both share are not checked again.
     """
     if not isinstance(belief, Belief):
         plugin.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")
     plugin.checked_pose(belief.pose, "returned a Belief with the pose")
     if before is None or belief.map_from_odom is not before.map_from_odom:
         plugin.checked_pose(belief.map_from_odom, "returned a Belief with `map_from_odom`")
-    if not _is_table(belief.covariance, 3) or len(belief.covariance) != 3:
+    if not _is_finite_table(belief.covariance, 3) or len(belief.covariance) != 3:
         plugin.raise_invalid("returned a Belief whose covariance is not a finite array (3, 3)")
     is_checked = before is not None and belief.particles is before.particles and not belief.particles.flags.writeable
-    if not is_checked and not _is_table(belief.particles, 4):
+    if not is_checked and not _is_finite_table(belief.particles, 4):
         plugin.raise_invalid("returned a Belief whose particles are not a finite array (n, 4)")
     return belief
 
 
-def _is_table(value: object, columns: int) -> bool:
+def _is_finite_table(value: object, columns: int) -> bool:
     return isinstance(value, np.ndarray) and value.shape[1:] == (columns,) and all_finite(value)

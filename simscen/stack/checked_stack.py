@@ -1,4 +1,4 @@
-"""Wrapper that checks the decisions of a navigation stack, either the reference stack or one of another package."""
+"""Wrapper that checks the decisions of a navigation stack: the reference stack, or a stack of another package."""
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class CheckedStack(CheckedPlugin):
         self._command: Twist | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localize at the estimate, then drive to the goals in order."""
+        """Initialize the localizer with the estimate, and drive to the goals in order."""
         self.call(self.inner.start, estimate, goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
@@ -40,11 +40,11 @@ class CheckedStack(CheckedPlugin):
 
     @property
     def can_switch_zones(self) -> bool:
-        """Whether the stack implements SupportsZones."""
+        """Whether the stack can replace its zones during a run."""
         return callable(getattr(self.inner, "set_zones", None))
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Replace all zones from the next costmap update on."""
+        """Replace all keepout and speed zones at the next costmap update."""
         self.call(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:
@@ -54,12 +54,12 @@ class CheckedStack(CheckedPlugin):
         except Exception as error:  # as in `call`, without its overhead at every beat
             self.raise_as_run_error(error)
         if self._last is None or decision is not self._last:  # an unchanged decision is the same object
-            self._last = self._checked(decision, tick)
+            self._last = self._checked_decision(decision, tick)
         return self._last
 
     @property
     def plan(self) -> Path | None:
-        """The plan being followed."""
+        """The plan being followed; None without a plan."""
         plan = self.call(lambda: self.inner.plan)
         return None if plan is None else self.checked_path(plan, "returned as `plan`")
 
@@ -71,7 +71,7 @@ class CheckedStack(CheckedPlugin):
             self.raise_invalid(f"returned {goal!r} as `goal`, which is not a Goal")
         return goal
 
-    def _checked(self, decision: object, tick: int) -> Decision:
+    def _checked_decision(self, decision: object, tick: int) -> Decision:
         if not isinstance(decision, Decision):
             self.raise_invalid(f"returned {type(decision).__name__} instead of a Decision")
         if decision.command is not self._command:

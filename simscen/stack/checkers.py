@@ -9,18 +9,17 @@ from simscen.model.controllers import ProgressChecker as ProgressSpec
 from simscen.model.controllers import SimpleGoalChecker as GoalSpec
 from simscen.stack.setting import Setting
 
-STANDSTILL_SPEED, STANDSTILL_YAW_RATE = 0.02, 0.1
-"""The robot counts as stationary below these speeds in m/s and rad/s."""
+STANDSTILL_SPEED_M_S, STANDSTILL_YAW_RATE_RAD_S = 0.02, 0.1
+"""The robot counts as stationary below these speeds."""
 STANDSTILL_CHECKS = 10
-"""Number of consecutive checks with a stationary robot before `well_inside` no longer applies: half a second at the
-default rate, since the robot also stops briefly between reaching the position and turning to the heading."""
+"""Number of consecutive checks with a stationary robot after which the full tolerances apply: 0.5 s by default."""
 
 
 class SimpleGoalChecker:
     """Decides whether the goal is reached, like nav2_controller::SimpleGoalChecker.
 
-    With `stateful`, a position that was reached counts as reached until the robot leaves the tolerance. The tolerances
-    of a moving robot are multiplied by `well_inside`, so that a value below 1 lets it drive on into the goal.
+    With `stateful`, the position stays reached until the robot leaves the position tolerance. While the robot moves,
+    the tolerances are multiplied by `well_inside`, so that the robot does not stop at their edge.
     """
 
     def __init__(self, spec: GoalSpec, setting: Setting) -> None:
@@ -34,7 +33,8 @@ class SimpleGoalChecker:
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Return whether the robot has reached the goal, given its estimated pose in the map frame and its velocity."""
-        is_standing = abs(twist.vx) + abs(twist.vy) < STANDSTILL_SPEED and abs(twist.wz) < STANDSTILL_YAW_RATE
+        speed, yaw_rate = abs(twist.vx) + abs(twist.vy), abs(twist.wz)
+        is_standing = speed < STANDSTILL_SPEED_M_S and yaw_rate < STANDSTILL_YAW_RATE_RAD_S
         self._standstill_checks = self._standstill_checks + 1 if is_standing else 0
         factor = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
         distance = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
@@ -64,10 +64,7 @@ class ProgressChecker:
         self._baseline = None
 
     def is_stuck(self, pose: Pose2, now: float) -> bool:
-        """Return whether the time allowance has passed without progress.
-
-        `now` in s is the time of a clock that stops while the robot must not move.
-        """
+        """Return whether the time allowance has passed without progress. `now` is the navigator's time in s."""
         baseline = self._baseline
         if (
             baseline is None

@@ -1,6 +1,6 @@
-"""Collision monitor: limits the velocity by the latest scans, independent of map and costmap (nav2_collision_monitor).
+"""Collision monitor (nav2_collision_monitor): slows the robot down before obstacles in the latest scans.
 
-Moving obstacles are checked at their predicted positions, if the stack predicts motion.
+It does not use map and costmap. If the stack predicts moving obstacles, it checks their predicted positions.
 """
 
 import math
@@ -19,20 +19,23 @@ from simscen.stack.protocols import RobotModel
 
 DEFAULT_STEPS = 8
 """Number of time steps until `time_before_collision` if `simulation_time_step` is not set."""
-STEP_ROUNDING = 1e-9
-"""Fraction of a time step that is taken for a rounding error, so that it does not add a step."""
+STEP_TOLERANCE = 1e-9
+"""Rounding error, in time steps, that does not add a time step."""
 MAX_STEPS = 1000
 """Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
-MIN_APPROACH_M = 0.005
-"""The robot brakes for a moving obstacle only if standing still keeps the obstacle farther away by at least this."""
+MIN_BENEFIT_M = 0.005
+"""The robot brakes for a moving obstacle only if this increases their distance by more than this value."""
 ROUNDING_M = 1e-6
-"""Rounding error allowed in the quick check of moving obstacles that precedes the exact one."""
+"""Rounding error allowed for distances to moving obstacles."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedScan:
-    """The latest scan of a lidar and the odometry pose at its time. All hits are at least `nearest` m from the base."""
+    """The latest scan of a lidar, and the pose of the robot in the odom frame at the time of the scan.
+
+    All hits are at least `nearest` m from the base.
+    """
 
     scan: Scan
     odometry: Pose2
@@ -40,7 +43,7 @@ class RecordedScan:
 
 
 class CollisionMonitor:
-    """Slows the robot down before obstacles (Nav2's "approach" polygon), and detects lidars without usable scans."""
+    """Slows the robot down before obstacles (Nav2's "approach" action), and detects lidars without usable scans."""
 
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
         """Take the parameters, the robot, the names of its lidars, and the tick rate in Hz."""
@@ -65,11 +68,14 @@ class CollisionMonitor:
             self._max_edge_distance, self._miter_factor = robot.radius, 1.0
 
     def start(self, tick: int) -> None:
-        """Start the timeout of lidars that have not sent a scan yet."""
+        """Set the tick from which `silence_reason` counts the time of lidars that have not sent a scan yet."""
         self._start_tick = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
-        """Process a scan that arrived at `tick`, taken at pose `odometry`. A scan without returns is not usable."""
+        """Store a scan that arrived at `tick`. A scan without returns is not usable.
+
+        `odometry` is the pose of the robot in the odom frame when the scan was taken.
+        """
         self._arrivals[scan.sensor] = tick, scan.tick
         nearest = _nearest(scan)
         if nearest is None:
@@ -78,16 +84,16 @@ class CollisionMonitor:
         self._oldest = min(self._scan_ticks.values())
         self._scans[scan.sensor] = RecordedScan(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
-    def on_moving(self, moving: MovingObstacles) -> None:
+    def set_moving_obstacles(self, moving: MovingObstacles) -> None:
         """Set the moving obstacles in the base frame. Scans must mark the beams that hit them (ScanWithMovingHits)."""
         self._moving, self._has_moving = moving, len(moving) > 0
 
     def is_silent(self, tick: int) -> bool:
-        """Return whether any lidar has sent no usable scan for `source_timeout`, or none at all."""
+        """Return whether any lidar has sent no usable scan within the last `source_timeout` s."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence_reason(self, tick: int) -> str:
-        """Return a message: which lidar is silent, and whether its scans are missing, empty, or too late."""
+        """Return which lidar is silent, and whether its scans are missing, empty, or too late, as a message."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
         limit = f"source_timeout is {self._spec.source_timeout:g} s"
         elapsed = (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
@@ -99,8 +105,8 @@ class CollisionMonitor:
         late = (arrived - taken) / self._tick_rate
         return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
 
-    def allow(self, command: Twist, odometry: Pose2) -> Twist:
-        """Return the command, slowed down in proportion if it leads to a contact within `time_before_collision`.
+    def limit_command(self, command: Twist, odometry: Pose2) -> Twist:
+        """Return the command, scaled down if it leads to a collision within `time_before_collision` s.
 
         `odometry` is the current pose in the odom frame.
         """
@@ -117,9 +123,9 @@ class CollisionMonitor:
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale) if scale > 0.0 else STOP
 
     def _time_to_scan_points(self, recorded: RecordedScan, command: Twist, odometry: Pose2, horizon: float) -> float:
-        """Return the time in s until enough points of a scan are within the stop margin, at most `horizon`.
+        """Return the time in s until `min_points` hits of a scan are within the stop margin, at most `horizon`.
 
-        Points that the robot moves away from do not count.
+        Hits that the robot moves away from do not count.
         """
         (vx, vy, _), (x, y, _), (scan_x, scan_y, _) = command, odometry, recorded.odometry
         reach = self._stop_radius + math.hypot(vx, vy) * horizon + math.hypot(x - scan_x, y - scan_y)
@@ -137,9 +143,9 @@ class CollisionMonitor:
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _may_meet_moving(self, command: Twist, horizon: float) -> bool:
-        """Return whether a moving obstacle can come within the stop margin of the footprint within the horizon.
+        """Return False if no moving obstacle can come within the stop margin of the footprint within `horizon` s.
 
-        A quick check: the closest approach of straight motions has a closed form, and turns are bounded.
+        Quick check with the closest approach of straight motions, and an upper bound for the effect of the turn rate.
         """
         own_velocity = complex(command.vx, command.vy)
         deviation = abs(own_velocity) * abs(command.wz) * horizon * horizon / 2
@@ -156,7 +162,7 @@ class CollisionMonitor:
     def _time_to_moving(self, command: Twist, horizon: float) -> float:
         """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        Obstacles that would come as close to a stationary robot do not count, because braking would not help.
+        Obstacles that would come equally close to a stationary robot do not count, because braking would not help.
         """
         times = self._times
         centers = self._moving.at(times)
@@ -167,20 +173,23 @@ class CollisionMonitor:
         gaps_standing = self._gaps_to(centers, STOP)
         unavoidable = (gaps_standing[1:] < 0.0) & (gaps_standing[1:] < gaps_standing[0] - 1e-4)
         first = (collides | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
-        worse = (gaps < gaps_standing - MIN_APPROACH_M)[1 + first, np.arange(len(first))]
+        worse = (gaps < gaps_standing - MIN_BENEFIT_M)[1 + first, np.arange(len(first))]
         is_contact = (collides & worse).any(axis=1)
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _gaps_to(self, centers: Array, twist: Twist) -> Array:
-        """Return distances (times, obstacles) in m from the stop margin to moving obstacles at a constant `twist`."""
+        """Return distances (times, obstacles) in m from the stop margin to moving obstacles, for a constant `twist`.
+
+        `centers` (times, obstacles, 2) are the predicted positions of the obstacles.
+        """
         return self._gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 
     def _gaps(self, points: Array, poses: Array) -> Array:
-        """Return distances (m, n) from the footprint at poses (m, 3) to points (m or 1, n, 2); negative inside.
+        """Return distances (m, n) in m from the footprint at poses (m, 3) to points (m or 1, n, 2); negative inside.
 
-        For a polygon, the result is a lower bound: the largest signed distance from any of its edge lines.
+        For a polygon, the result is a lower bound: the largest signed distance from its edge lines.
         """
         dx = points[:, :, 0] - poses[:, None, 0]
         dy = points[:, :, 1] - poses[:, None, 1]
@@ -196,7 +205,7 @@ def _time_steps(spec: MonitorSpec) -> int:
     """Return the number of time steps until `time_before_collision`, none longer than `simulation_time_step`."""
     if spec.simulation_time_step is None:
         return DEFAULT_STEPS
-    return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_ROUNDING))
+    return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE))
 
 
 def _miter_factor(normals: Array) -> float:
@@ -209,7 +218,7 @@ def _miter_factor(normals: Array) -> float:
 
 
 def _nearest(scan: Scan) -> float | None:
-    """Return the shortest valid range in m; None if there is no return."""
+    """Return the shortest valid range in m; None if the scan has no returns."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest

@@ -9,15 +9,15 @@ from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import RobotModel
 
-CRAWL_SPEED, CRAWL_YAW_RATE = 0.02, 0.1
-"""The robot counts as stopped by the monitor below these speeds in m/s and rad/s."""
+STOPPED_SPEED_M_S, STOPPED_YAW_RATE_RAD_S = 0.02, 0.1
+"""The robot counts as stopped by the collision monitor if its command is below these speeds."""
 
 
 class VelocitySmoother:
-    """Limits velocity and acceleration of commands, like nav2_velocity_smoother in open loop."""
+    """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Take the limits of the specification, at most those of the robot; `period` between commands in s."""
+        """Take the limits: the lower ones of specification and robot. `period` is the controller period in s."""
         self._enabled = spec.enabled
         acceleration = min(spec.max_accel or robot.linear_acceleration, robot.linear_acceleration)
         deceleration = min(spec.max_decel or robot.linear_deceleration, robot.linear_deceleration)
@@ -29,7 +29,7 @@ class VelocitySmoother:
         self._last = Twist()
 
     def reset(self, twist: Twist) -> None:
-        """Set the velocity from which the next command accelerates, because the last one was not sent unchanged."""
+        """Set the velocity from which the next command accelerates."""
         self._last = twist
 
     def smooth(self, command: Twist, periods: int = 1) -> Twist:
@@ -49,7 +49,7 @@ class VelocitySmoother:
         return self._last
 
     def _limited(self, command: Twist) -> Twist:
-        """Return the velocity within the speed limits; a car keeps the curvature of its path."""
+        """Return the command within the speed limits; for a car, with the same curvature."""
         if not self._has_limits or (
             max(abs(command.vx), abs(command.vy)) <= self._max_speed and abs(command.wz) <= self._max_yaw_rate
         ):
@@ -62,7 +62,7 @@ class VelocitySmoother:
         return Twist(vx, vy, wz)
 
     def _accelerated(self, current: float, target: float, periods: int) -> float:
-        """Return the speed along one axis after `periods`; a change of direction stops at zero first."""
+        """Return the speed of one axis after `periods`; a change of direction stops at zero first."""
         if current * target < 0.0:
             target = 0.0
         step = periods * (self._speed_up_step if abs(target) > abs(current) else self._slow_down_step)
@@ -70,12 +70,12 @@ class VelocitySmoother:
 
 
 class CommandPipeline:
-    """Passes commands through velocity smoother and collision monitor, and delays them by the components' latencies."""
+    """Passes commands through velocity smoother and collision monitor, delayed by the latency of the components."""
 
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """Take the components, the controller's `period`, and the `latency` of (controller, monitor), both in ticks."""
+        """Take the components, the controller `period`, and the `latency` of (controller, monitor), all in ticks."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._requested, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
         self._immediate: tuple[Twist, int] | None = None
@@ -113,7 +113,7 @@ class CommandPipeline:
         self.sent = STOP
 
     def step(self, tick: int, odometry: Pose2) -> None:
-        """Process the commands that are due at this tick, with the robot at a pose in the odom frame."""
+        """Process the commands due at this tick, and update `sent`. `odometry` is the pose in the odom frame."""
         if self._immediate is not None:
             self.sent = self._filter(tick, *self._immediate, odometry)
             self._immediate = None
@@ -123,7 +123,7 @@ class CommandPipeline:
             self.sent = self._allowed.take()
 
     def hold_timed_out(self, tick: int) -> bool:
-        """Return whether the monitor has stopped the robot for `hold_timeout`; if so, the time starts again."""
+        """Return whether the monitor has kept the robot stopped for `hold_timeout`. If so, restart the timeout."""
         is_over = tick - self._last_free_tick >= self._monitor.hold_ticks
         if is_over:
             self._last_free_tick = tick
@@ -132,10 +132,11 @@ class CommandPipeline:
     def _filter(self, tick: int, command: Twist, periods: int, odometry: Pose2) -> Twist:
         """Return the command after smoother and monitor."""
         smoothed = self._smoother.smooth(command, periods)
-        allowed = self._monitor.allow(smoothed, odometry)
+        allowed = self._monitor.limit_command(smoothed, odometry)
         if allowed is not smoothed:
             self._smoother.reset(allowed)
-        is_crawling = abs(allowed.vx) + abs(allowed.vy) < CRAWL_SPEED and abs(allowed.wz) < CRAWL_YAW_RATE
-        if not is_crawling or command == STOP:
+        speed, yaw_rate = abs(allowed.vx) + abs(allowed.vy), abs(allowed.wz)
+        is_stopped = speed < STOPPED_SPEED_M_S and yaw_rate < STOPPED_YAW_RATE_RAD_S
+        if not is_stopped or command == STOP:
             self._last_free_tick = tick
         return allowed

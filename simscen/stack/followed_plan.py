@@ -1,4 +1,4 @@
-"""The plan that the robot follows, its occupied points, and its transformation to the odom frame for the controller."""
+"""Plan that the robot follows: its occupied points, and its transformation to the odom frame for the controller."""
 
 import math
 
@@ -14,18 +14,17 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Changes of the costmap count if they are this close to the plan, or closer than a larger inscribed radius."""
+"""Costmap changes within this distance of the plan, or within a larger inscribed radius, cause a new check."""
 WATCH_EVERY_POINTS = 4
 """Every n-th point of the plan is checked for changes nearby."""
-MAX_UNLOCATED_M = 0.5
-"""After this much motion, the position on the plan is computed even if nothing needs it, to keep the search short."""
-MISSED_M, END_M = 0.2, 0.03
-"""A car has missed its plan if it is farther than 0.2 m from it, or has less than 0.03 m of it left."""
+MAX_DEFERRED_MOTION_M = 0.5
+"""Motion of the robot after which its position on the plan is updated at the latest."""
+MAX_CROSS_TRACK_M, MIN_REMAINING_M = 0.2, 0.03
+"""A car has missed its plan if it is farther than 0.2 m from it, or if less than 0.03 m of it remain."""
 COMPARISON_DISTANCE_M = 1.0
 """Distance from the robot at which a shift between map and odom frame is measured."""
 MIN_SHIFT_M = 0.01
-"""The controller gets the path again if the map frame has shifted by more than this in the odom frame. Corrections of
-the localizer are larger; the continuous drift of odometry between two controller periods is smaller."""
+"""Shift of the map frame in the odom frame above which the controller gets the path again."""
 ROUNDING_M = 1e-9
 """Largest shift that rounding alone can cause."""
 
@@ -42,23 +41,23 @@ class FollowedPlan:
         self._complex_points: Plane = path.points[:, 0] + 1j * path.points[:, 1]
         self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest_step
         self._revision = costmap.revision
-        self.compare(costmap)
+        self.update_occupied(costmap)
 
-    def compare_if_changed(self, costmap: LayeredCostmap) -> None:
+    def update_occupied_if_changed(self, costmap: LayeredCostmap) -> None:
         """Update the occupied points if the costmap has changed near the points ahead of the robot."""
         ahead = self._complex_points[self._track.index :: WATCH_EVERY_POINTS]
         if costmap.changed_near(self._revision, ahead, self._watch_distance):
-            self.compare(costmap.view)
+            self.update_occupied(costmap.view)
         self._revision = costmap.revision
 
-    def compare(self, costmap: CostmapView) -> None:
-        """Determine the occupied points: those where the inscribed circle of the robot does not fit on a costmap."""
+    def update_occupied(self, costmap: CostmapView) -> None:
+        """Determine the occupied points of the plan, where the inscribed circle of the robot does not fit."""
         self._occupied = distances(costmap, self.path.points[:, :2]) <= np.float32(self._radius)
 
     def locate(self, pose: Pose2) -> None:
         """Set the pose of the robot in the map frame. Its position on the plan is computed when needed."""
         self._pose, (x, y, _) = pose, self._located_pose
-        if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_UNLOCATED_M:
+        if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_DEFERRED_MOTION_M:
             self._update_tracker(pose)
 
     def _update_tracker(self, pose: Pose2) -> None:
@@ -79,22 +78,22 @@ class FollowedPlan:
         return points
 
     def sampled_points(self, every: int) -> list[complex]:
-        """Return every n-th point ahead as x + iy."""
+        """Return every n-th point ahead of the robot as x + iy."""
         return self._track.sampled_points(every)
 
     def is_missed(self, pose: Pose2) -> bool:
-        """Return whether a car can no longer reach its goal on this plan, because it cannot turn in place."""
+        """Return whether a car is too far from the plan, or too near its end, to reach the goal on this plan."""
         x, y, _ = self._track.points[self._track.index].tolist()
-        return math.hypot(pose.x - x, pose.y - y) > MISSED_M or self.remaining() < END_M
+        return math.hypot(pose.x - x, pose.y - y) > MAX_CROSS_TRACK_M or self.remaining() < MIN_REMAINING_M
 
     def remaining(self) -> float:
         """Return the length of the plan ahead in m."""
         return self._track.remaining()
 
     def is_blocked(self) -> bool:
-        """Return whether any point ahead is occupied.
+        """Return whether any point ahead of the robot is occupied.
 
-        Occupied points next to the robot are ignored if free ones follow, so that a robot in collision can leave.
+        Occupied points before the first free point are ignored, so that a robot in collision can leave.
         """
         occupied = self._occupied[self._track.index :: 2]
         if not occupied.any():
@@ -106,8 +105,7 @@ class FollowedPlan:
 class LocalPath:
     """Passes the plan to the controller in the odom frame.
 
-    Nav2's controllers transform the plan in each cycle. Here, the controller gets the plan once, and the part ahead
-    again when the transform between map and odom frame has changed. Until then, it can reuse what it has computed.
+    The controller gets a plan once, and its part ahead again after the transform from map to odom frame has changed.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -119,7 +117,7 @@ class LocalPath:
         self._local_goal: Goal | None = None
 
     def update(self, plan: FollowedPlan, goal: Goal, frames: Frames) -> Goal:
-        """Update the controller's path for the current plan and frames. Return the goal in the odom frame."""
+        """Update the controller's path. `plan` and `goal` are in the map frame. Return the goal in the odom frame."""
         is_unchanged = frames.shift_since(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
         if not is_unchanged:
             self._odom_from_map = frames.odom_from_map

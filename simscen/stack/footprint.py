@@ -26,7 +26,7 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
 
 
 def distance_at(costmap: CostmapView, x: float, y: float) -> float:
-    """Return the same as `distances` for one point, in a tenth of the time."""
+    """Return the distance in m from one point to the nearest lethal cell; 0 outside the costmap."""
     left, low = costmap.origin
     distance, resolution = costmap.distance, costmap.resolution
     row, column = math.floor((y - low) / resolution), math.floor((x - left) / resolution)
@@ -34,28 +34,25 @@ def distance_at(costmap: CostmapView, x: float, y: float) -> float:
     return distance.item(row, column) if 0 <= row < height and 0 <= column < width else 0.0
 
 
-def lethal_near(costmap: CostmapView, x: float, y: float, meters: float) -> Array:
-    """Return the centers (n, 2) of the lethal cells in a square around a point, `meters` to each side."""
+def lethal_near(costmap: CostmapView, x: float, y: float, half_side: float) -> Array:
+    """Return the centers (n, 2) of the lethal cells in a square around (x, y) with half the side length in m."""
     left, low = costmap.origin
-    first = [max(0, math.floor((at - meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
-    last = [max(0, math.ceil((at + meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    first = [max(0, math.floor((at - half_side - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    last = [max(0, math.ceil((at + half_side - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
     near = np.argwhere(costmap.distance[first[0] : last[0], first[1] : last[1]] <= 0.0) + np.array(first)
     cells: Array = np.array((left, low)) + (near[:, ::-1] + 0.5) * costmap.resolution
     return cells
 
 
 class Footprint:
-    """Collision checker for many poses at once.
+    """Collision checker for many poses at once. A footprint is in collision if it contains the center of a lethal cell.
 
-    A round robot is in collision if the center of a lethal cell is within its radius. Any other robot is in collision
-    if the center of a lethal cell is within its inscribed radius or inside its footprint polygon.
-
-    Attributes in m: `inscribed` and `circumscribed` radius; `reach`, the largest distance that a point of the footprint
-    moves per radian of rotation (0 if round). `discs` cover the footprint, for faster checks.
+    `inscribed` and `circumscribed` are radii in m. `reach` is the largest distance in m that a point of the footprint
+    moves per rad of rotation; 0 if round. `discs` cover the footprint, for faster checks.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
-        """Prepare the checks of a robot on costmaps whose `resolution` is the cell size in m."""
+        """Prepare checks of a robot on costmaps with this `resolution`, the cell size in m."""
         self.inscribed = robot.inscribed_radius
         self._is_round = robot.radius is not None
         self.reach = 0.0 if self._is_round else robot.circumscribed_radius
@@ -63,17 +60,17 @@ class Footprint:
         corners = np.array(robot.footprint, dtype=np.float64)
         inner = _inner_points(corners, resolution, self.inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
-        self._depth = _depths(corners, self._hull).astype(np.float32)
+        self._depth = _edge_distances(corners, self._hull).astype(np.float32)
         self._corners, self.discs = corners, CoveringDiscs(robot)
 
-    def gaps(self, points: Array, poses: Array) -> Array:
+    def point_distances(self, points: Array, poses: Array) -> Array:
         """Return distances (n, k) in m from the footprint's edge at poses (n, 3) to points (k, 2); negative inside."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x, y = points[None, :, 0] - poses[:, 0, None], points[None, :, 1] - poses[:, 1, None]
         if self._is_round:
             return np.asarray(np.hypot(x, y) - self.circumscribed)
         local = np.stack((cosine * x + sine * y, cosine * y - sine * x), axis=-1).reshape(-1, 2)
-        signed = np.where(_inside(self._corners, local), -1.0, 1.0) * _depths(self._corners, local)
+        signed = np.where(_inside(self._corners, local), -1.0, 1.0) * _edge_distances(self._corners, local)
         return np.asarray(signed.reshape(x.shape))
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -88,10 +85,9 @@ class Footprint:
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
-        """Return the approximate distance (n,) in m from the footprint's edge to the nearest lethal cell.
+        """Return approximate distances (n,) in m from the footprint's edge at poses (n, 3) to the nearest lethal cell.
 
-        In collision, it is minus the depth of the deepest lethal cell inside the footprint. Its change then shows
-        whether a motion leads out of the collision or further into it.
+        In collision, the result is minus the depth of the deepest lethal cell inside the footprint.
         """
         center = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
         if self._is_round:
@@ -106,8 +102,8 @@ class Footprint:
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
         """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles; negative in collision.
 
-        The obstacles are at their positions predicted for `times` (s, broadcast with the poses), inflated by `sigmas`
-        standard deviations of these. If the footprint is not round, the result is a few centimeters too small.
+        The obstacles are at their predicted positions at `times` in s, which broadcast with the poses. They are
+        inflated by `sigmas` standard deviations. If the footprint is not round, the result is a few cm too small.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
@@ -116,7 +112,7 @@ class Footprint:
         return np.asarray((distances(costmap, self._points_at(poses)) > 0).all(axis=1))
 
     def _points_at(self, poses: Array) -> Array:
-        """Return the check points (n, k, 2) of the footprint at poses (n, 3)."""
+        """Return the points (n, k, 2) of the footprint that are checked for lethal cells, at poses (n, 3)."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x = poses[:, 0, None] + cosine * self._hull[:, 0] - sine * self._hull[:, 1]
         y = poses[:, 1, None] + sine * self._hull[:, 0] + cosine * self._hull[:, 1]
@@ -124,11 +120,10 @@ class Footprint:
 
 
 class CoveringDiscs:
-    """Row of equal discs along the x axis of the base that covers the footprint.
+    """Row of k equal discs along the x axis of the base that covers the footprint, for fast approximate checks.
 
-    `offsets` (k,) are the x of their centers and `radius` is their radius, in m. `reach` is the largest distance of
-    their edges from the base; `centered` is True for a single disc at the base. A check needs only k lookups per pose
-    and errs on the safe side by a centimeter or two. Controllers compare thousands of trajectories with it.
+    `offsets` (k,) are the x coordinates of the centers in m. `radius` is the radius of each disc in m. `reach` is the
+    largest distance in m from the base to the edge of a disc. `centered` is True for a single disc at the base.
     """
 
     def __init__(self, robot: RobotModel) -> None:
@@ -159,7 +154,10 @@ class CoveringDiscs:
         return np.asarray(least - np.float32(self.radius))
 
     def gap(self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
-        """Return distances (…,) in m from the discs at poses (…,) to moving obstacles; see MovingObstacles.gap."""
+        """Return distances (…,) in m from the discs at poses (…,) to the nearest moving obstacle at `times` (s).
+
+        Obstacles are inflated by `sigmas` standard deviations of their position.
+        """
         least, *others = [moving.gap(*at, times, sigmas) for at in self._centers_at(x, y, yaw)]
         for other in others:
             np.minimum(least, other, out=least)
@@ -169,7 +167,10 @@ class CoveringDiscs:
     def nearness(
         self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, margin: float
     ) -> tuple[Reals, Mask]:
-        """Return nearness (…,) and contact (…,) of discs and moving obstacles; see MovingObstacles.nearness."""
+        """Return the nearness (…,) of the nearest moving obstacle at `times` (s), and whether it touches a disc.
+
+        The nearness is 1 at contact and 0 at a distance of `margin` m plus one standard deviation of the position.
+        """
         positions = self._centers_at(x, y, yaw)
         (nearest, touched), *others = [moving.nearness(*at, times, self.radius, margin) for at in positions]
         for near, touch in others:
@@ -186,7 +187,7 @@ class CoveringDiscs:
 
 
 def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
-    """Return points (n, 2) inside the footprint but outside its inscribed circle, at least one for each cell."""
+    """Return points (n, 2) inside the footprint but outside its inscribed circle, at least one per costmap cell."""
     spacing = resolution / math.sqrt(2.0)
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
@@ -196,7 +197,7 @@ def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
 
 
 def _inside(corners: Array, points: Array) -> Mask:
-    """Return which of the points (n, 2) are inside the polygon."""
+    """Return which of the points (n, 2) are inside the polygon with these corners (m, 2)."""
     inside: Mask = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True):
         if ay != by:
@@ -205,13 +206,13 @@ def _inside(corners: Array, points: Array) -> Mask:
     return inside
 
 
-def _depths(corners: Array, points: Array) -> Array:
+def _edge_distances(corners: Array, points: Array) -> Array:
     """Return distances (n,) from points (n, 2) to the nearest edge of the polygon."""
-    depths: Array = np.full(len(points), np.inf)
+    distance: Array = np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = np.clip((points - a) @ (b - a) / float((b - a) @ (b - a)), 0.0, 1.0)
-        np.minimum(depths, np.hypot(*(points - a - along[:, None] * (b - a)).T), out=depths)
-    return depths
+        np.minimum(distance, np.hypot(*(points - a - along[:, None] * (b - a)).T), out=distance)
+    return distance
 
 
 def _edge_points(corners: Array, resolution: float) -> Array:

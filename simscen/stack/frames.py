@@ -1,4 +1,4 @@
-"""Poses of the robot in the map and odom frames, the transform between these (REP 105), and the odometry history."""
+"""Poses of the robot in the map and odom frames (REP 105), the transform between both, and the odometry history."""
 
 import math
 from bisect import bisect_left
@@ -21,7 +21,7 @@ class Frames(NamedTuple):
 
     @property
     def map_from_odom(self) -> Pose2:
-        """The transform that a localizer publishes."""
+        """The transform that a localizer publishes: pose of the odom frame in the map frame."""
         return self.pose.compose(self.odometry.inverse())
 
     @property
@@ -60,7 +60,7 @@ def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
 HISTORY_S = 10
 """Time for which past poses can be looked up: the default of tf2's buffer."""
 TRAIL_S = 60
-"""Time covered by the trail of the robot: longer than a stuck robot waits between two recoveries."""
+"""Default time covered by the trail of the robot, which recovery behaviors use."""
 # Larger values, as from a broken encoder, are rejected: their squares could overflow.
 _MAX_VALUE = 1e6
 
@@ -72,11 +72,11 @@ def is_plausible(values: tuple[float, float, float]) -> bool:
 
 
 class OdometryHistory:
-    """Odometry poses of the last HISTORY_S seconds by tick, and the longer trail of the robot."""
+    """Odometry poses of the last HISTORY_S seconds by tick, and the trail: the poses of the last `trail_s` seconds."""
 
-    def __init__(self, tick_rate: int, trail: float = HISTORY_S) -> None:
-        """Create an empty history with a tick rate in Hz. `trail` is the time in s that `trail()` covers."""
-        self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail * tick_rate, (trail + 1) * tick_rate
+    def __init__(self, tick_rate: int, trail_s: float = HISTORY_S) -> None:
+        """Create an empty history. `tick_rate` is in Hz."""
+        self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail_s * tick_rate, (trail_s + 1) * tick_rate
         self.clear()
 
     def clear(self) -> None:
@@ -107,12 +107,12 @@ class OdometryHistory:
         del self._readings[: bisect_left(self._readings, (self._newest - self._trail,))]
         self._prune_at = self._readings[0][0] + self._capacity
 
-    def _first(self) -> int:
+    def _oldest_index(self) -> int:
         """Return the index of the oldest pose within HISTORY_S."""
         return bisect_left(self._readings, (self._newest - self._span,))
 
     def trail(self) -> list[Pose2]:
-        """Return all stored poses, the oldest first."""
+        """Return the poses of the trail, the oldest first."""
         return [pose for _, pose in self._readings]
 
     def reaches(self, tick: int) -> bool:
@@ -123,14 +123,14 @@ class OdometryHistory:
         """Return the latest pose up to `tick` without interpolation, or the oldest pose if all are later."""
         if tick >= self._newest:
             return self.now
-        first = self._first()
+        first = self._oldest_index()
         return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
 
     def at(self, tick: int) -> Pose2 | None:
         """Return the pose at `tick`, interpolated linearly; None before the oldest or after the latest pose."""
         if tick == self._newest:
             return self.now
-        first = self._first()
+        first = self._oldest_index()
         after = bisect_left(self._readings, (tick,), first)
         if after == len(self._readings):
             return None
@@ -145,6 +145,6 @@ class OdometryHistory:
         return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
     def past_pose(self, latest: Pose2, tick: int) -> Pose2:
-        """Return the pose at `tick`, not interpolated, in the frame in which `latest` is the robot's latest pose."""
+        """Return the pose at `tick`, not interpolated, in another frame; `latest` is the latest pose in that frame."""
         past = self.latest_until(tick)
         return latest if past is self.now else latest.compose(self.now.between(past))

@@ -1,4 +1,4 @@
-"""Kinematics of a base: arcs at constant velocity in closed form, velocity limits, and cumulative sums."""
+"""Kinematics of a base: poses on arcs at constant velocity, cusps of paths, and velocity limits."""
 
 import cmath
 import math
@@ -14,17 +14,17 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
-MIN_YAW_RATE = 1e-6
-"""Yaw rate in rad/s below which an arc is taken for a straight line."""
+MIN_YAW_RATE_RAD_S = 1e-6
+"""Yaw rate below which an arc is taken for a straight line."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
-"""Times of the poses in a logged local plan. At 0.5 m/s and 1 rad/s, the chords are at most 4 mm off the arc."""
+"""Times of the poses in a logged local plan."""
 
 
 def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
     """Return the poses (n, 3) of a base that starts at `pose` with constant `twist`, after `times` (n,) in s."""
     vx, vy, wz = twist
     turned = wz * times
-    if abs(wz) < MIN_YAW_RATE:
+    if abs(wz) < MIN_YAW_RATE_RAD_S:
         x, y = vx * times, vy * times
     else:
         forward, left = np.sin(turned) / wz, (1.0 - np.cos(turned)) / wz
@@ -37,20 +37,20 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
 
 
 def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
-    """Return the same poses (n, 3) as `poses_along`, but faster if there are only about a dozen times."""
+    """Return the poses (n, 3) of `poses_along`, with wrapped headings. Faster for up to about a dozen times."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
     start, velocity = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
     poses: list[tuple[float, float, float]] = []
     for time in times:
         turned = wz * time
-        effective_time = time if abs(wz) < MIN_YAW_RATE else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
+        effective_time = time if abs(wz) < MIN_YAW_RATE_RAD_S else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
         position = start + velocity * effective_time
         poses.append((position.real, position.imag, wrap(yaw + turned)))
     return np.array(poses)
 
 
 def mean_velocity(step: Pose2, seconds: float) -> Twist:
-    """Return the constant velocity that moves a base along an arc by `step` in the base frame within `seconds`."""
+    """Return the constant velocity that moves a base by `step` within `seconds`; `step` is in the base frame."""
     x, y, turn = step
     c, s = math.cos(turn / 2), math.sin(turn / 2)  # the chord of the arc is at half the turn
     return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)
@@ -64,7 +64,7 @@ def forward_steps(poses: Array) -> npt.NDArray[np.bool_]:
 
 
 def direction_changes(forward: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Return the indices of the poses between a forward and a backward step; `forward` is from `forward_steps`."""
+    """Return the indices of the poses between a forward and a backward step. `forward` comes from `forward_steps`."""
     return np.flatnonzero(forward[1:] != forward[:-1]) + 1
 
 
@@ -74,7 +74,7 @@ def cusps(poses: Array) -> npt.NDArray[np.int64]:
 
 
 Axes = tuple[float, float, float]
-"""Values for vx, vy, and turn rate."""
+"""Values for vx, vy, and turn rate, in this order."""
 OptionalAxes = tuple[float | None, float | None, float | None]
 Limits = TypeVar("Limits", bound="VelocityLimits")
 Real = TypeVar("Real", np.float32, np.float64)
@@ -82,7 +82,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 @dataclass(frozen=True)
 class VelocityLimits:
-    """Lowest and highest velocity, acceleration, and (negative) deceleration of vx, vy (m, s) and turn rate (rad, s).
+    """Limits of vx and vy (m, s) and the turn rate (rad, s): velocity, acceleration, and (negative) deceleration.
 
     `turning_radius` is the minimum turning radius in m; 0 for a base that turns in place.
     """
@@ -109,7 +109,7 @@ def velocity_limits(
     deceleration: OptionalAxes,
     turning_radius: float | None = None,
 ) -> VelocityLimits:
-    """Return the requested limits, each bounded by that of the robot; for None, the limit of the robot."""
+    """Return the requested limits, bounded by those of the robot. None stands for the limit of the robot."""
     linear, lateral, angular = robot.max_linear, robot.max_lateral, robot.max_angular
     increase, decrease = robot.linear_acceleration, -robot.linear_deceleration
     angular_change = robot.angular_acceleration
@@ -123,6 +123,7 @@ def velocity_limits(
 
 
 def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, limits: Axes) -> Axes:
+    """Return `bound(value, limit)` for each requested value; the limit for None. `bound` is min or max."""
     x, y, turn = (
         limit if value is None else bound(value, limit) for value, limit in zip(requested, limits, strict=True)
     )

@@ -1,4 +1,4 @@
-"""Moving obstacles at one time: position and velocity with their uncertainty, and predictions from these."""
+"""Moving obstacles with uncertain position and velocity, and predictions of their motion."""
 
 import cmath
 import math
@@ -10,24 +10,21 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 
-MAX_UNCERTAINTY_M = 0.8
-"""Largest inflation of an obstacle: by its uncertainty in `gap`, by margin plus uncertainty in `nearness`."""
+MAX_INFLATION_M = 0.8
+"""Largest distance by which an obstacle is inflated: for its uncertainty, and in `nearness` also for the margin."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Limits of the time steps of `is_surely_clear`.
-
-A step is longer than MAX_STEP_S only if the obstacle stays farther away than MAX_UNCERTAINTY_M during it.
-"""
+"""Limits of the time steps of `is_surely_clear`. Only steps far away from the obstacle are longer."""
 CONTACT_DISTANCE_M = 0.03
-"""Closer obstacles count as touching."""
+"""Distance below which obstacles count as touching."""
 
 Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
 
 
 class MovingObstacle(NamedTuple):
-    """A moving upright cylinder: center (m) and velocity (m/s) as x + iy, and radius in m.
+    """A moving upright cylinder: center in m and velocity in m/s as x + iy, and radius in m.
 
-    The uncertainty is the same along all axes. `covariance` is that of position and velocity.
+    The uncertainty is the same along both axes. `covariance` is the covariance of position and velocity.
     """
 
     position: complex
@@ -64,10 +61,9 @@ class MovingObstacle(NamedTuple):
 
 
 class MovingObstacles:
-    """Moving obstacles in one frame at one time. All other times are in s after it.
+    """Moving obstacles in one frame at one time. The parameter `times` of the methods is in s after this time.
 
-    `acceleration` is the standard deviation of their acceleration in m/s², by which the uncertainty of predictions
-    grows.
+    `acceleration` is the standard deviation of their acceleration in m/s², by which the uncertainty grows.
     """
 
     __slots__ = ("acceleration", "obstacles")
@@ -77,7 +73,7 @@ class MovingObstacles:
     ) -> None:
         """Create obstacles from `centers` (n, 2) in m, `velocities` (n, 2) in m/s, and `radii` (n,) in m.
 
-        `covariances` (n, 4, 4) are of x, y, vx, vy in that order; the larger value of the two axes is used for both.
+        `covariances` (n, 4, 4) are those of (x, y, vx, vy). The larger value of the two axes is used for both.
         """
         spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
         rows = zip(centers.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
@@ -89,7 +85,7 @@ class MovingObstacles:
 
     @classmethod
     def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """Return a set of these obstacles."""
+        """Create a set of single obstacles."""
         moving = object.__new__(cls)
         moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
         return moving
@@ -114,7 +110,7 @@ class MovingObstacles:
 
     @property
     def covariances(self) -> Array:
-        """Covariances (n, 4, 4) of x, y, vx, vy in that order."""
+        """Covariances (n, 4, 4) of (x, y, vx, vy)."""
         spreads = [
             ((position, covariance), (covariance, velocity)) for *_, position, covariance, velocity in self.obstacles
         ]
@@ -129,25 +125,25 @@ class MovingObstacles:
         """Return distances (…,) in m from points (…,) to the surface of the nearest obstacle at `times`.
 
         `times` broadcast with the points. Obstacles are inflated by `sigmas` standard deviations of their position, at
-        most by MAX_UNCERTAINTY_M. Without obstacles, the distance is inf.
+        most by MAX_INFLATION_M. Without obstacles, the distance is inf.
         """
         nearest = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
         for obstacle, gap in self._gaps(x, y, times):
-            inflation = np.minimum(sigmas * self._position_std(obstacle, times), MAX_UNCERTAINTY_M) if sigmas else 0.0
+            inflation = np.minimum(sigmas * self._position_std(obstacle, times), MAX_INFLATION_M) if sigmas else 0.0
             np.minimum(nearest, gap - inflation, out=nearest)
         return nearest
 
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, margin: float) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
 
-        The nearness falls linearly with the distance: 1 at contact, 0 at `margin` (m) plus one standard deviation of
-        the position (at most MAX_UNCERTAINTY_M), and negative beyond.
+        The nearness is 1 at contact and falls linearly with the distance. It is 0 at `margin` m plus one standard
+        deviation of the obstacle's position, at most at MAX_INFLATION_M, and negative beyond.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
         for obstacle, gap in self._gaps(x, y, times):
             touched |= gap < radius + CONTACT_DISTANCE_M
-            required = np.minimum(margin + self._position_std(obstacle, times), MAX_UNCERTAINTY_M)
+            required = np.minimum(margin + self._position_std(obstacle, times), MAX_INFLATION_M)
             np.maximum(nearest, (radius - gap) / required, out=nearest)
         nearest += 1.0
         return nearest, touched
@@ -155,9 +151,9 @@ class MovingObstacles:
     def is_surely_clear(
         self, position: Callable[[float], complex], speed: float, radius: float, margin: float, seconds: float
     ) -> bool:
-        """Return True if the nearness of a moving disc certainly stays at 0 or less for `seconds`. A quick check.
+        """Return True if the `nearness` of a moving disc is certainly at most 0 for `seconds`; False if uncertain.
 
-        The disc is at `position(t)` (x + iy in m) after t s and is not faster than `speed` in m/s.
+        The disc is at `position(t)`, x + iy in m, after t s. It is not faster than `speed` in m/s.
         """
         for obstacle in self.obstacles:
             closing_speed, time = max(speed + abs(obstacle.velocity), 1e-3), 0.0
@@ -165,12 +161,12 @@ class MovingObstacles:
                 offset = abs(obstacle.position + obstacle.velocity * time - position(time))
                 required = min(
                     margin + obstacle.position_std(min(time + MAX_STEP_S, seconds), self.acceleration),
-                    MAX_UNCERTAINTY_M,
+                    MAX_INFLATION_M,
                 )
                 slack = (offset - obstacle.radius - radius - required) / closing_speed
                 if slack < MIN_STEP_S:
                     return False
-                time += max(min(slack, MAX_STEP_S), slack - (MAX_UNCERTAINTY_M - required) / closing_speed)
+                time += max(min(slack, MAX_STEP_S), slack - (MAX_INFLATION_M - required) / closing_speed)
         return True
 
     def _position_std(self, obstacle: MovingObstacle, times: Reals) -> Reals:
@@ -180,7 +176,7 @@ class MovingObstacles:
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + velocity_variance * times**2 + drift))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
-        """Yield each obstacle with the distances (…,) in m from points (…,) to its surface."""
+        """Yield each obstacle, and the distances (…,) in m from points (…,) to its surface at `times`."""
         for obstacle in self.obstacles:
             position, velocity, radius, *_ = obstacle
             dx, dy = x - (position.real + velocity.real * times), y - (position.imag + velocity.imag * times)

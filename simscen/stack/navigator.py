@@ -1,10 +1,10 @@
 """Navigation to one goal: the replanning and recovery logic of Nav2's default behavior trees, as a state machine.
 
-Without failures, one step checks the goal, checks the plan, and calls the controller. When planning fails, the global
-costmap is cleared and planning is retried; when control fails, the local costmap is cleared (the contextual recoveries
-of Nav2's tree). If the retry fails too, the next recovery behavior runs, after which both may be retried again.
-Planning may also be retried again once a plan has been found. After `number_of_retries` behaviors, the goal fails with
-the code of the last failure. A goal inside a mapped wall fails after the first retry, because no recovery can help.
+After a planning failure, the global costmap is cleared and planning is retried once. After a control failure, the local
+costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs, and both can be
+retried again. After `number_of_retries` behaviors, the goal fails with the code of the last failure.
+
+A goal inside a mapped wall fails after the first retry, because no recovery can help.
 """
 
 from typing import NamedTuple, Protocol
@@ -47,8 +47,8 @@ class ClearEntirely:
         return True
 
 
-class Step(NamedTuple):
-    """Result of a step of the navigator. `failure` is not None if the goal has failed."""
+class StepResult(NamedTuple):
+    """Result of a step of the navigator: either the goal is reached, or it has failed, or the command is sent."""
 
     command: Twist = STOP
     reached: bool = False
@@ -95,7 +95,7 @@ class Navigator:
         self._failing_since: float | None = None
 
     def pursue(self, goal: Goal) -> None:
-        """Drive to this goal in the following steps, with all retries restored."""
+        """Set the goal for the following steps, and restore all retries."""
         self.goal = goal
         self._reset()
         self._recovery.reset()
@@ -108,29 +108,28 @@ class Navigator:
         self.goal, self.via = None, ()
         self._reset()
 
-    def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> Step:
-        """Run one step, `periods` controller periods after the previous one; `twist` is the measured velocity.
+    def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> StepResult:
+        """Run one step, `periods` controller periods after the previous one. `twist` is the measured velocity.
 
-        `is_held` means that the collision monitor has kept the robot stopped for its `hold_timeout`. This counts as a
-        control failure.
+        `is_held`: the collision monitor has kept the robot stopped for `hold_timeout`, which is a control failure.
         """
         goal = self.goal
         if goal is None:
-            return Step()
+            return StepResult()
         self._clock += periods * self._period
         if self._behavior is not None:
             return self._recover(tick, frames, self._behavior)
         if not self.via and self._goal_checker.reached(goal, frames.pose, twist):
-            return Step(reached=True)
+            return StepResult(reached=True)
         events: tuple[Event, ...] = ()
         try:
             events = self.plans.step(tick, self._clock, goal, frames.pose, self.via)
             command = self._follow(goal, frames, twist, is_held)
         except NavigationFailure as failure:
-            step = self._handle_failure(tick, goal, frames, failure)
-            return step._replace(events=(*events, *step.events))
+            result = self._handle_failure(tick, goal, frames, failure)
+            return result._replace(events=(*events, *result.events))
         self._failing_since = None
-        return Step(command, events=events)
+        return StepResult(command, events=events)
 
     def _follow(self, goal: Goal, frames: Frames, twist: Twist, is_held: bool) -> Twist:
         """Return the controller's command on the current plan, or a stop if there is no plan yet."""
@@ -148,19 +147,19 @@ class Navigator:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return command
 
-    def _handle_failure(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
-        """Tolerate a control failure for a while; then clear a costmap and retry; then run a recovery; then give up."""
+    def _handle_failure(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> StepResult:
+        """Tolerate the failure, clear a costmap and retry, start a recovery behavior, or let the goal fail."""
         planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
             events = (Event(tick, EventKind.PLAN_FAILED, "", _failure_data(failure)),)
             if not self._recovery.can_help(failure):
-                return Step(failure=failure, events=events)
+                return StepResult(failure=failure, events=events)
             retry, self._planning_retried = not self._planning_retried, True
         else:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
-                if self._is_tolerable():
-                    return Step()
-                failure = self._patience_exceeded(failure)
+                if self._is_tolerated():
+                    return StepResult()
+                failure = self._with_patience_exceeded(failure)
             self.plans.report_control_failure()
             retry, self._control_retried = not self._control_retried, True
         if retry:
@@ -171,38 +170,39 @@ class Navigator:
             else:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")
-            return Step(events=events)
+            return StepResult(events=events)
         if self._is_unreachable(goal, failure):
-            return Step(failure=failure, events=events)
+            return StepResult(failure=failure, events=events)
         self.plans.drop("recovery")
         self._planning_retried, self._control_retried, self._failing_since = False, False, None
         self._behavior = self._recovery.next(frames.pose.distance(goal.pose))
         if self._behavior is None:
-            return Step(failure=failure, events=events)
+            return StepResult(failure=failure, events=events)
         self._behavior_since = self._clock
         self._behavior.start(frames.odometry)
         started = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _failure_data(failure))
-        return Step(events=(*events, started))
+        return StepResult(events=(*events, started))
 
-    def _is_tolerable(self) -> bool:
+    def _is_tolerated(self) -> bool:
+        """Return whether control has failed for less than `failure_tolerance`."""
         if self._failing_since is None:
             self._failing_since = self._clock
         tolerance = self._failure_tolerance
         return tolerance < 0.0 or self._clock - self._failing_since < tolerance
 
-    def _patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
-        """Return what nav2_controller reports when NO_VALID_CONTROL has lasted too long, or else the failure itself."""
+    def _with_patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
+        """Return the failure; PATIENCE_EXCEEDED instead of NO_VALID_CONTROL if `failure_tolerance` is positive."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
     def _is_unreachable(self, goal: Goal, failure: NavigationFailure) -> bool:
-        """Return whether the failure means that a goal lies inside a mapped obstacle, so that no recovery helps."""
+        """Return whether the failure is caused by a goal inside a mapped obstacle."""
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
             self._costmaps.global_costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
-    def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
+    def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> StepResult:
         """Run one step of the current recovery behavior."""
         result: dict[str, Value] = {"outcome": "succeeded"}
         try:
@@ -211,10 +211,10 @@ class Navigator:
         except NavigationFailure as failure:
             command, result = None, {"outcome": "failed", **_failure_data(failure)}
         if command is not None:
-            return Step(command)
+            return StepResult(command)
         self._behavior = None
         self._progress.reset()
-        return Step(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result),))
+        return StepResult(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result),))
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:

@@ -14,21 +14,22 @@ from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 MISSED_AFTER_S = 1.0
-"""Minimum time for which a car follows a plan before this can count as missed."""
+"""Minimum time for which a car follows a plan before the plan can count as missed."""
 CHECK_EVERY_STEPS = 2
 """Number of steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
 """Replanning rates of Nav2's default trees, without and with intermediate goals."""
 PLAN_END_M = 0.1
-"""If less of the plan than this is left and an intermediate goal is not reached, the robot has missed that goal."""
+"""Remaining length of the plan below which intermediate goals that are not reached count as missed."""
 
 
 @dataclass(frozen=True)
 class PlanResult:
     """A computed path.
 
-    `is_partial`: the path leads only to the edge of a rolling costmap. `origin`: corner of the costmap when the path
-    was planned. `avoids_moving`: the costs included the predicted positions of moving obstacles.
+    is_partial:     the path leads only to the edge of a rolling costmap
+    origin:         corner (x, y) of the costmap on which the path was planned
+    avoids_moving:  the costs included the predicted positions of moving obstacles
     """
 
     path: Path
@@ -48,9 +49,9 @@ class _Request:
 
 
 class PlanManager:
-    """Maintains the plan to the current goal in the map frame. The parameter `now` is the navigator's time in s.
+    """Requests, monitors, and replaces the plan to the current goal. The parameter `now` is the navigator's time in s.
 
-    Replans as Nav2's trees do: at a fixed rate, or only if the plan has become invalid. Subclasses may add reasons.
+    Replans at a fixed rate, or only if the plan has become invalid. Subclasses may add reasons to replan.
     """
 
     def __init__(
@@ -60,16 +61,16 @@ class PlanManager:
         costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
-        steered: bool = False,
+        is_car: bool = False,
         latency: int = 0,
     ) -> None:
-        """Take the planner and its costmap.
+        """Take the planner and the costmap to plan on.
 
-        `plan_seed` returns the seed of the n-th plan; `radius` is the inscribed radius of the robot in m; `steered`
-        means that the robot is a car, which cannot turn in place; `latency` is the planning time in ticks.
+        `plan_seed` returns the seed of the n-th plan. `radius` is the inscribed radius of the robot in m. A car cannot
+        turn in place. `latency` is the planning time in ticks.
         """
         self._spec, self.planner, self._costmap = spec, planner, costmap
-        self._plan_seed, self._radius, self._steered, self._latency = plan_seed, radius, steered, latency
+        self._plan_seed, self._radius, self._is_car, self._latency = plan_seed, radius, is_car, latency
         self._plan_count = 0
         self._via: tuple[Goal, ...] = ()
         self.reset(0.0)
@@ -82,13 +83,13 @@ class PlanManager:
         self._steps = 0
 
     def drop(self, reason: str) -> None:
-        """Discard the plan and any pending request; the next step requests a new plan for this reason."""
+        """Discard the plan and any pending request. The next step requests a new plan with this reason."""
         self.plan: FollowedPlan | None = None
         self._request: _Request | None = None
         self._reason = reason
 
     def report_control_failure(self) -> None:
-        """React to a control failure. Does nothing here; for subclasses."""
+        """React to a control failure. Subclasses override this method, which does nothing."""
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
         """Request, receive, or replace the plan. Return an event if the robot follows a new plan from now on.
@@ -117,7 +118,7 @@ class PlanManager:
         return self._latency if self.plan is None and self._request is not None else 0
 
     def _send_request(self, tick: int, goal: Goal, pose: Pose2, reason: str, is_optional: bool = False) -> None:
-        """Plan from the current pose. The answer becomes available after the planner's latency."""
+        """Request a plan from the current pose. The answer becomes available after the planner's latency."""
         due = tick + self._latency
         try:
             answer: PlanResult | NavigationFailure = self._compute(due, goal, pose)
@@ -142,14 +143,14 @@ class PlanManager:
 
     def _mandatory_reason(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
         """Return why the plan must be replaced; "" if it can still be followed."""
-        if self._steered and now - self._adopted_at >= MISSED_AFTER_S and plan.is_missed(pose):
+        if self._is_car and now - self._adopted_at >= MISSED_AFTER_S and plan.is_missed(pose):
             return "missed"
         if self._via and not self._is_partial and plan.remaining() < PLAN_END_M:
             return "missed"
         return self._scheduled_reason(now, plan)
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
-        """Return why periodic replanning is due: "rate", or for `on_invalid` "blocked" or "window"; "" if it is not."""
+        """Return "rate", "blocked", or "window" (the costmap has rolled) if periodic replanning is due, else ""."""
         rate = self._spec.replanning_rate or (THROUGH_POSES_RATE_HZ if self._via else TO_POSE_RATE_HZ)
         if now - self._scheduled_at < 1.0 / rate:
             return ""
@@ -162,15 +163,15 @@ class PlanManager:
         return "" if may_keep and not self._is_blocked(plan) else "rate"
 
     def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
-        """Return why a better plan may exist; "" if there is no reason. Always "" here; for subclasses."""
+        """Return why a better plan may exist, or "". Subclasses override this method, which returns ""."""
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
-        plan.compare_if_changed(self._costmap)
+        plan.update_occupied_if_changed(self._costmap)
         return plan.is_blocked()
 
     def _accepts(self, reason: str, result: PlanResult) -> bool:
-        """Return whether to follow a new plan. Always True here; for subclasses."""
+        """Return whether to follow a new plan. Subclasses override this method, which returns True."""
         return True
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> PlanResult:
@@ -191,7 +192,7 @@ class PlanManager:
         return self._costmap.view
 
     def _compute_leg(self, view: CostmapView, goal: Goal, start: Pose2) -> tuple[Array, bool]:
-        """Return the points (n, 3) to a goal, and whether they lead only to the edge of the costmap."""
+        """Return the poses (n, 3) from start to goal, and whether they lead only to the edge of the costmap."""
         self._plan_count += 1
         aim = self._costmap.goal_in_window(start, goal.pose)
         is_partial = aim is not goal.pose
@@ -204,12 +205,12 @@ class PlanManager:
     def _call_planner(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         return self.planner.plan(view, start, goal, seed)
 
-    def _followed(self, path: Path) -> FollowedPlan:
+    def _make_followed_plan(self, path: Path) -> FollowedPlan:
         return FollowedPlan(path, self._radius, self._costmap.view)
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
-        """Follow a new plan, and return the event."""
-        self.plan = self._followed(result.path)
+        """Follow a new plan. Return the event PLAN_MADE."""
+        self.plan = self._make_followed_plan(result.path)
         self._adopted_at = self._scheduled_at = now
         details: dict[str, Value] = {"reason": reason, "length": round(result.path.length(), 6)}
         return Event(tick, EventKind.PLAN_MADE, "", details)

@@ -38,11 +38,11 @@ class NavigationFailure(Exception):
 
 @dataclass(frozen=True)
 class RobotModel:
-    """Description of the robot for its stack, in SI units.
+    """Description of the robot for its stack, in SI units. Speeds and accelerations are limits of the base.
 
     `footprint` contains the corners in the base frame, counterclockwise. For a round robot, it is a regular polygon,
-    and `radius` is not None. Speeds and accelerations are limits of the base. `turning_radius` is the minimum turning
-    radius, 0 for a base that turns in place. A `holonomic` base can drive sideways.
+    and `radius` is not None. `turning_radius` is the minimum turning radius; 0 for a base that turns in place. A
+    `holonomic` base can drive sideways.
     """
 
     footprint: Polygon
@@ -110,13 +110,13 @@ class SupportsPose(Protocol):
 
     @property
     def pose(self) -> Pose2:
-        """Exactly the pose of `belief`."""
+        """The same pose as in `belief`."""
         ...
 
 
 def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
-    """Return whether a localizer has `pose`. Checks the class, because reading the property may compute the pose."""
-    return hasattr(type(localizer), "pose")
+    """Return whether the class of a localizer has the property `pose`."""
+    return hasattr(type(localizer), "pose")  # reading the property may compute the pose
 
 
 LETHAL = 254
@@ -125,20 +125,20 @@ LETHAL = 254
 
 @fast_dataclass(eq=False)
 class CostmapView:
-    """A costmap at one time: for planners the global one in the map frame, for the others the local one (odom frame).
+    """A costmap at one time. Planners get the global costmap, controllers and behaviors get the local costmap.
 
-    Poses, paths, and goals in the same call are in the frame of the costmap.
+    The global costmap is in the map frame, the local one in the odom frame. Poses, paths, and goals in the same call
+    are in the frame of the costmap. The arrays are valid until the next update of the costmap.
 
-    `costs` (height, width) uint8 has nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown). Row 0
-    has the lowest y; `origin` is the corner of cell (0, 0) without rotation. `distance` (height, width) float32 is the
-    distance in m from the center of each cell to the center of the nearest lethal cell. Distances beyond the inflation
-    radius and half a meter beyond the footprint may be cut off. `resolution` is the cell size in m. `revision`
-    increases with each change. `inflation_radius` is the distance in m up to which obstacles increase costs. The arrays
-    may be views of a live costmap and are valid until its next update.
-
-    `moving` contains the moving obstacles in this frame that motion prediction has found; `Footprint.gap` returns the
-    distance to them. It is empty without prediction. Moving obstacles do not affect the costs, except in the view for a
-    planner, where cells cost more if the robot would meet an obstacle there.
+    costs:             costs (height, width) as in nav2_costmap_2d: 0 free, 253 inscribed, 254 lethal, 255 unknown
+    distance:          distances (height, width) in m from the center of each cell to that of the nearest lethal cell.
+                       They are cut off at the inflation radius, or 0.5 m beyond the circumscribed radius if larger.
+    resolution:        cell size in m
+    origin:            corner (x, y) of cell (0, 0), which has the lowest x and y
+    revision:          number that increases with each change
+    inflation_radius:  distance in m up to which obstacles increase costs
+    moving:            predicted moving obstacles (see `Footprint.gap`), empty without motion prediction. They increase
+                       only the costs for a planner: in cells where the robot would meet an obstacle.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -150,7 +150,7 @@ class CostmapView:
     moving: MovingObstacles = NO_MOVING_OBSTACLES
 
     def with_grown_obstacles(self, meters: float) -> "CostmapView":
-        """Return a copy with every obstacle enlarged by `meters` in all directions."""
+        """Return a copy with all lethal cells enlarged by `meters` in all directions."""
         costs = np.where(self.distance <= meters, np.uint8(LETHAL), self.costs)
         return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(meters), np.float32(0)))
 
@@ -160,27 +160,26 @@ class Planner(Protocol):
 
     *Given* a start or goal outside the map or in an obstacle *then* it fails at once, for example with GOAL_OCCUPIED.
     *Given* that no path exists *then* it fails with NO_VALID_PATH after a bounded number of iterations.
-    *Given* success *then* the path starts at `start`, ends within `tolerance` of `goal`, and the footprint is on no
-    lethal cell at any of its points.
+    *Given* success *then* the path starts at `start` and ends within `tolerance` of `goal`. At each pose of the path,
+    the footprint is free of lethal cells.
     """
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 0.1 m apart. `seed` is for its random generator, if any."""
+        """Return a path of poses in the map frame, at most 0.1 m apart. `seed` is the seed for a random generator."""
         ...
 
 
 class Controller(Protocol):
-    """Follows a path. All inputs are in the odom frame like the local costmap, because that frame is continuous.
+    """Follows a path. All inputs are in the odom frame, because this frame is continuous.
 
-    *Given* limits of the robot and its speed *then* no command exceeds them. *Given* an obstacle on the arc that it
-    would drive *then* it fails with NO_VALID_CONTROL.
+    *Given* velocity limits of the robot and a speed limit *then* no command exceeds them.
+    *Given* an obstacle on the arc of the command *then* it fails with NO_VALID_CONTROL.
     """
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on.
 
-        The path is new, or it is the part of the current path ahead of the robot, after the transform between map and
-        odom frame has changed.
+        The path can be the rest of the current path, again, after the transform from map to odom frame has changed.
         """
         ...
 
@@ -199,17 +198,17 @@ class Controller(Protocol):
 
     @property
     def local_plan(self) -> Path | None:
-        """The expected trajectory, for the log."""
+        """The trajectory that the controller expects to drive, for the log; None if there is none."""
         ...
 
 
 @runtime_checkable
 class SupportsArc(Protocol):
-    """Optional extension of a controller whose local plan is an arc at constant velocity, which is faster to log."""
+    """Optional extension of a controller whose local plan is an arc: logging the arc is faster."""
 
     @property
     def arc(self) -> tuple[Pose2, Twist] | None:
-        """Pose and velocity of the last command; None before the first."""
+        """Start pose and constant velocity of the arc of the last command; None before the first command."""
         ...
 
 
@@ -233,8 +232,8 @@ class Behavior(Protocol):
 class GoalChecker(Protocol):
     """Decides whether a goal is reached.
 
-    *Given* a robot that stands still at the goal *then* it returns True within two seconds. *Given* a robot outside the
-    goal's tolerances *then* it never does.
+    *Given* a robot that stands still at the goal *then* `reached` returns True within two seconds.
+    *Given* a robot outside the goal's tolerances *then* `reached` returns False.
     """
 
     def reset(self) -> None:
@@ -250,23 +249,23 @@ class SupportsZones(Protocol):
     """Optional extension of a stack whose costmap filters can change during a run."""
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Replace all zones from the next costmap update on. Called before `decide` of the same tick."""
+        """Replace all keepout and speed zones at the next costmap update. Called before `decide` of the same tick."""
         ...
 
 
 class Stack(Protocol):
-    """A complete navigation stack: takes readings and returns one command per beat.
+    """A complete navigation stack: takes readings and returns one command per beat (tick at which anything is due).
 
-    *Given* no goal or an ended task *then* it commands zero. (A stack may still avoid a moving obstacle that would hit
-    the robot, and return afterward, but not after a cancel.)
+    *Given* no goal or an ended task *then* it commands zero. Unless its task was canceled, it may avoid a moving
+    obstacle that would hit the robot, and return afterward.
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Initialize the localizer with the estimate and drive to the goals in order."""
+        """Initialize the localizer with the estimate, and drive to the goals in order."""
         ...
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Drive to this goal first, like a new action goal. Called before `decide` of the same tick."""
+        """Replace the current goal, as a new action goal does. Called before `decide` of the same tick."""
         ...
 
     def cancel(self, tick: int) -> None:
@@ -274,12 +273,12 @@ class Stack(Protocol):
         ...
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Process the readings of this beat and return the command."""
+        """Process the readings of this beat, and return the command and other output."""
         ...
 
     @property
     def plan(self) -> Path | None:
-        """The plan being followed."""
+        """The plan being followed; None without a plan."""
         ...
 
     @property
@@ -290,11 +289,14 @@ class Stack(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Robot and environment that a scenario configures for a stack. `tick_rate` is in Hz.
+    """Robot and environment of a stack.
 
-    `map` is None for mapless navigation. The robot must not enter `keepout` polygons (map frame); `speed_zones` are
-    polygons with a speed limit in m/s; `masks` are the same as grids of cells. `lidars` are the names of the lidars
-    that the localizer uses. `has_imu`: the robot has an IMU.
+    map:          map for localization and planning; None for mapless navigation
+    tick_rate:    number of physics steps per second
+    keepout:      polygons in the map frame that the robot must not enter
+    speed_zones:  polygons in the map frame, each with a speed limit in m/s
+    masks:        keepout and speed zones as grids of cells (filter masks of Nav2)
+    lidars:       names of the lidars that the localizer uses
     """
 
     robot: RobotModel

@@ -1,4 +1,4 @@
-"""Selection of the plans, local plans, beliefs, costmaps, and standstill events that the stack publishes."""
+"""Selection of the plans, local plans, beliefs, and costmaps to publish, and events for a robot that stands still."""
 
 import math
 from collections.abc import Callable
@@ -18,31 +18,31 @@ from simscen.stack.frames import Frames, transform_poses
 from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, Localizer, SupportsArc
 
-BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
-"""Rates in Hz of beliefs between scans, and of local plans."""
+BELIEF_RATE_HZ, LOCAL_PLAN_RATE_HZ = 10.0, 5.0
+"""Rates at which beliefs without new scans, and local plans, are published."""
 MAX_CELLS_PER_SECOND = 125_000
-"""Maximum number of cells published per second for each costmap; a larger costmap is published less often."""
+"""Maximum number of cells published per second for each costmap. It limits the rate of large costmaps."""
 _OCCUPANCY_TABLE = np.array(
     [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
 ).tobytes()
-"""Published occupancy for each cost 0 … 255, as in nav2_costmap_2d: 1 … 252 become 1 … 98, 253 → 99, 254 → 100."""
+"""Published occupancy for each cost 0 … 255, as in nav2_costmap_2d: 1 … 252 → 1 … 98, 253 → 99, 254 → 100."""
 
 
 Updates = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
-"""Plan, local plan, and costmaps to publish: None or empty if there is no change."""
+"""Plan, local plan, and costmaps to publish; None or empty if there is nothing new."""
 NO_UPDATES: Updates = (None, None, ())
 
 
 class Publisher:
-    """Selects what to publish: only changes, and at limited rates."""
+    """Selects the plans, beliefs, and costmaps to publish: only changes, and at limited rates."""
 
     def __init__(
         self, tick_rate: int, localizer: Localizer, controller: Controller, local_frame: Literal["map", "odom"] = "odom"
     ) -> None:
-        """Take the tick rate in Hz, the sources, and the frame of the local costmap."""
+        """Take the tick rate in Hz, the components to publish from, and the frame of the local costmap."""
         self._localizer, self._controller, self._tick_rate = localizer, controller, tick_rate
-        self._belief_period = math.ceil(tick_rate / BELIEF_RATE)
-        self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE)
+        self._belief_period = math.ceil(tick_rate / BELIEF_RATE_HZ)
+        self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE_HZ)
         self.belief_due = 0
         """Tick from which on the belief is published without a scan."""
         self._local_plan_due = self._local_plan_period
@@ -52,12 +52,12 @@ class Publisher:
         self._local_costmap = _CostmapPublisher("local", local_frame)
 
     def belief(self, tick: int) -> Belief:
-        """Return the belief to publish. Call it after each scan, and at the tick in the attribute `belief_due`."""
+        """Return the belief to publish at this tick. Call it after each scan, and at the tick `belief_due`."""
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
     def updates(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
-        """Return what to publish after a controller period in which the robot follows `plan`."""
+        """Return what to publish after a controller period. The robot follows `plan`, or None."""
         local_plan: Path | None = None
         grids: tuple[CostGrid, ...] = ()
         if plan is not None and tick >= self._local_plan_due:
@@ -89,7 +89,7 @@ class Publisher:
 
 @dataclass
 class _CostmapPublisher:
-    """Publisher of one costmap: the revision published last, and the tick `due` from which the next may follow."""
+    """Publisher of one costmap. `due` is the tick of the next publication, `revision` the one published last."""
 
     name: str
     frame: str
@@ -113,11 +113,11 @@ class _CostmapPublisher:
 
 
 REPORT_AFTER_S = 1.0
-"""Time for which a component must hold the robot before this is reported."""
+"""Time for which a component must hold the robot before an event reports it."""
 
 
 class StandstillReporter:
-    """Creates an event when a component has kept the robot from driving for a while, and another when that ends."""
+    """Creates an event when a component has kept the robot from driving for REPORT_AFTER_S, and another at the end."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
@@ -127,7 +127,7 @@ class StandstillReporter:
         self._since, self._is_reported = 0, False
 
     def report_hold(self, tick: int, component: str, reason: Callable[[], str]) -> tuple[Event, ...]:
-        """Record that a component holds the robot. `reason` returns the message of the event."""
+        """Record that a component holds the robot, and return new events. `reason` returns the message of the event."""
         ended: tuple[Event, ...] = ()
         if component != self.holder:
             ended = self.report_release(tick)
@@ -138,7 +138,7 @@ class StandstillReporter:
         return (*ended, Event(tick, EventKind.ROBOT_HELD, component, {"message": reason()}))
 
     def report_release(self, tick: int) -> tuple[Event, ...]:
-        """Record that no component holds the robot any more, or that the robot has no goal."""
+        """Record that no component holds the robot any more, or that it has no goal. Return new events."""
         if not self.holder:
             return ()
         component, is_reported, self.holder, self._is_reported = self.holder, self._is_reported, "", False

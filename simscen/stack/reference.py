@@ -1,4 +1,4 @@
-"""The reference stack, Nav2 in miniature: passes readings to its components and returns velocity commands."""
+"""The reference stack, Nav2 in miniature: passes readings to its components, and returns velocity commands."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from simscen.stack.localizers.odometry_filter import OdometryFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
-"""Types of readings that only measure motion. They can wait until the next scan or controller period."""
+"""Types of readings that only measure motion. Their processing can wait until the next scan or controller period."""
 
 
 class ReferenceStack:
     """Localizer, costmaps, navigator, controller, velocity smoother, and collision monitor of one robot.
 
     It decides at the controller's rate and repeats its command in between. Subclasses override the methods `_on_…` and
-    `_adjust_…`. Except for `_on_idle`, these do nothing here, or return their argument.
+    `_adjust_…`. In this class, most of them do nothing or return their argument.
     """
 
     def __init__(
@@ -52,10 +52,10 @@ class ReferenceStack:
         fuses_odometry: bool = False,
         odometry_filter: "OdometryFilter | None" = None,
     ) -> None:
-        """Combine the components. `control_period` and `localizer_latency` are in ticks.
+        """Take the components. `control_period` and `localizer_latency` are in ticks.
 
-        `fuses_odometry`: the localizer (an EKF) provides the pose in the odom frame, instead of the wheel odometry.
-        `odometry_filter`: filter of the wheel odometry; None to use it unfiltered.
+        `fuses_odometry`: the pose in the odom frame is that of the localizer (an EKF), not that of the wheel odometry.
+        `odometry_filter`: filter of the wheel odometry; None to use unfiltered odometry.
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
@@ -77,7 +77,7 @@ class ReferenceStack:
         self._pending: Readings = ()
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localize at the estimate, then drive to the goals in order."""
+        """Initialize the localizer with the estimate, and drive to the goals in order."""
         self._process_readings(self._tick, ())
         self._localizer.reset(estimate)
         self._monitor.start(self._tick)
@@ -97,12 +97,12 @@ class ReferenceStack:
         self._commands.stop(tick)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Replace all keepout and speed zones from the next costmap update on."""
+        """Replace all keepout and speed zones at the next costmap update."""
         self._zones = zones
 
     @property
     def plan(self) -> Path | None:
-        """The plan being followed."""
+        """The plan being followed; None without a plan."""
         plan = self._navigator.plans.plan
         return None if plan is None else plan.path
 
@@ -113,7 +113,7 @@ class ReferenceStack:
 
     @property
     def components(self) -> tuple[tuple[str, Any, tuple[str, ...]], ...]:
-        """Name, object, and time-consuming methods of each component that benchmarks measure."""
+        """Components that benchmarks measure, each with its name, object, and names of time-consuming methods."""
         filters = () if self._odometry_filter is None else (("odometry filter", self._odometry_filter, ("fuse",)),)
         return (
             *filters,
@@ -123,11 +123,11 @@ class ReferenceStack:
             ("costmap", self._costmaps.local_costmap, ("refresh",)),
             ("planner", self._navigator.plans.planner, ("plan",)),
             ("controller", self._controller, ("command", "set_path")),
-            ("collision monitor", self._monitor, ("allow", "on_scan")),
+            ("collision monitor", self._monitor, ("limit_command", "on_scan")),
         )
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Process the readings of this beat and return the decision."""
+        """Process the readings of this tick, and return the command and other output."""
         self._tick, belief = tick, None
         is_control_tick = tick % self._control_period == 0
         if not is_control_tick and self._can_wait(tick, readings):
@@ -149,27 +149,27 @@ class ReferenceStack:
     # Extension points -------------------------------------------------------------------------------------------------
 
     def _on_motion(self, reading: Odometry | Imu) -> None:
-        """Process an odometry or IMU reading that has been accepted as plausible."""
+        """Process a plausible odometry or IMU reading."""
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
-        """Process the pose by wheel odometry and the pose used in the odom frame, which a filter may have fused."""
+        """Process the pose `wheels` by wheel odometry and the pose `fused` after the odometry filter, if any."""
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
-        """Process a scan, and return the scan for costmaps and collision monitor."""
+        """Process a scan. Return the scan to pass to costmaps and collision monitor."""
         return scan
 
     def _on_costmaps_updated(self, tick: int, frames: Frames) -> None:
         """Run after the costmap update of a controller period."""
 
     def _on_drive(self) -> None:
-        """Run before each controller period in which the robot has a goal."""
+        """Run in each controller period with a goal, before the navigator."""
 
     def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
-        """Return the command to pass to the velocity smoother instead of the navigator's command."""
+        """Return the command for the velocity smoother; `command` is that of the navigator."""
         return command
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
-        """Return the command to send to the base instead of the collision monitor's command."""
+        """Return the command for the base; `command` is that of the collision monitor."""
         return command
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
@@ -179,7 +179,7 @@ class ReferenceStack:
     # Readings ---------------------------------------------------------------------------------------------------------
 
     def _can_wait(self, tick: int, readings: Readings) -> bool:
-        """Return whether these readings can be processed together with the next scan, which saves time."""
+        """Return whether these readings can be processed later, together with the next scan."""
         if self._events or self._commands.has_latency or self._fuses_odometry:
             return False
         if tick >= self._publishing.belief_due or tick >= self._localizer_scans.due:
@@ -187,7 +187,7 @@ class ReferenceStack:
         return MOTION_READINGS.issuperset(map(type, readings))
 
     def _repeated_decision(self, sent: Twist) -> Decision:
-        """Return a decision with nothing but the command; the same object as long as the command stays the same."""
+        """Return a decision with only the command. While the command stays the same, return the same object."""
         if sent is not self._last_decision.command:
             self._last_decision = Decision(sent)
         return self._last_decision
@@ -230,7 +230,7 @@ class ReferenceStack:
         self._costmaps.add_reading(processed)
 
     def _process_odometry(self, reading: Odometry) -> None:
-        """Filter an odometry reading, pass it to the localizer, and add its pose to the odometry history."""
+        """Filter an odometry reading, pass it to the localizer, and add the pose to the odometry history."""
         if reading.sensor == TRUTH:
             self._process_true_pose(reading)
             return
@@ -248,7 +248,7 @@ class ReferenceStack:
             self._on_motion(reading)
 
     def _filtered_odometry(self, reading: Odometry) -> Odometry | None:
-        """Return the filtered odometry, or the reading itself without a filter; None if the filter cannot use it."""
+        """Return the filtered odometry; None if there is no new estimate. Without a filter, return the reading."""
         if self._odometry_filter is None:
             return reading
         odometry = self._odometry_filter.fuse(reading) if reading.sensor == self._wheel_sensor else None
@@ -257,7 +257,7 @@ class ReferenceStack:
         return odometry
 
     def _process_true_pose(self, reading: Odometry) -> None:
-        """Pass the true pose to the localizer. Without wheel odometry, it also serves as odometry."""
+        """Pass the true pose to the localizer. Without wheel odometry, use the true pose as odometry, too."""
         self._localizer.on_odometry(reading)
         if self._wheel_sensor:
             return
@@ -341,7 +341,7 @@ class ReferenceStack:
                 self._events += self._standstill.report_release(tick)
 
     def _report_waiting(self, tick: int, component: str, latency: int) -> None:
-        """Report that the robot stands still until a component has finished computing."""
+        """Report that the robot stands still until a component has finished its computation."""
         seconds = f"{latency / self._tick_rate:.3g} s"
         message = f"the {component} takes {seconds} (stack: latency: {component}); the robot waits for it"
         self._events += self._standstill.report_hold(tick, component, lambda: message)

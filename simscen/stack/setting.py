@@ -1,4 +1,4 @@
-"""What the constructor of a stack component gets: robot, map, random generator, and functions of the stack."""
+"""Argument of the constructors of stack components: robot, map, random generator, and functions of the stack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ UNKNOWN_POSE = Estimate(None)
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Second constructor argument of each component and of a whole stack: `Class(specification, setting)`.
+    """Second argument of the constructor of a component or stack: `Class(specification, setting)`.
 
-    Units are SI and rad. The map frame is that of `map`; the base frame has x forward and y to the left (REP 103).
+    Units are SI and rad. The base frame has x forward and y to the left (REP 103).
 
     surroundings:     robot model, map, keepout and speed zones, names of the lidars, tick rate
     name:             name of the random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
@@ -33,9 +33,9 @@ class Setting:
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
     clear_costmap:    clears all obstacles from the costmaps that current readings do not show (for a behavior)
-    clear_around:     does the same only within the range of the local costmap (for a behavior)
+    clear_around:     like `clear_costmap`, but only within the range of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
-    limit_command:    returns a command as the collision monitor limits it, given the pose in the odom frame
+    limit_command:    returns the command after the collision monitor, given command and pose in the odom frame
     wrap_localizer:   wraps the localizer for all other components (for the reference stack)
     """
 
@@ -54,7 +54,7 @@ class Setting:
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":
-        """Return the setting for another component, whose random stream has this name."""
+        """Return a copy for another component, whose random stream has this name."""
         return replace(self, name=name)
 
     @property
@@ -74,14 +74,14 @@ class Setting:
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """The component's own random generator. Its draws do not affect other components."""
+        """The component's own random generator, independent of those of other components."""
         return self.streams.generator(self.name)
 
     @cached_property
     def footprint(self) -> Footprint:
-        """The footprint checker: `footprint.free(costmap, poses)` returns for poses (n, 3) whether they are free."""
+        """Collision checker of the robot: `footprint.free(costmap, poses)` returns which poses (n, 3) are free."""
         return _footprint(self.robot, self.resolution)
 
 
 _footprint = lru_cache(maxsize=16)(Footprint)
-"""Return the cached footprint checker, which components share, because it takes a millisecond to build."""
+"""Return the Footprint of a robot and a resolution, cached for all components."""

@@ -1,4 +1,4 @@
-"""List of the goals of a navigation task, with the events and the result that an action client would see."""
+"""List of the goals of a navigation task, with the events that the client of a Nav2 action would see."""
 
 from simscen.core.clock import Clock
 from simscen.core.messages.navigation import ErrorCode, Goal, Mode, TaskResult
@@ -8,10 +8,9 @@ Events = tuple[Event, ...]
 
 
 class Task:
-    """Goals in the order in which the robot drives to them. Methods return the events that an action client would see.
+    """Goals in the order in which the robot drives to them. Methods that change the task return the resulting events.
 
-    Intermediate goals (`via`) and the goal after them are one action: they fail, are canceled, and are preempted
-    together.
+    Intermediate goals (`via`) and the goal after them form one action: they fail, or are canceled, together.
     """
 
     def __init__(self, stop_on_failure: bool, *, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
@@ -37,7 +36,7 @@ class Task:
         self._wait_until = None
 
     def accept_next(self, tick: int) -> Events:
-        """Call `end_wait`, then accept the next goal if there is no current one and the robot does not wait."""
+        """End the wait if its time is over. Accept the next goal if there is no current goal and no wait."""
         events = self.end_wait(tick)
         if self.goal is None and self._wait_until is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
@@ -50,11 +49,11 @@ class Task:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether the robot waits at a reached goal for its `wait` time."""
+        """Whether the robot waits at a goal that it has reached."""
         return self._wait_until is not None
 
     def end_wait(self, tick: int) -> Events:
-        """End the wait if its time is over, and with it the task if no goal is left."""
+        """End the wait at a goal if its time is over. End the task, too, if no goal is left."""
         if self._wait_until is None or tick < self._wait_until:
             return ()
         self._wait_until = None
@@ -69,7 +68,7 @@ class Task:
         return tuple(self._waiting[: last + 1])
 
     def record_reached(self, tick: int) -> Events:
-        """Record that the current goal is reached, and start the wait there, if any."""
+        """Record that the current goal is reached, and start the wait of this goal, if any."""
         assert self.goal is not None
         reached = self._event(tick, EventKind.GOAL_REACHED)
         if self.goal.wait > 0:
@@ -78,7 +77,7 @@ class Task:
         return (reached, *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_passed(self, tick: int) -> Events:
-        """Record that the robot has passed the current goal, which is an intermediate one."""
+        """Record that the robot has passed the current goal, an intermediate one."""
         return (self._event(tick, EventKind.GOAL_PASSED), *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
@@ -104,10 +103,7 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:
-        """Replace the current goal and the other goals of its action by `goal`, and end a wait.
-
-        The goals of later actions stay.
-        """
+        """Replace the goals of the current action, or a wait, by `goal`. The goals of later actions stay."""
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
         self.goal, self._wait_until = None, None
         self._waiting.insert(0, goal)
@@ -139,7 +135,7 @@ class Task:
 
     @property
     def upcoming_goal(self) -> Goal | None:
-        """The goal that will be accepted next, or None."""
+        """The goal that will be accepted next; None if no goal is left."""
         return self._waiting[0] if self._waiting else None
 
     def _event(self, tick: int, kind: EventKind, **data: Value) -> Event:

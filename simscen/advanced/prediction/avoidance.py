@@ -18,7 +18,7 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import CoveringDiscs
-from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, Reals
+from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
 
 MIN_DISTANCE_M = 0.25
@@ -79,7 +79,7 @@ class Avoidance:
 
         All arguments are in one frame. A robot without a path stays near `home`, or near `pose` if `home` is None.
         """
-        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON_S)
+        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_INFLATION_M, self._speed, HORIZON_S)
         if not near.obstacles:
             self._last = None
             return command

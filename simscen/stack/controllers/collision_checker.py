@@ -9,8 +9,8 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
-from simscen.stack.kinematics import MIN_YAW_RATE, poses_along
-from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
+from simscen.stack.kinematics import MIN_YAW_RATE_RAD_S, poses_along
+from simscen.stack.moving_obstacles import MAX_INFLATION_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
@@ -54,7 +54,7 @@ class CollisionChecker:
         """
         if not costmap.moving.obstacles or command == STOP:
             return command
-        reach, speed = self._footprint.discs.reach + MAX_UNCERTAINTY_M, math.hypot(command.vx, command.vy)
+        reach, speed = self._footprint.discs.reach + MAX_INFLATION_M, math.hypot(command.vx, command.vy)
         near = costmap.moving.near(pose.x, pose.y, reach, speed, horizon)
         if not near.obstacles:
             return command
@@ -137,7 +137,7 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
 def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
     """Return which of the poses (n, 3) are deeper inside an obstacle than the first pose, or inside another one."""
     reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
-    gaps = footprint.gaps(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
+    gaps = footprint.point_distances(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
     deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
     in_lethal_cell = distances(costmap, poses[:, :2]) <= 0.0
     return np.asarray(deeper.any(axis=1) | (in_lethal_cell & ~in_lethal_cell[0]))
@@ -150,7 +150,7 @@ def _is_surely_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twi
     those between cell centers.
     """
     vx, vy, wz = twist
-    speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE
+    speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE_RAD_S
     cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
     required = radius + CELL_DIAGONAL * resolution
     time, at_x, at_y = 0.0, pose.x, pose.y

@@ -133,9 +133,9 @@ def test_retrace_sends_only_commands_that_the_collision_monitor_allows() -> None
     monitor.on_scan(Scan("lidar", 0, ranges, math.atan2(0.217, 0.02) - 0.02, 0.01, 0.1, 10.0), Pose2(0.0, 0.0))
     view = view_of(LONG, Flatland())
     with pytest.raises(NavigationFailure, match="too long"):
-        run(behavior(LONG, way), view, allowed=monitor.allow)
-    heedful = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: way, limit_command=monitor.allow))
-    end = run(heedful, view, allowed=monitor.allow)[-1]
+        run(behavior(LONG, way), view, allowed=monitor.limit_command)
+    heedful = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: way, limit_command=monitor.limit_command))
+    end = run(heedful, view, allowed=monitor.limit_command)[-1]
     assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
 
 

@@ -32,7 +32,7 @@ def monitor(robot: RobotModel | None = None, **options: float) -> CollisionMonit
 def test_the_monitor_keeps_the_time_before_collision(x: float, scale: float) -> None:
     guard = monitor()
     guard.on_scan(scan((x, 0.0)), Pose2(0, 0))
-    allowed = guard.allow(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    allowed = guard.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
     assert allowed.vx == pytest.approx(0.5 * scale, abs=0.5 / 8)
     assert allowed.vx <= 0.5 * scale + 1e-9 or scale == 1.0
 
@@ -40,31 +40,31 @@ def test_the_monitor_keeps_the_time_before_collision(x: float, scale: float) -> 
 def test_the_monitor_lets_the_robot_drive_away_from_what_it_nearly_touches() -> None:
     guard = monitor()
     guard.on_scan(scan((0.23, 0.0)), Pose2(0, 0))
-    assert guard.allow(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
-    assert guard.allow(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
+    assert guard.limit_command(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
+    assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
 
 
 def test_the_monitor_counts_what_the_robot_has_driven_since_the_scan() -> None:
     guard = monitor()
     guard.on_scan(scan((0.6, 0.0)), Pose2(5, 5, 1.0))
-    assert guard.allow(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
+    assert guard.limit_command(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
     moved = Pose2(5, 5, 1.0).compose(Pose2(0.36, 0.0))
-    assert guard.allow(Twist(0.2), moved) == STOP
+    assert guard.limit_command(Twist(0.2), moved) == STOP
 
 
 def test_the_monitor_sees_the_corner_of_a_long_hull_swing() -> None:
     guard = monitor(box_robot())
     guard.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
-    assert guard.allow(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
-    assert guard.allow(Twist(0.3), Pose2(0, 0)).vx == 0.3
+    assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
+    assert guard.limit_command(Twist(0.3), Pose2(0, 0)).vx == 0.3
 
 
 def test_the_monitor_may_want_more_points_than_one() -> None:
     guard = monitor(min_points=3)
     guard.on_scan(scan((0.3, 0.0), (0.3, 0.01)), Pose2(0, 0))
-    assert guard.allow(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
+    assert guard.limit_command(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
     guard.on_scan(scan((0.3, 0.0), (0.3, 0.01), (0.3, -0.01)), Pose2(0, 0))
-    assert guard.allow(Twist(0.5), Pose2(0, 0)).vx < 0.5
+    assert guard.limit_command(Twist(0.5), Pose2(0, 0)).vx < 0.5
 
 
 def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
@@ -114,10 +114,10 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
         places, speeds = rng.normal(0.0, 1.2, (2, 2)), rng.normal(0.0, 0.7, (2, 2))
         moving = MovingObstacles(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
         wanted = Twist(*rng.normal(0.0, (0.5, 0.1, 0.8)).tolist())
-        hasty.on_moving(moving)
-        thorough.on_moving(moving)
-        allowed = thorough.allow(wanted, Pose2(0.0, 0.0))
-        assert hasty.allow(wanted, Pose2(0.0, 0.0)) == allowed
+        hasty.set_moving_obstacles(moving)
+        thorough.set_moving_obstacles(moving)
+        allowed = thorough.limit_command(wanted, Pose2(0.0, 0.0))
+        assert hasty.limit_command(wanted, Pose2(0.0, 0.0)) == allowed
         braked += allowed != wanted
         spared += not hasty._may_meet_moving(wanted, MonitorSpec().time_before_collision)
     assert braked > 10
@@ -134,5 +134,5 @@ def test_simulation_time_step_is_the_resolution_of_the_time_before_collision(
     """Contact after 0.4 s at 0.5 m/s: the last step before it counts."""
     guard = monitor(**({} if step is None else {"simulation_time_step": step}))
     guard.on_scan(scan((0.22 + 0.02 + 0.199, 0.0)), Pose2(0, 0))
-    allowed = guard.allow(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    allowed = guard.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
     assert allowed.vx == pytest.approx(0.5 * free_time / 0.5)

@@ -77,7 +77,7 @@ def test_a_reading_that_is_not_a_place_is_refused(bad: float, part: int) -> None
 
 
 def test_path_is_longer_than_the_lookup_buffer_and_restarts_with_new_odometry() -> None:
-    kept = OdometryHistory(RATE, trail=60)
+    kept = OdometryHistory(RATE, trail_s=60)
     for tick in range(0, 1000, 10):
         kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
     assert 990 - 61 * RATE <= kept.trail()[0].x / 0.1 <= 990 - 60 * RATE

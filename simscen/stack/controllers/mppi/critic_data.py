@@ -13,7 +13,7 @@ from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.costmap.layers import INSCRIBED, NO_INFORMATION
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
-from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
+from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 Mask = npt.NDArray[np.bool_]
@@ -94,7 +94,7 @@ class CriticData:
         if not len(moving):
             return moving
         farthest, times = np.sqrt((rollouts.x * rollouts.x + rollouts.y * rollouts.y).max(axis=1)), self.times
-        reach, speed = self.footprint.circumscribed + MAX_UNCERTAINTY_M, float((farthest / times).max())
+        reach, speed = self.footprint.circumscribed + MAX_INFLATION_M, float((farthest / times).max())
         near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
         return near.in_frame(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
 

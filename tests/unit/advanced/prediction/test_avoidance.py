@@ -152,8 +152,10 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
     still = np.zeros((1, 4, 4))
 
     def told(x: float, y: float, vx: float, vy: float) -> float:
-        monitor.on_moving(MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0))
-        return monitor.allow(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
+        monitor.set_moving_obstacles(
+            MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0)
+        )
+        return monitor.limit_command(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
 
     assert told(1.0, 0.0, 1.0, 0.0) == 1.0  # it goes as fast as the robot
     standing = told(1.0, 0.0, 0.0, 0.0)

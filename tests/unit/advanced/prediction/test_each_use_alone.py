@@ -32,7 +32,7 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     def update(tick: int, frames: Frames) -> None:
         original(tick, frames)
         if heed != "monitor":
-            stack._monitor.on_moving(no_moving_obstacles())
+            stack._monitor.set_moving_obstacles(no_moving_obstacles())
         if heed != "controller":
             stack._costmaps.local_costmap.moving = no_moving_obstacles()
 
