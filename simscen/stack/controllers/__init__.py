@@ -1,1 +1,1 @@
-"""Controllers: velocity commands that follow a path, as in Nav2's controller server."""
+"""Controllers, which compute velocity commands that follow a path: RPP, DWB, and MPPI."""

@@ -14,29 +14,30 @@ from simscen.stack.moving_obstacles import MAX_INFLATION_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Factors by which a command may be multiplied to let moving obstacles pass, in the order of the attempts."""
-MAX_TIME_STEP_S, UNCERTAINTY_SIGMAS = 0.1, 0.5
-"""Largest time between two checks of moving obstacles, and standard deviations by which these are enlarged."""
+"""Factors by which a command is multiplied, in the order of attempts, until it avoids moving obstacles."""
+MAX_TIME_STEP_S = 0.1
+"""Largest time between two checks of moving obstacles."""
+UNCERTAINTY_SIGMAS = 0.5
+"""Number of standard deviations of their position by which moving obstacles are inflated."""
 APPROACH_TOLERANCE_M = 1e-4
-"""A robot that is already too close counts as approaching if its distance decreases by more than this."""
+"""Decrease of the distance to a moving obstacle above which a robot that is already too close approaches it."""
 
 
 class CollisionChecker:
     """Checks the arc of a command for collisions, and slows the command down if a collision is near."""
 
     def __init__(self, footprint: Footprint, min_speed: float) -> None:
-        """Take the footprint, and the lowest speed in m/s to which a command is slowed down."""
+        """Take the footprint, and the minimum speed in m/s of a command after slowing down."""
         self._footprint, self._min_speed = footprint, min_speed
 
     def free_time(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
-        """Return the time in s, at most `horizon`, for which the command does not hit a static obstacle."""
+        """Return the time in s, at most `horizon`, until the command leads to a collision with a static obstacle."""
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
     def slow_down(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
-        """Return the command; if it is not free for `horizon` s, slowed down so that it becomes free for `required` s.
+        """Return the command if its `free_time` is at least `horizon`; otherwise scaled by `free_time` / `required`.
 
-        Raises NO_VALID_CONTROL if it would be slower than the minimum. Nav2 fails at once; slowing down first gives the
-        planner time to find a way around the obstacle.
+        All times are in s. Raises NO_VALID_CONTROL if the scaled command is slower than the minimum speed.
         """
         if free_time >= horizon:
             return command
@@ -48,9 +49,7 @@ class CollisionChecker:
     def slow_down_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
         """Return the command times the largest of SPEED_FACTORS that avoids moving obstacles for `horizon` s.
 
-        If none does, take the factor with the latest collision. Robot and obstacles are compared at the same times, so
-        that the robot does not slow down for an obstacle that will have left. A stop is not a failure, because a moving
-        obstacle will move on.
+        If no factor avoids them, the factor with the latest collision is used.
         """
         if not costmap.moving.obstacles or command == STOP:
             return command
@@ -72,26 +71,21 @@ class CollisionChecker:
 
 
 ROTATION_CLEARANCE_CELLS = 1.01
-"""Minimum distance, in cells, between the footprint and the center of a lethal cell during a rotation in place. The
-obstacle may be half a cell nearer, and a robot without a rear lidar does not see obstacles behind it."""
+"""Minimum distance in cells between the footprint and the center of a lethal cell during a rotation in place."""
 BACKUP_SPEED_M_S, BACKUP_FREE_TIME_S = 0.15, 1.0
-"""Speed of backing up (Nav2's backup_speed), and time for which the command must be free of collisions."""
+"""Speed of backing up (Nav2's backup_speed), and time for which this command must be free of collisions."""
 BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
-"""Turn rates to try in this order: a robot that entered on a curve may not be able to leave in a straight line."""
+"""Turn rates of backing up, in the order of attempts."""
 
 
 class RotationClearance:
-    """Checks whether a robot with corners can rotate in place, and finds a way to back out if not.
-
-    A robot that starts a rotation without room for all of it gets stuck: its corners come closer to obstacles with each
-    step, until it can neither turn nor leave.
-    """
+    """Checks whether a robot has room to rotate in place, and otherwise finds a command to back up."""
 
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Return whether a rotation by `angle` rad keeps the required clearance, or the current one if it is less."""
+        """Return whether a rotation by `angle` rad keeps the required clearance, or a smaller current clearance."""
         reach = self._footprint.reach
         if reach == 0.0 or distance_at(costmap, pose.x, pose.y) > reach + 2.0 * costmap.resolution:
             return True
@@ -102,7 +96,7 @@ class RotationClearance:
         return bool((clearance >= required).all())
 
     def backup_command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return a command that backs up as straight as possible; None if every curvature is blocked."""
+        """Return the command to back up as straight as possible; None if all turn rates lead to a collision."""
         for turn_rate in BACKUP_TURN_RATES_RAD_S:
             command = Twist(-BACKUP_SPEED_M_S, 0.0, turn_rate)
             if time_to_collision(self._footprint, costmap, pose, command, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S:
@@ -110,15 +104,15 @@ class RotationClearance:
         return None
 
 
-CELL_DIAGONAL = 1.4143
-"""Diagonal of a cell relative to its edge, rounded up."""
+CELL_DIAGONAL_CELLS = 1.4143
+"""Diagonal of a cell in cells (square root of 2), rounded up."""
 
 
 def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
     """Return the time in s until the first collision with a static obstacle at this velocity, at most `horizon`.
 
-    A robot may already be in collision according to the costmap, for example because of a localization error. So that
-    it can leave, only motion into another obstacle or more than half a cell deeper into the same one counts then.
+    If the robot already is in collision, only motion into another obstacle, or more than half a cell deeper into the
+    same one, counts as a collision. This allows the robot to leave.
     """
     if _is_surely_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
@@ -135,7 +129,7 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
 
 
 def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the poses (n, 3) are deeper inside an obstacle than the first pose, or inside another one."""
+    """Return which of the poses (n, 3) are deeper in an obstacle than the first pose, or in another obstacle."""
     reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
     gaps = footprint.point_distances(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
     deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
@@ -144,15 +138,14 @@ def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.N
 
 
 def _is_surely_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
-    """Return True if a disc of `radius` m is certainly free along the arc: a quick check for open space.
+    """Return True if a disc of `radius` m is certainly free along the arc; False if uncertain. A quick check.
 
-    Each step is as long as the free distance. Half a cell diagonal is added at both of its ends, because distances are
-    those between cell centers.
+    Sphere tracing: each step along the arc is as long as the free distance.
     """
     vx, vy, wz = twist
     speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE_RAD_S
     cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
-    required = radius + CELL_DIAGONAL * resolution
+    required = radius + CELL_DIAGONAL_CELLS * resolution  # distances are those between cell centers
     time, at_x, at_y = 0.0, pose.x, pose.y
     while True:
         free_distance = distance_at(costmap, at_x, at_y) - required

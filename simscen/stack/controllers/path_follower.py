@@ -1,4 +1,4 @@
-"""Base class of the controllers: path, position on the path, speed limit, and rotation to the heading of the goal."""
+"""Base class of the controllers, and rotation in place to the heading of the goal."""
 
 import math
 
@@ -12,8 +12,8 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 DEFAULT_SPEED_M_S = 0.5
 """Nav2's default of desired_linear_vel and of MPPI's vx_max."""
 SAME_GOAL_M = 0.1
-"""A path to a goal within this distance of the previous goal does not reset the controller: localization corrections
-move the goal in the odom frame."""
+"""Distance between the ends of successive paths up to which they lead to the same goal, so that the controller is not
+reset: corrections of the localizer move the goal in the odom frame."""
 
 
 class PathFollower:
@@ -33,11 +33,11 @@ class PathFollower:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
         end = Pose2(*path.points[-1].tolist())
         if self._end is None or end.distance(self._end) > SAME_GOAL_M:
-            self.begin()
+            self.reset_for_goal()
         self._end, self._tracker = end, PathTracker(path, self._search_distance)
 
-    def begin(self) -> None:
-        """Reset the state for another goal. Not called for a new path to the same goal."""
+    def reset_for_goal(self) -> None:
+        """Reset the state of the controller for another goal."""
 
     @property
     def full_speed(self) -> float:
@@ -45,7 +45,7 @@ class PathFollower:
         return self._full_speed
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Drive no faster than this in m/s; None lifts the limit."""
+        """Set the speed limit in m/s; None removes it."""
         self._speed_limit = limit
 
     @property
@@ -55,11 +55,11 @@ class PathFollower:
 
     @property
     def _speed_ratio(self) -> float:
-        """Factor by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
+        """Factor (0 … 1) by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
         return self._speed / self._full_speed
 
     def _locate(self, pose: Pose2) -> PathTracker:
-        """Return the path with the updated position of the robot on it. Raises INVALID_PATH if there is no path."""
+        """Return the path tracker, updated to the pose of the robot. Raises INVALID_PATH if there is no path."""
         if self._tracker is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
         self._tracker.locate(pose)
@@ -67,28 +67,28 @@ class PathFollower:
 
 
 PASSED_TOLERANCE_RATIO = 0.8
-"""A goal behind the robot is reached within this fraction of its tolerance, because the robot could only drive back."""
-STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
-"""A robot within the tolerance has also arrived if its speed and the remaining length of its path are below these."""
+"""Fraction of its tolerance within which a goal behind the robot is reached."""
 PASSED_PATH_LENGTH_M = 0.1
 """Remaining length of the path below which a goal behind the robot can be reached."""
+STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
+"""Speed and remaining length of the path below which the goal is reached within its full tolerance."""
 CAR_PATH_END_M = 0.03
-"""Remaining length of the path below which a car has arrived: it gets its heading from the last arc."""
+"""Remaining length of the path below which a car has reached the goal."""
 SETTLING_PERIODS = 2.0
 """Minimum number of control periods for the remaining rotation. With fewer, the heading would oscillate."""
 BRAKING_FACTOR = 1.6
-"""Speed limit before a stop: sqrt(factor · deceleration · distance). The exact factor, 2, would leave no reserve."""
+"""Factor in the speed limit before a stop, sqrt(factor · deceleration · distance): 2 without a reserve."""
 
 
 class GoalRotation:
-    """Decides when the position of the goal is reached, and rotates the robot to the heading of the goal."""
+    """Decides whether the position of the goal is reached, and then rotates the robot to the heading of the goal."""
 
     def __init__(
         self, robot: RobotModel, max_turn_rate: float, acceleration: float, period: float, tolerance_ratio: float
     ) -> None:
         """Take the limits in rad/s and rad/s², and the control period in s.
 
-        Driving stops within the fraction `tolerance_ratio` of the goal's tolerance.
+        The position is reached within the fraction `tolerance_ratio` of the goal's position tolerance.
         """
         self._tolerance_ratio = tolerance_ratio
         self._can_turn = robot.turning_radius == 0.0
@@ -101,9 +101,9 @@ class GoalRotation:
         self._is_reached = False
 
     def is_position_reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
-        """Return whether to rotate instead of driving on; `remaining` is the remaining length of the path in m.
+        """Return whether the robot should stop driving and rotate. `remaining` is the remaining path length in m.
 
-        The result stays True until the robot leaves the tolerance.
+        The result stays True until the robot leaves the position tolerance.
         """
         distance = goal.pose.distance(pose)
         if not self._can_turn:

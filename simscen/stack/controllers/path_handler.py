@@ -1,4 +1,4 @@
-"""Path handler: the position of the robot on its path, and the part of the path ahead of it."""
+"""Path handler: tracks the position of the robot on its path, and returns the part of the path ahead of it."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -14,13 +14,13 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.kinematics import direction_changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
-"""Default length of path that is searched for the nearest point; controllers use `max_robot_pose_search_dist`."""
+"""Default length of path beyond the last position that is searched for the nearest point."""
 CUSP_REACHED_M = 0.03
 """Length of path before a cusp at which the cusp counts as reached."""
 CURVATURE_SPAN_M = 0.3
 """Length of path to both sides of a point over which the curvature is measured."""
 CARROT_SEARCH_MARGIN_M = 0.5
-"""Length of path, beyond twice the distance of the carrot, that is searched for the carrot."""
+"""Length of path, in addition to twice the lookahead distance, that is searched for the carrot."""
 LENGTH_TOLERANCE_M = 1e-9
 """Rounding error allowed for sums of lengths."""
 
@@ -28,15 +28,12 @@ LENGTH_TOLERANCE_M = 1e-9
 class PathTracker:
     """Path with the position of the robot on it, which only moves toward the end of the path.
 
-    A path may change between forward and backward driving (Reeds-Shepp) at cusps. The robot follows one segment after
-    the other: points beyond the next cusp are not considered until the robot has reached the cusp.
-
-    Searches skip points that cannot be the result, since a step along the path changes the distance to the robot by at
-    most the length of the step. So few points remain that scalars (points as x + iy) are faster than arrays.
+    The driving direction of a path may change at cusps, which divide it into segments. Points beyond the next cusp are
+    ignored until the robot has reached the cusp.
     """
 
     def __init__(self, path: Path, search_distance: float = SEARCH_AHEAD_M) -> None:
-        """Take a path. The nearest point is searched up to `search_distance` m of path beyond the last position."""
+        """Take a path. `search_distance` is the length of path in m that is searched beyond the last position."""
         self._search_distance = search_distance
         self.points = np.ascontiguousarray(path.points)
         steps = np.diff(self.points[:, :2], axis=0)
@@ -62,7 +59,7 @@ class PathTracker:
 
     @property
     def has_cusps(self) -> bool:
-        """Whether there is another segment after the current one."""
+        """Whether there is a cusp ahead."""
         return len(self._segment_ends) > 1
 
     @property
@@ -71,7 +68,7 @@ class PathTracker:
         return self._segment_forward[0]
 
     def locate(self, pose: Pose2) -> None:
-        """Update the position: the point of the segment nearest to the robot, or of the next segment at a cusp."""
+        """Update the position: the nearest point of the current segment or, at a cusp, of the next segment."""
         self._find_nearest(pose)
         while len(self._segment_ends) > 1 and self.remaining_in_segment() <= CUSP_REACHED_M:
             self.index = self._segment_start = self._segment_ends.pop(0)
@@ -90,7 +87,7 @@ class PathTracker:
         self.index = nearest
 
     def ahead(self, length: float) -> tuple[Array, Array]:
-        """Return the points (n, 3) of the segment over the next `length` m of path, and the path length (n,) to each.
+        """Return the points (n, 3) of the segment within the next `length` m, and the path length (n,) in m to each.
 
         There are at least two points, unless the segment has only one.
         """
@@ -100,13 +97,13 @@ class PathTracker:
         return self.points[start:end], self.along[start:end] - self.along[start]
 
     def sampled_points(self, every: int) -> list[complex]:
-        """Return every n-th point (x + iy) from the nearest one on."""
+        """Return every n-th point ahead of the robot as x + iy."""
         return self._complex_points[self.index :: every]
 
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
-        """Yield (path length in m, x + iy, curvature in 1/m) of points ahead on the segment.
+        """Yield (path length in m, x + iy, curvature in 1/m) of points of the segment, about `spacing` m apart.
 
-        The points are about `spacing` m apart. The first one is `spacing` m ahead, the last one at most `reach` m.
+        The first point is `spacing` m ahead, the last one at most `reach` m.
         """
         along, start = self._along, self._along[self.index]
         length = spacing
@@ -142,11 +139,10 @@ class PathTracker:
         return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
-        """Return (x, y) where the segment leaves the circle of radius `distance` m around the robot, or its end.
+        """Return the carrot (x, y): where the segment leaves the circle of radius `distance` m around the robot.
 
-        The carrot is interpolated between points, so that it moves smoothly (RPP's circleSegmentIntersection). With
-        `beyond`, the segment is extended straight beyond its end (interpolate_curvature_after_goal), so that the robot
-        arrives with the heading of the end.
+        If the segment ends inside the circle, return its end. With `beyond`, extend it straight to the circle instead
+        (RPP's interpolate_curvature_after_goal).
         """
         search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
         outside = self._first_outside(pose, distance, search_end)
@@ -166,9 +162,9 @@ class PathTracker:
         )
 
     def _first_outside(self, pose: Pose2, distance: float, search_end: float) -> int | None:
-        """Return the index of the first point ahead that is at least `distance` m from the robot; None if none is.
+        """Return the index of the first point ahead that is at least `distance` m from the robot, or None.
 
-        The search ends at the path length `search_end`, and at the end of the segment.
+        The search ends at the path length `search_end` in m, or at the end of the segment.
         """
         points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
         index, end = self.index, self._segment_ends[0]
@@ -176,12 +172,12 @@ class PathTracker:
             away = abs(points[index] - robot)
             if away >= distance:
                 return index
-            index += int((distance - away) * self._points_per_meter) or 1
+            index += int((distance - away) * self._points_per_meter) or 1  # skips points that are certainly inside
         return None
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
-    """Return (x, y) where the line from a (inside) to b leaves a circle; a and b are relative to its `center`."""
+    """Return (x, y) where the line from a (inside) to b leaves a circle. a and b are relative to its `center`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
@@ -190,25 +186,19 @@ def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center
 
 Floats = npt.NDArray[np.float32]
 PATH_SPACING_M = 0.05
-"""Default distance between points. Nav2's planners return one point per costmap cell, and its critics count points."""
+"""Default distance between the points of an upcoming path."""
 
 
 @dataclass(frozen=True, eq=False)
 class UpcomingPath:
-    """Part of the path ahead of the robot: poses (n, 3) that are `spacing` m apart, and their total `length` in m.
-
-    It ends at the next cusp, at the end of the path, or after the requested length.
-    """
+    """Part of the path ahead of the robot, up to the next cusp: poses (n, 3) at equal `spacing`, and `length`, in m."""
 
     points: Array
     spacing: float
     length: float
 
     def relative_to(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
-        """Return x and y (n,) relative to the position of `pose`, without rotation, and the headings (n,).
-
-        Relative positions are small, so that float32 is precise enough.
-        """
+        """Return x and y (n,) relative to the position of `pose`, without rotation, and the headings (n,)."""
         x, y, yaw = self.points.T
         return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""Regulated pure pursuit (Macenski et al. 2023; nav2_regulated_pure_pursuit_controller)."""
+"""Regulated pure pursuit controller (Macenski et al. 2023; nav2_regulated_pure_pursuit_controller)."""
 
 import math
 from typing import NamedTuple
@@ -16,19 +16,17 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 MIN_SQUARED_CHORD_M2 = 0.001
-"""Squared distance of the carrot below which the arc is straight (Nav2's calculateCurvature)."""
+"""Squared distance of the carrot below which the arc is a straight line (Nav2's calculateCurvature)."""
 CAR_LOOKAHEAD_RATIO = 0.4
-"""Maximum lookahead distance of a car relative to its turning radius. Where a plan changes from full left to full
-right, a farther carrot would cut the bend, and a car cannot correct that."""
+"""Maximum lookahead distance of a car relative to its turning radius. A farther carrot would cut S-bends."""
 MIN_ROTATION_RAD = 0.1
-"""Angle to the carrot below which a rotation in place would not help."""
+"""Angle to the carrot below which a rotation in place does not help."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
-"""Ratios of the lookahead distance to try until the arc is free. An arc to a far carrot cuts the bends of the path; a
-shorter one stays closer to it. nav2_graceful_controller tries its targets in the same way."""
+"""Factors on the lookahead distance, in the order of attempts to find a free arc (as nav2_graceful_controller does)."""
 
 
 class Carrot(NamedTuple):
-    """Point of the path that the robot steers to, in m in the base frame."""
+    """Point of the path that the robot steers to: x and y in m in the base frame."""
 
     x: float
     y: float
@@ -39,13 +37,13 @@ class Carrot(NamedTuple):
         return math.hypot(self.x, self.y)
 
     def bearing(self, backward: bool) -> float:
-        """Return the angle in rad by which the robot must rotate until its front, or its back, points at the carrot."""
+        """Return the angle in rad from the front of the robot to the carrot; with `backward`, from its back."""
         sign = -1.0 if backward else 1.0
         return math.atan2(sign * self.y, sign * self.x)
 
 
 class Arc(NamedTuple):
-    """A command, the time in s for which it is free of collisions, and the time `horizon` for which it has to be."""
+    """A command, the time in s for which it is free of collisions, and the required time `horizon` in s."""
 
     command: Twist
     free_time: float
@@ -53,10 +51,9 @@ class Arc(NamedTuple):
 
 
 class RegulatedPurePursuit(PathFollower):
-    """Steers at a carrot on the path, and regulates the speed by curvature, nearby obstacles, and distance to the goal.
+    """Steers to a carrot on the path, and regulates the speed by curvature, nearby obstacles, and distance to the goal.
 
-    Nav2's controller fails if the arc to the carrot is blocked. This one tries nearer carrots, then a lower speed, and
-    then a rotation in place.
+    If the arc to the carrot is blocked, it tries nearer carrots, then a lower speed, and then a rotation in place.
     """
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
@@ -72,13 +69,13 @@ class RegulatedPurePursuit(PathFollower):
         self.arc: tuple[Pose2, Twist] | None = None
         """Pose and velocity of the last command."""
 
-    def begin(self) -> None:
-        """Reset the goal rotation for a path to another goal."""
+    def reset_for_goal(self) -> None:
+        """Reset the goal rotation for another goal."""
         self._goal_rotation.reset()
 
     @property
     def local_plan(self) -> Path | None:
-        """The arc of the last command."""
+        """The arc of the last command; None before the first command."""
         return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
@@ -95,7 +92,7 @@ class RegulatedPurePursuit(PathFollower):
         return command
 
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command to the farthest carrot with a free arc, or else on the arc that is free for longest."""
+        """Return the command for the farthest carrot whose arc is free; if no arc is free, slow down or rotate."""
         spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
         arcs: list[Arc] = []
         rotation: float | None = None
@@ -134,10 +131,9 @@ class RegulatedPurePursuit(PathFollower):
     def _is_straight_free(
         self, carrot: Carrot, backward: bool, command: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
-        """Return whether the robot could drive straight to the carrot after a rotation in place.
+        """Return whether a round robot could drive straight to the carrot after a rotation in place.
 
-        That is often the only way out of a narrow space. Always False if the robot is not round, because its corners
-        come closer to obstacles when it rotates.
+        False if the robot is not round, or if the angle to the carrot is small.
         """
         angle = carrot.bearing(backward)
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
@@ -147,13 +143,13 @@ class RegulatedPurePursuit(PathFollower):
         return arc.free_time >= arc.horizon
 
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
-        """Return the distance in m that must be free: to the carrot or, for a car, to the next cusp if it is nearer."""
+        """Return the distance in m that must be free: to the carrot, or for a car to a nearer cusp."""
         if not self._is_car:
             return carrot.distance
         return min(carrot.distance, max(CUSP_REACHED_M, tracker.remaining_in_segment()))
 
     def _rotate(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command to rotate in place or, if there is no room for the whole rotation, to back out."""
+        """Return the command to rotate in place by `angle` rad or, without room for this rotation, to back up."""
         if not self._spec.use_collision_detection or self._rotation_clearance.has_room(angle, pose, costmap):
             return self._goal_rotation.turn(angle, twist)
         command = self._rotation_clearance.backup_command(pose, costmap)
@@ -199,7 +195,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, self._approach_speed(tracker, regulated, pose))
 
     def _approach_speed(self, tracker: PathTracker, speed: float, pose: Pose2) -> float:
-        """Return the speed near the end of the path or a cusp: scaled as in Nav2, and limited by the brakes."""
+        """Return the speed near the end of the segment, at most `speed`: scaled as in Nav2, and low enough to brake."""
         remaining, spec = tracker.remaining_in_segment(), self._spec
         if remaining < spec.approach_velocity_scaling_dist:
             distance = _to_robot_frame(pose, *tracker.segment_end).distance
@@ -210,7 +206,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
     def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> Arc:
-        """Return the command with its free time. It has to be free for `distance` m, but at most for Nav2's limit."""
+        """Return the command with its free time, and the required time to drive `distance` m (limited as in Nav2)."""
         max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:
             return Arc(command, max_time, max_time)
@@ -224,7 +220,7 @@ class RegulatedPurePursuit(PathFollower):
 
 
 def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
-    """Return the carrot at a distance in m; see PathTracker.carrot."""
+    """Return the carrot of the path at `distance` m; with `beyond`, also beyond the end of the path."""
     return _to_robot_frame(pose, *tracker.carrot(pose, distance, beyond=beyond))
 
 
@@ -238,21 +234,18 @@ DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
 SAMPLE_SPACING_M = 0.1
 """Distance between the points of the path ahead for which a speed is determined."""
 SPEED_PER_CLEARANCE_1_S = 10.0
-"""Speed in m/s that each meter of clearance adds to the minimum, so that the robot can react in a narrow gap."""
+"""Speed in m/s that each meter of clearance adds to the minimum speed in a narrow passage."""
 
 
 class SpeedRegulation:
-    """Regulates the speed (m/s) by curvature and nearby obstacles, also those farther ahead on the path.
-
-    Nav2's controller slows down in bends and narrow passages, but does not brake before them.
-    """
+    """Regulates the speed (m/s) by curvature and nearby obstacles, also before bends and narrow passages ahead."""
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
         self._spec, self._inscribed_radius = spec, setting.footprint.inscribed
         self._doubled_deceleration = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
 
     def for_distance(self, speed: float, distance: float) -> float:
-        """Return the speed with an obstacle `distance` m from the base: as in Nav2, but lower in narrow passages."""
+        """Return the speed with an obstacle `distance` m from the base; with `slow_down_ahead`, lower than in Nav2."""
         spec = self._spec
         if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
             return speed
@@ -270,7 +263,7 @@ class SpeedRegulation:
     def for_path_ahead(self, speed: float, regulated: float, tracker: PathTracker, costmap: CostmapView) -> float:
         """Return the speed, at most `regulated`, from which the robot can brake in time for the path ahead.
 
-        `speed` is the speed at points of the path where nothing requires regulation.
+        `speed` is the speed without regulation.
         """
         if not self._spec.slow_down_ahead:
             return regulated

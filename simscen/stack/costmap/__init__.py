@@ -1,1 +1,1 @@
-"""Layered costmap of the robot (nav2_costmap_2d), vectorized."""
+"""Layered costmaps, as in nav2_costmap_2d."""

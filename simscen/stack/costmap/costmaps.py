@@ -1,4 +1,4 @@
-"""The global costmap for planning and the local costmap for control, as in Nav2, with their update schedules."""
+"""The global costmap for planning and the local costmap for control, and the schedules of their updates."""
 
 import math
 from dataclasses import replace
@@ -15,25 +15,24 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
-"""Size of Nav2's local costmap, and the default minimum size of this one."""
+"""Default minimum size of the local costmap, which is the size in Nav2."""
 ZONE_TOLERANCE_M = 0.02
-"""Keepout zones are moved in the local costmap when their position in the odom frame has changed by more than this."""
+"""Shift of the map frame in the odom frame above which keepout zones are moved in the local costmap."""
 
 
 class Costmaps:
     """Global and local costmap of one robot, each updated at its own rate.
 
     The global costmap is in the map frame and contains the map. The local costmap rolls with the robot in the odom
-    frame and contains no map, so that a correction of the localizer does not move obstacles in it. Only keepout zones,
-    which are defined in the map frame, move with a correction.
+    frame and contains no map. Its obstacles do not move when the localizer corrects the pose; only keepout zones do.
     """
 
     def __init__(
         self, spec: StackSpec, surroundings: Surroundings, lookahead_distance: float, latency: int = 0
     ) -> None:
-        """Create both costmaps.
+        """Create both costmaps. An update takes `latency` ticks.
 
-        The local costmap contains at least `lookahead_distance` m ahead of the robot; an update takes `latency` ticks.
+        The local costmap covers at least `lookahead_distance` m ahead of the robot, unless its size is specified.
         """
         self.global_costmap = LayeredCostmap(spec.costmap, surroundings)
         local_spec = spec.local_costmap.with_defaults_from(spec.costmap)
@@ -53,7 +52,7 @@ class Costmaps:
         """The tick from which `update` has something to do."""
 
     def add_reading(self, reading: Scan | Image) -> None:
-        """Store a reading for the next update of each costmap; it replaces an earlier one of the same sensor."""
+        """Store a reading for the next update of each costmap. It replaces earlier readings of the same sensor."""
         for schedule in (self._global_schedule, self._local_schedule):
             schedule.readings[reading.sensor] = reading
 
@@ -67,7 +66,7 @@ class Costmaps:
         self.global_costmap.set_zones(zones)
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
-        """Update the costmaps that are due with the newest reading of each sensor, at the pose of its time."""
+        """Update the costmaps that are due with the newest reading of each sensor."""
         if tick >= self._global_schedule.next:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)
@@ -78,24 +77,21 @@ class Costmaps:
         self.next = min(self._global_schedule.next, self._local_schedule.next)
 
     def clear(self) -> None:
-        """Clear all obstacles except those in the newest readings (Nav2's ClearEntireCostmap for both costmaps)."""
+        """Clear all obstacles of both costmaps except those in the newest readings (Nav2's ClearEntireCostmap)."""
         self.global_costmap.clear()
         self.clear_local()
 
     def clear_around(self) -> None:
-        """Clear both costmaps within the range of the local costmap (Nav2's ClearCostmapAroundRobot).
-
-        Obstacles farther away do not stop the controller. Without them, the robot could plan into the same dead end.
-        """
+        """Clear both costmaps within the range of the local costmap (Nav2's ClearCostmapAroundRobot)."""
         self.global_costmap.clear(self._local_range)
         self.clear_local()
 
     def clear_local(self) -> None:
-        """Clear the local costmap, except for cells that no lidar can see now: the robot may back up into them."""
+        """Clear the local costmap, except for obstacles outside the field of view of all lidars."""
         self.local_costmap.clear(unseen=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
-        """Clear the global costmap only: entirely, or within the range of the local costmap."""
+        """Clear the global costmap: entirely, or only within the range of the local costmap."""
         self.global_costmap.clear(math.inf if entirely else self._local_range)
 
     def _update_local_zones(self, frames: Frames) -> None:
@@ -113,7 +109,7 @@ class Costmaps:
 
 
 class _Update(NamedTuple):
-    """A reading, the pose `base` of the robot at the time of the reading, and the frames at the start of the update."""
+    """A reading, the pose `base` of the robot at the time of the reading, and its poses at the start of the update."""
 
     base: Pose2
     reading: Scan | Image
@@ -124,7 +120,7 @@ class _UpdateSchedule:
     """Update times of one costmap, and the readings for its next update."""
 
     def __init__(self, period: int, latency: int) -> None:
-        """Take the time between updates and the time that an update takes, in ticks."""
+        """Take the time between two updates and the duration of an update, in ticks."""
         self._period, self._updated_at = max(period, latency), -period
         self._updates = LatencyQueue[_Update](latency)
         self.next: float = 0
@@ -135,7 +131,7 @@ class _UpdateSchedule:
         return tick - self._updated_at >= self._period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
-        """Start an update if it is due and there are readings. Return the updates that are complete at this tick.
+        """Start an update if it is due and there are readings. Return the updates that are complete by this tick.
 
         `base` is the current pose of the robot in the frame of the costmap.
         """
@@ -153,6 +149,6 @@ class _UpdateSchedule:
 
 
 def _is_blind(scan: Scan) -> bool:
-    """Return whether all ranges of a scan are invalid or too short, so that it shows neither hits nor free space."""
+    """Return whether all ranges of a scan are invalid or too short."""
     ranges, nearest = scan.ranges, scan.range_min
     return not len(ranges) or not (ranges.item(0) >= nearest or bool((ranges >= nearest).any()))

@@ -1,10 +1,10 @@
 """Obstacles and ground seen by a depth camera (like Nav2's voxel layer, but without voxels).
 
 Each obstacle cell stores the height of the observed point. The cell is cleared only when the camera sees through that
-point. Looking over a low box or below a table top therefore does not clear it.
+point, not when it looks over a low box or below a table top.
 
-Ground can be sloping. Each image column is traced from its lowest row upward: points that rise no steeper than the
-configured slope are ground; steeper faces and edges are obstacles.
+Ground can be sloping. Each image column is traced from its lowest row upward. Points that rise no more steeply than
+`max_ground_slope` are ground. Steeper faces are obstacles.
 """
 
 import math
@@ -38,7 +38,7 @@ def project_depth_image(
 
     `known_ground` (rows, columns) are the cells that earlier images showed as ground.
     """
-    across, up = _slopes(image.depth.shape, image.field_of_view)
+    across, up = _ray_slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
     depth[~((depth <= spec.obstacle_max_range) & (depth > 0.0))] = np.nan
     points = image.mount.apply(np.stack((depth, depth * across, depth * up), axis=-1))
@@ -62,7 +62,7 @@ def project_depth_image(
 def seen_through(
     cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
 ) -> Mask:
-    """Return whether the camera sees through cells (n, 2) at their heights (n,) in m to something farther away."""
+    """Return through which of the cells (n, 2), at their heights (n,) in m, the camera sees points farther away."""
     in_base = base.inverse().apply(frame.centers(cells))
     points = image.mount.inverse().apply(np.column_stack((in_base, heights.astype(np.float64))))
     is_ahead = points[:, 0] > 0.0
@@ -84,8 +84,8 @@ def _focal_length(columns: int, field_of_view: float) -> float:
 
 
 @lru_cache(maxsize=8)
-def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
-    """Return how far the ray of each pixel (rows, columns) goes to the left and up, in m per m of depth."""
+def _ray_slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
+    """Return the slopes of the ray of each pixel (rows, columns): m to the left, and m up, per m of depth."""
     rows, columns = shape
     focal = _focal_length(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
@@ -97,22 +97,24 @@ GROUND_STEP_M = 0.05
 MAX_RISE_RATIO = 1.0
 """Rise in m per m above which points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
-"""The slope at the lowest point of a column is measured over this fraction (one eighth) of the image rows."""
+"""The slope at the lowest point of a column is measured over one eighth of the image rows."""
 
 
-def above_ground(away: Array, heights: Array, slope: float, low: float, known: Mask) -> tuple[Array, Mask]:
-    """Return the heights in m above the ground of the points of an image (rows, columns), and which of them are ground.
+def above_ground(
+    away: Array, heights: Array, max_slope: float, max_step: float, known_ground: Mask
+) -> tuple[Array, Mask]:
+    """Return the heights in m above the ground of the points of an image (rows, columns), and which points are ground.
 
-    away:     horizontal distances of the points from the camera in m, top row first
-    heights:  heights in m above the plane on which the robot stands; nan for pixels without a point
-    slope:    maximum slope angle of the ground in rad
-    low:      maximum height in m of ground at the lowest point of a column, unless its slope leads down to the robot
-    known:    points on cells that earlier images showed as ground
+    away:          horizontal distances of the points from the camera in m, top row first
+    heights:       heights in m above the plane on which the robot stands; nan for pixels without a point
+    max_slope:     maximum slope angle of the ground in rad
+    max_step:      height in m up to which the lowest point of a column is ground, even on an upright face
+    known_ground:  points on cells that earlier images showed as ground
     """
-    max_rise, upright = math.tan(slope), _upright(away, heights)
+    max_rise, upright = math.tan(max_slope), _upright(away, heights)
     rows, columns = heights.shape
     ground_distance, ground_height = np.zeros(columns), np.zeros(columns)
-    has_ground = ~_on_a_step(away, heights, upright, low) | known[_lowest(heights), np.arange(columns)]
+    has_ground = ~_on_a_step(away, heights, upright, max_step) | known_ground[_lowest(heights), np.arange(columns)]
     above, level = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
     for row in range(rows - 1, -1, -1):
         r, z = away[row], heights[row]
@@ -126,7 +128,7 @@ def above_ground(away: Array, heights: Array, slope: float, low: float, known: M
 
 
 def _upright(away: Array, heights: Array) -> Mask:
-    """Return which points belong to an upright face: they are steeply above or below the point in an adjacent row."""
+    """Return which points are steeply above or below the point in an adjacent row."""
     steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
@@ -134,22 +136,22 @@ def _upright(away: Array, heights: Array) -> Mask:
     return upright
 
 
-def _on_a_step(away: Array, heights: Array, upright: Mask, low: float) -> Mask:
-    """Return in which columns the lowest point is on a step whose edge is below the image.
+def _on_a_step(away: Array, heights: Array, upright: Mask, max_step: float) -> Mask:
+    """Return in which columns the lowest point is on a step (or an obstacle) whose edge is below the image.
 
-    Such a point is higher than `low`. Besides, it is on an upright face, or the slope at this point, extended to the
-    robot, ends higher than `low`.
+    This point is higher than `max_step`. Besides, it is on an upright face, or the slope there, extended to the robot,
+    ends higher than `max_step`.
     """
     rows, columns = heights.shape
     all_columns, lowest = np.arange(columns), _lowest(heights)
     upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)
     r, z = away[lowest, all_columns], heights[lowest, all_columns]
     rise = (heights[upper, all_columns] - z) / np.maximum(away[upper, all_columns] - r, GROUND_STEP_M)
-    step: Mask = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
+    step: Mask = (z > max_step) & (upright[lowest, all_columns] | ~(z - rise * r <= max_step))
     return step
 
 
 def _lowest(heights: Array) -> npt.NDArray[np.intp]:
-    """Return the lowest row with a point for each column, or the last row if it has no point."""
+    """Return the lowest row with a point for each column; the last row for columns without a point."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

@@ -1,7 +1,6 @@
 """Exact squared Euclidean distance transforms of grids, complete or up to a maximum distance.
 
-scipy's transform keeps several copies of the grid in double precision. Where only distances up to a few meters matter,
-comparing neighbors in 16-bit integers is faster; docs/design/speed.md has the measurements.
+Up to a few meters, comparing neighbors in 16-bit integers is faster than scipy's transform (see docs/design/speed.md).
 """
 
 from collections.abc import Iterator
@@ -15,13 +14,13 @@ MAX_INT32_EDGE_CELLS = 30_000
 """Longest edge of a grid for which squared distances fit into 32 bits."""
 
 MAX_REACH_CELLS = 180
-"""Largest supported `reach` in cells: the sum of two squares must fit into 16 bits."""
+"""Largest supported `reach`, the maximum distance: the sum of two squares must fit into 16 bits."""
 OUT_OF_REACH = 65535
-"""Value for cells beyond the maximum distance, larger than any squared distance within it."""
+"""Largest value in 16 bits, for cells farther away than any maximum distance."""
 MAX_COMPARED_CELLS = 60
-"""Maximum distance in cells up to which comparing neighbors is faster than scipy's transform."""
+"""Maximum distance up to which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
-"""Number of values that are compared at once: about the size of a processor cache."""
+"""Number of values that are compared at once: they fit into a processor cache."""
 
 Squares = npt.NDArray[np.uint16]
 _STEPS: Squares = (np.arange(1, MAX_REACH_CELLS + 1) ** 2).astype(np.uint16)[:, None, None]
@@ -36,13 +35,13 @@ def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squar
 
 
 class SquaredDistanceTransform:
-    """Transform of `squared_distances_within` for several grids of the same shape, with buffers allocated once.
+    """The transform of `squared_distances_within` for several grids of the same shape, with buffers allocated once.
 
-    It is separable: it computes first the distance to the nearest marked cell in each row, then minima over the rows.
+    It is separable: one pass along the rows, then one along the columns.
     """
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:
-        """Allocate buffers for grids of a shape (rows, columns). `reuse` optimizes for more than one grid."""
+        """Allocate buffers for grids of a shape (rows, columns). With `reuse`, optimize for more than one grid."""
         self._reach, self._beyond = reach, reach * reach + 1
         if reach > MAX_COMPARED_CELLS:
             return
@@ -75,7 +74,7 @@ class SquaredDistanceTransform:
 
 
 class _AxisPass:
-    """One pass along the first axis: each result is the minimum of value + offset² over all offsets up to `reach`."""
+    """One pass along the first axis: each result is the minimum of (value + offset²) over offsets up to `reach`."""
 
     def __init__(self, height: int, width: int, reach: int, buffer: Squares, reuse: bool) -> None:
         padded = np.full((height + 2 * reach, width), reach * reach + 1, dtype=np.uint16)

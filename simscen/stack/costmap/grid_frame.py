@@ -1,4 +1,4 @@
-"""Grid geometry of a costmap: positions of its cells, and when and how the window of a rolling costmap moves."""
+"""Grid geometry of a costmap: positions of cells, and the moving window of a rolling costmap."""
 
 import math
 from dataclasses import dataclass
@@ -12,29 +12,30 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Plane
 
 Cells = npt.NDArray[np.int64]
-_minimum, _maximum = np.minimum.reduce, np.maximum.reduce
+"""Cells (n, 2) as (row, column)."""
 CellIndices = npt.NDArray[np.int64]
 """Flat indices (n,) of cells, row by row from cell (0, 0)."""
+_minimum, _maximum = np.minimum.reduce, np.maximum.reduce
 
 MAX_CACHED_CELLS = 10_000
-"""Maximum number of cells of a grid whose centers are cached: about a local costmap."""
+"""Largest grid whose cell centers are cached: about a local costmap."""
 
 
 @dataclass(frozen=True)
 class GridFrame:
-    """An unrotated grid in the frame of its costmap: `origin` is the corner of cell (0, 0), `shape` (rows, columns)."""
+    """An unrotated grid in the frame of its costmap. `origin` (x, y) is the corner of cell (0, 0)."""
 
     origin: tuple[float, float]
     resolution: float
     shape: tuple[int, int]
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return row and column of the cell at a point, possibly outside the grid."""
+        """Return the cell (row, column) at a point, possibly outside the grid."""
         scale = 1.0 / self.resolution
         return math.floor((y - self.origin[1]) * scale), math.floor((x - self.origin[0]) * scale)
 
     def cells(self, points: Array) -> Cells:
-        """Return the cells (n, 2) as (row, column) at points (n, 2), possibly outside the grid."""
+        """Return the cells (n, 2) at points (n, 2), possibly outside the grid."""
         local = (points - np.array(self.origin)) * (1.0 / self.resolution)
         cells: Cells = np.floor(local[:, ::-1]).astype(np.int64)
         return cells
@@ -50,9 +51,9 @@ class GridFrame:
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
     def indices_of(self, points: Plane, center: complex, reach: float) -> CellIndices:
-        """Return the flat indices of the cells at those of the points x + iy (n,) that are on the grid.
+        """Return the flat indices of the cells at points x + iy (n,). Points outside the grid are left out.
 
-        All points must be within `reach` m of `center`. If this circle is on the grid, single points are not checked.
+        All points must be within `reach` m of `center`, so that a check of this circle can replace checks of points.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
@@ -74,11 +75,11 @@ class GridFrame:
 
     @cached_property
     def _index_factors(self) -> CellIndices:
-        """Factors by which (column, row) of a cell are multiplied in its flat index."""
+        """Factors of (column, row) in the flat index of a cell."""
         return np.array((1, self.shape[1]))
 
     def points(self, indices: CellIndices) -> Plane:
-        """Return the centers x + iy (n,) of the cells with these flat indices (n,)."""
+        """Return the centers x + iy (n,) of cells (n,)."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
             return _cell_centers(indices, columns, self.resolution, corner)
@@ -87,18 +88,18 @@ class GridFrame:
         return points
 
     def extent(self, indices: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Return the lowest (row, column) and the highest (row, column) of cells; at least one is required."""
+        """Return the bounding box of at least one cell: lowest (row, column) and highest (row, column)."""
         width = self.shape[1]
         first, last, columns = int(_minimum(indices)), int(_maximum(indices)), indices % width
         return (first // width, int(_minimum(columns))), (last // width, int(_maximum(columns)))
 
     def covers(self, x: float, y: float) -> bool:
-        """Return whether the point lies on the grid."""
+        """Return whether the point (x, y) lies on the grid."""
         column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
     def from_window(self, window: tuple[slice, slice], indices: CellIndices) -> CellIndices:
-        """Return the flat indices in the grid of cells that are given by their flat indices in a window."""
+        """Convert flat indices in a window (rows, columns) to flat indices in the grid."""
         (rows, columns), width = window, self.shape[1]
         window_width = max(1, columns.stop - columns.start)
         cells: CellIndices = (
@@ -107,10 +108,7 @@ class GridFrame:
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
-        """Return the window (rows, columns) from cell `low` to cell `high`, with `margin` more cells on each side.
-
-        The window is clipped to the grid.
-        """
+        """Return the window (rows, columns) from cell `low` to cell `high`, plus `margin` cells, within the grid."""
         return (
             slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
             slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
@@ -133,15 +131,15 @@ def _all_cell_centers(shape: tuple[int, int], size: float) -> Plane:
 Cell = TypeVar("Cell", bound=np.generic)
 
 GOAL_EDGE_MARGIN_M = 0.6
-"""If the goal is outside the window, the plan ends this far inside the edge."""
+"""Distance from the edge of the window at which a plan ends if the goal is outside."""
 ROLL_RATIO = 1 / 8
-"""A window is moved when the distance of the robot from its center exceeds this fraction of its size."""
+"""Distance of the robot from the center, as a fraction of the window's size, above which the window is moved."""
 MAX_ROLL_OFFSET_M = 0.25
-"""Largest distance of the robot from the center of a local costmap before it is moved (in Nav2, at each update)."""
+"""Distance of the robot from the center above which the window of a local costmap is moved."""
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:
-    """Return a window of this size (x, y) in m around a point, whose cells align with those of all other windows."""
+    """Return a window of `size` (x, y) in m around a pose. Cells of different windows align."""
     columns, rows = (math.ceil(length / resolution) for length in size)
     column, row = round(center.x / resolution) - columns // 2, round(center.y / resolution) - rows // 2
     return GridFrame((column * resolution, row * resolution), resolution, (rows, columns))
@@ -156,7 +154,7 @@ def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> 
 
 
 def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, fill: float) -> npt.NDArray[Cell]:
-    """Return a copy of the layer for another window of the same size; cells new in this window get the value `fill`."""
+    """Return a copy of the layer for another window of the same size. New cells get the value `fill`."""
     shifted = np.full(after.shape, fill, dtype=layer.dtype)
     steps = [round((after.origin[axis] - before.origin[axis]) / after.resolution) for axis in (1, 0)]
     remaining = [_remaining(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
@@ -166,13 +164,13 @@ def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, f
 
 
 def _remaining(step: int, cells: int) -> tuple[int, int]:
-    """Return the range (first, end) of the cells along an axis that remain in the window after a shift by `step`."""
+    """Return the range (first, end) of cells along an axis that remain in the window after a shift by `step` cells."""
     first = min(max(0, step), cells)
     return first, max(first, min(cells, cells + step))
 
 
 def clip_goal(frame: GridFrame, start: Pose2, goal: Pose2) -> Pose2:
-    """Return the goal; if it is outside the window, a point inside on the straight line from the start to the goal."""
+    """Return the goal. If it is outside the window, return a pose inside, on the line from start to goal."""
     if frame.covers(goal.x, goal.y):
         return goal
     across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution

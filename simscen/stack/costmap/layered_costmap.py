@@ -1,4 +1,4 @@
-"""Layered costmap: static map and live obstacles (those seen by sensors), inflated, and updated where cells changed."""
+"""Layered costmap: inflated obstacles of the static map and live obstacles, which sensors see."""
 
 import math
 from collections import deque
@@ -48,22 +48,20 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 DISTANCE_MARGIN_M = 0.5
-"""Distances are computed up to this far beyond the circumscribed radius, or up to the inflation radius if larger."""
+"""Distances to obstacles are computed up to the circumscribed radius plus this margin, or to the inflation radius."""
 SCANS_PER_UNKNOWN_UPDATE = 5
-"""Unknown cells are updated with every n-th scan: once per second at the default rate, like Nav2's global costmap. A
-map can have many unknown cells, and driving does not depend on them."""
+"""Unknown cells are updated with every n-th scan: once per second at the default rate."""
 MAX_REVISIONS = 16
 """Number of revisions for which the changed cells are stored."""
 
 
 class LayeredCostmap:
-    """Costs of the cells and their distances to the nearest obstacle, available as `view`.
+    """Costs of cells and distances to the nearest obstacle, available as `view`.
 
-    Distances to the static map are computed once. A scan changes few cells, and distances to live obstacles are only
-    recomputed around these. This works because distances are cut off (see DISTANCE_MARGIN_M).
+    Updates recompute only the surroundings of changed cells. The frame, map or odom, is that of the poses in `update`.
 
-    Without a map, the costmap is a window of `size` (x, y) in m that rolls with the robot, see `should_roll` for
-    `max_offset`. Its frame, map or odom, is that of the poses passed to `update`.
+    Without a map, the costmap is a window of `size` (x, y) in m that rolls with the robot. The window is moved when the
+    robot is farther than `max_offset` m from its center.
     """
 
     def __init__(
@@ -104,14 +102,14 @@ class LayeredCostmap:
 
     @property
     def publish_frequency(self) -> float:
-        """Maximum rate in Hz at which to publish the costmap; 0 = never."""
+        """Maximum rate in Hz at which to publish the costmap; 0 means never."""
         return self._spec.publish_frequency
 
     @property
     def view(self) -> CostmapView:
-        """The current costmap. Its arrays are shared with this object and valid until the next update.
+        """The current costmap. Its arrays are valid until the next update.
 
-        Costs and distances are computed here, once for all updates since the last access.
+        Access computes costs and distances, once for all updates since the last access.
         """
         if self._changed is not None:
             self.refresh(*self._changed)
@@ -128,7 +126,7 @@ class LayeredCostmap:
         return self._revision
 
     def changed_near(self, revision: int, points: Plane, distance: float) -> bool:
-        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision."""
+        """Return whether obstacles within `distance` m of `points` x + iy (n,) may have changed since a revision."""
         count = self._revision - revision
         if count > len(self._changes):
             return True
@@ -141,11 +139,11 @@ class LayeredCostmap:
 
     @property
     def obstacle_cells(self) -> int:
-        """Number of cells with live obstacles, plus the keepout cells that were added since the start."""
+        """Number of cells with live obstacles, plus the keepout cells added since the start."""
         return self._live.count + self._keepout_change
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
-        """Clear the cells that a sensor sees through, then mark its obstacles. `base`: robot pose of the reading."""
+        """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
         if self._rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
         self._latest_readings[reading.sensor] = (base, reading)
@@ -161,8 +159,8 @@ class LayeredCostmap:
     def clear(self, clear_within: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
 
-        Obstacles up to `unseen` m beyond the circumscribed radius that no lidar can see are kept, since they may still
-        be there and the robot may back up next. Otherwise like Nav2's ClearEntireCostmap and ClearCostmapAroundRobot.
+        Obstacles outside the field of view of all lidars are kept, up to `unseen` m beyond the circumscribed radius:
+        the robot may back up into them.
         """
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
@@ -190,7 +188,7 @@ class LayeredCostmap:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the pose is not in a mapped wall and the inscribed circle fits within `tolerance` m of it."""
+        """Return whether the pose is not in a mapped wall, and the inscribed circle fits within `tolerance` m of it."""
         center = self._frame.cell(pose.x, pose.y)
         if self._static_squared[center] == 0:
             return False
@@ -200,11 +198,11 @@ class LayeredCostmap:
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
     def goal_in_window(self, start: Pose2, goal: Pose2) -> Pose2:
-        """Return the goal, or a point toward it inside the rolling window if the goal is outside (see `clip_goal`)."""
+        """Return the goal; if it is outside a rolling window, a pose inside on the line from start to goal."""
         return clip_goal(self._frame, start, goal) if self._rolling else goal
 
     def _roll(self, base: Pose2) -> None:
-        """Move the window with the robot. New cells are unknown if unknown space is tracked."""
+        """Move the window so that the robot is at its center. New cells are unknown if unknown space is tracked."""
         before, window = self._frame, window_around(base, self._size, self._spec.resolution)
         if self._has_keepout:
             self._set_static_layer(self._static_layer_in(window))
@@ -243,9 +241,9 @@ class LayeredCostmap:
         self._has_walls = bool(layer.lethal.any())
 
     def _recompute(self, costs: Costs | None = None) -> None:
-        """Reset costs and distances to the static layer; live obstacles follow with the next view.
+        """Reset costs and distances to the static layer. The next `view` adds live obstacles.
 
-        `costs` are the costs of the static layer if they are already computed.
+        `costs` are the costs of the static layer; None to compute them.
         """
         if costs is None:
             costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks_unknown else None)
@@ -257,14 +255,14 @@ class LayeredCostmap:
             self._mark_changed(*self._frame.extent(marked))
 
     def _obstacles(self, window: Window) -> Mask:
-        """Return the live obstacles in a window, without noise if denoising is enabled."""
+        """Return which cells of a window are live obstacles, without small groups if the denoise layer is enabled."""
         marked = self._live.marked(window)
         if not self._min_group_size:
             return marked
         return remove_small_groups(marked, self._static_squared[window] == 0, self._spec.denoise_layer)
 
     def _update_unknown(self, base: Pose2, scan: Scan) -> None:
-        """Mark unknown cells that beams cross as known, with every n-th scan."""
+        """With every n-th scan, mark the unknown cells that beams cross as known."""
         self._scans += 1
         if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
@@ -286,7 +284,7 @@ class LayeredCostmap:
             self._mark_changed((top, left), (bottom, right))
 
     def _mark_changed(self, low: tuple[int, int], high: tuple[int, int], cells: CellIndices | None = None) -> None:
-        """Mark the cells from `low` to `high` as changed, as a new revision with `cells` (see `_add_revision`)."""
+        """Mark the window from cell `low` to `high` as changed, and add a revision with `cells`."""
         if self._changed is not None:
             before_low, before_high = self._changed
             low = min(low[0], before_low[0]), min(low[1], before_low[1])
@@ -295,12 +293,12 @@ class LayeredCostmap:
         self._add_revision(cells)
 
     def _add_revision(self, cells: CellIndices | None) -> None:
-        """Add a revision in which obstacles changed only in these cells, or possibly in any cell if None."""
+        """Add a revision in which obstacles changed in these cells; None means in any cell."""
         self._revision += 1
         self._changes.append(cells)
 
     def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
-        """Recompute distances and costs of all cells that the cells from `low` to `high` can affect."""
+        """Recompute distances and costs of all cells near the window from cell `low` to `high`."""
         self._changed = None
         if (low, high) == self._whole:
             self._refresh_all()
@@ -341,16 +339,16 @@ def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
 
 
 def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
-    """Compute and cache the costs of a map without keepout zones, before runs are forked."""
-    tables, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
-    _costs(grid, tables, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
+    """Compute and cache the costs of a map without keepout zones, before worker processes are forked."""
+    inflation, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
+    _costs(grid, inflation, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
 
 
 @cached_on_instance
-def _costs(grid: OccupancyGrid, tables: Inflation, threshold: int, margin: int, tracks_unknown: bool) -> Costs:
-    """Return the costs of a map without zones and live obstacles, computed once for all runs."""
+def _costs(grid: OccupancyGrid, inflation: Inflation, threshold: int, reach_cells: int, tracks_unknown: bool) -> Costs:
+    """Return the costs of a map without zones and live obstacles, cached for all runs."""
     unknown = layer_without_zones(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
-    return tables.costs(static_distances(grid, threshold, margin), unknown)
+    return inflation.costs(static_distances(grid, threshold, reach_cells), unknown)
 
 
 def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:

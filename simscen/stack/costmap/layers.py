@@ -1,7 +1,7 @@
 """Static layer (map and keepout zones) and inflation of a costmap, and the speed filter.
 
-Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost. The
-largest value, OUT_OF_REACH, stands for 256 cells (12.8 m at 5 cm) and more.
+Distances are stored as squared numbers of cells (uint16), with which lookup tables give the distance in m and the cost.
+The largest value, OUT_OF_REACH, stands for 256 cells and more.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ Costs = npt.NDArray[np.uint8]
 
 
 def squared_distances(lethal: npt.NDArray[np.bool_], reach_cells: int) -> Squared:
-    """Return the squared distance in cells of each cell to the nearest lethal cell, exact up to `reach_cells`."""
+    """Return the squared distance of each cell to the nearest lethal cell, exact up to `reach_cells` cells."""
     if not lethal.any():
         return np.full(lethal.shape, OUT_OF_REACH, dtype=np.uint16)
     if reach_cells <= MAX_REACH_CELLS:
@@ -48,15 +48,15 @@ def squared_distances(lethal: npt.NDArray[np.bool_], reach_cells: int) -> Square
 
 @lru_cache(maxsize=8)
 def shared_inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach_m: float) -> "Inflation":
-    """Return the cached lookup tables with these arguments of Inflation, for both costmaps and all runs of a robot."""
+    """Return the Inflation with these arguments, cached for all costmaps and runs."""
     return Inflation(resolution, inscribed, radius, scaling, reach_m)
 
 
 class Inflation:
     """Lookup tables by squared distance in cells: `meters` for the distance in m, `cost` for Nav2's inflated cost.
 
-    cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
-    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). `meters` is at most `reach_m`.
+    cost = 252 · exp(-scaling · (distance - inscribed)) between the inscribed and the inflation radius (computeCost in
+    nav2_costmap_2d/inflation_layer.hpp). `meters` is at most `reach_m`.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Inflation:
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
     def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
-        """Return the costs of cells with these distances. `unknown` cells stay unknown unless inscribed or lethal."""
+        """Return the costs of cells at squared distances. `unknown` cells are unknown unless inscribed or lethal."""
         cost = self.cost.take(squared)
         if unknown is not None:
             cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
@@ -97,10 +97,10 @@ def static_layer(
     mask: OccupancyGrid | None = None,
     track_unknown: bool = True,
 ) -> StaticLayer:
-    """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
+    """Return the static layer of a map. A rotated map is sampled into an unrotated frame of the same resolution.
 
-    Cells are lethal if their occupancy is at least `threshold` percent, or if `keepout` or the keepout `mask` covers
-    them. Without `track_unknown`, unknown cells are free, as in Nav2.
+    Cells are lethal if their occupancy is at least `threshold` percent, or if keepout polygons or the keepout `mask`
+    cover them. Without `track_unknown`, unknown cells are free.
     """
     if abs(grid.origin.yaw) < 1e-9:
         frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -114,23 +114,20 @@ def static_layer(
 
 @cached_on_instance
 def layer_without_zones(grid: OccupancyGrid, threshold: int, track_unknown: bool) -> StaticLayer:
-    """Return the layer of a map without zones. Cached for all runs; copy the result before you modify it."""
+    """Return the static layer of a map without keepout zones. The result is cached: do not modify it."""
     return static_layer(grid, threshold, (), track_unknown=track_unknown)
 
 
 @cached_on_instance
 def static_distances(grid: OccupancyGrid, threshold: int, reach_cells: int) -> Squared:
-    """Return the squared distances in a layer without zones. Cached for all runs; do not modify the result."""
+    """Return squared distances to lethal cells of a map without zones. The result is cached: do not modify it."""
     return squared_distances(layer_without_zones(grid, threshold, True).lethal, reach_cells)
 
 
 def empty_layer(
     frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, track_unknown: bool = False
 ) -> StaticLayer:
-    """Return the static layer without a map: only `keepout` and the keepout `mask` are lethal.
-
-    All other cells are unknown with `track_unknown`, otherwise free.
-    """
+    """Return the static layer without a map: keepout cells are lethal, all others unknown or free."""
     return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, track_unknown))
 
 
@@ -160,10 +157,10 @@ def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
 
 
 class SpeedFilter:
-    """Speed limit at a position, from the current speed zones and speed mask."""
+    """Speed limits of the current speed zones and speed mask."""
 
     def __init__(self, surroundings: Surroundings) -> None:
-        """Take the initial zones and the initial mask."""
+        """Take the initial speed zones and speed mask."""
         self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
         self.is_used = bool(self._zones) or self._mask is not None
         """Whether there is or was a zone or a mask."""
@@ -173,7 +170,7 @@ class SpeedFilter:
         self._zones, self._mask, self.is_used = zones.speed, zones.masks.speed, True
 
     def limit(self, pose: Pose2, full_speed: float) -> float | None:
-        """Return the lowest limit in m/s at a pose; None without a limit. Masks can be relative to `full_speed`."""
+        """Return the lowest limit in m/s at a pose; None without a limit. Masks can be percentages of `full_speed`."""
         limits = [limit for polygon, limit in self._zones if distance_to_polygon(pose, polygon) == 0.0]
         masked = self._mask.at(pose, full_speed) if self._mask is not None else None
         return min(limits if masked is None else [*limits, masked], default=None)

@@ -1,7 +1,6 @@
-"""Obstacle layer: cells marked and cleared by lidars and depth cameras (nav2_costmap_2d), without loops over beams.
+"""Obstacle layer: cells that lidars and depth cameras mark and clear, as in nav2_costmap_2d.
 
-Nav2 traces every beam through the grid. Here, only marked cells are checked for beams that cross them, which has the
-same result with a hundredth of the cells.
+Nav2 traces each beam through the grid. Here, each marked cell is checked for a beam that crosses it, which is faster.
 """
 
 import cmath
@@ -22,18 +21,21 @@ from simscen.stack.costmap.layers import Mask, Squared
 from simscen.stack.localizers.beams import Plane, directions
 
 RANGE_TOLERANCE_M = 1e-9
-"""Rounding margin at the end of the free part of a beam, within which the quick test does not count."""
+"""Rounding error allowed for ranges."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScanWithMovingHits(Scan):
-    """Scan with a mask `moving` (n,) of beams that hit moving obstacles. Such beams clear cells but do not mark any."""
+    """Scan with a mask `moving` (n,) of beams that hit moving obstacles. These beams clear cells, but mark no cells."""
 
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
 def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
-    """Return the hits x + iy (n,) on static obstacles `nearest` to `farthest` m away, and the position of the lidar."""
+    """Return the hits x + iy (n,) on static obstacles between `nearest` and `farthest` m, and the lidar's position.
+
+    `base` is the pose of the robot.
+    """
     lidar = _lidar_position(scan, base)
     points: Plane = _hit_offsets(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
     points += lidar
@@ -42,7 +44,7 @@ def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tupl
 
 @lru_cache(maxsize=2)
 def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> Plane:
-    """Return the hits x + iy (n,) relative to the lidar, in the orientation of the base. Cached for both costmaps."""
+    """Return the hits x + iy (n,) relative to the position of the lidar, along the axes of the base. Cached."""
     ranges = scan.ranges
     is_valid = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanWithMovingHits):
@@ -53,15 +55,15 @@ def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> Plane:
 
 
 def _lidar_position(scan: Scan, base: Pose2) -> complex:
-    """Return the position of the lidar, x + iy, in the frame of the pose `base`."""
+    """Return the position of the lidar, x + iy, in the same frame as the pose `base`."""
     return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
 @lru_cache(maxsize=4)
 def _free_lengths(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
-    """Return the length in m of the free part of each beam (n,): up to its hit, at most `farthest`.
+    """Return for each beam (n,) the length in m up to its hit, at most `farthest`; 0 if the range is invalid.
 
-    It is 0 for invalid and too short ranges. Without `inf_is_valid`, it is also 0 for beams without a hit.
+    With `inf_is_valid`, beams without a hit are valid.
     """
     ranges = scan.ranges
     lengths = np.where(ranges > scan.range_max, np.inf if inf_is_valid else 0.0, ranges)
@@ -80,11 +82,10 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 def crossed_cells(
     points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[CellIndices, float]:
-    """Return which of the cells with centers x + iy (n,) a beam crosses before its hit, as indices into `points`.
+    """Return the indices of the cells, with centers `points` x + iy (n,), that beams cross before their hits.
 
-    Also return the distance in m of the nearest center from the lidar. At least one cell is required. Each cell is
-    tested only against the beam nearest to its center: if any beam crosses the cell, this one does. A line crosses a
-    square of half-width h if its distance from the center is at most h (|cos| + |sin|).
+    Also return the distance in m from the lidar to the nearest center. `points` must not be empty. Each cell is tested
+    only against the beam nearest to its center.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
     relative = points - _lidar_position(scan, base)
@@ -104,6 +105,7 @@ def crossed_cells(
         return in_front, nearest
     beam_offset = np.remainder(bearing[in_front] - beam[in_front] * step + math.pi, 2 * math.pi) - math.pi
     direction = first + bearing[in_front] - beam_offset
+    # A line crosses a square of half-width h if its distance from the center is at most h (|cos| + |sin|).
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(beam_offset)
     passed = (
@@ -115,9 +117,9 @@ def crossed_cells(
 
 
 def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndices, Array]:
-    """Return the indices of the beams nearest to directions (n,) relative to the first beam, and their `values`.
+    """Return the indices (n,) of the beams nearest to these bearings (n,), and the `values` (n,) of these beams.
 
-    The value is nan for directions outside the field of view.
+    Bearings are relative to the first beam. The value is nan for bearings outside the field of view.
     """
     step, count = scan.angle_increment, len(values)
     beams_per_turn = round(2 * math.pi / abs(step))
@@ -132,7 +134,7 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
 
 
 MAX_WALL_SQUARED_CELLS = 2
-"""Hits within one cell of a mapped wall (squared distance 2) are hits of the wall itself and are not marked."""
+"""Squared distance from a mapped wall up to which a hit is on the wall itself and is not marked."""
 NO_CELLS: CellIndices = np.zeros(0, dtype=np.int64)
 EMPTY_MASK: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
@@ -141,7 +143,7 @@ WHOLE_GRID: Window = slice(None), slice(None)
 
 
 class ObstacleLayer:
-    """Cells marked as live obstacles. Lidars and depth cameras do not clear each other's marks."""
+    """Cells marked as obstacles. Lidars do not clear marks of depth cameras, nor depth cameras those of lidars."""
 
     def __init__(self, spec: CostmapSpec, inscribed: float, frame: GridFrame) -> None:
         self._spec, self._inscribed = spec, inscribed
@@ -167,9 +169,9 @@ class ObstacleLayer:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
-        """Return the cells (n, 2) within `meters` along x and y that a lidar marked but that no scan has in view.
+        """Return cells (n, 2) within `meters` along x and y that a lidar has marked, outside the view of all `scans`.
 
-        `scans` contains (pose of the robot, scan).
+        `scans` contains pairs (pose of the robot, scan).
         """
         center = self._frame.cell(base.x, base.y)
         window = self._frame.window(center, center, math.ceil(meters / self._frame.resolution))
@@ -179,7 +181,7 @@ class ObstacleLayer:
         return cells
 
     def mark(self, cells: Cells) -> None:
-        """Mark cells as obstacles seen by a lidar."""
+        """Mark cells (n, 2) as obstacles seen by a lidar."""
         _set(self._scanned, cells, True)
         self._marked = np.flatnonzero(self._scanned)
 
@@ -201,7 +203,7 @@ class ObstacleLayer:
 
     @property
     def cells(self) -> CellIndices:
-        """Flat indices of the cells with a live obstacle; cells that two beams hit at once occur twice."""
+        """Flat indices of the cells with a live obstacle. A cell may occur twice."""
         return self._marked if self._heights is None else np.flatnonzero(self.marked())
 
     @property
@@ -212,7 +214,7 @@ class ObstacleLayer:
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> CellIndices:
         """Clear the cells that beams cross, then mark the hits of the beams. Return the changed cells.
 
-        `walls` (rows, columns) are the squared distances in cells to mapped walls; None if there are no walls.
+        `walls` (rows, columns) are the squared distances to mapped walls; None without walls.
         """
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
         points, lidar = hit_points(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
@@ -229,7 +231,7 @@ class ObstacleLayer:
         return np.concatenate((cleared, new)) if len(cleared) else new
 
     def _without_walls(self, walls: Squared | None, cells: CellIndices) -> CellIndices:
-        """Return the cells that are not next to a wall."""
+        """Return the cells that are not on or next to a wall."""
         if walls is None:
             return cells
         if walls is not self._walls:
@@ -275,13 +277,13 @@ class ObstacleLayer:
         return np.concatenate((marked[is_cleared], cells))
 
     def window_around_robot(self, base: Pose2, mount: float) -> Window:
-        """Return the cells in range of a sensor that is mounted `mount` m away from the origin of the base."""
+        """Return the cells in range of a sensor that is mounted at a distance of `mount` m from the base."""
         center = self._frame.cell(base.x, base.y)
         reach = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
         return self._frame.window(center, center, math.ceil(reach / self._frame.resolution) + 1)
 
     def _under_robot(self, points: Array, base: Pose2) -> Mask:
-        """Return which points (n, 2) are in the inscribed circle (as Nav2's footprint_clearing_enabled)."""
+        """Return which points (n, 2) are in the inscribed circle of the robot."""
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
 
 
@@ -296,7 +298,7 @@ def _set(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:
 def remove_small_groups(marked: Mask, walls: Mask, spec: DenoiseLayer) -> Mask:
     """Return the marked cells (rows, columns) without connected groups smaller than `minimal_group_size`.
 
-    Cells of walls count as members of a group, but are not returned.
+    Cells of walls count toward the size of a group, but are not returned.
     """
     from scipy.ndimage import label
 

@@ -1,1 +1,1 @@
-"""A dynamic-window controller with the critics of nav2_dwb_controller."""
+"""DWB, a dynamic-window controller with the critics of nav2_dwb_controller."""

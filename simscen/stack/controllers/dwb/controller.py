@@ -23,8 +23,7 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 PLAN_LENGTH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
-"""The critics see the next part of the plan: 1.2 times the distance that the robot drives in `sim_time`, plus 0.5 m. A
-shorter part would slow the robot down, a longer one would lead it straight into a wall after a bend."""
+"""Length of the plan that the critics get: 1.2 times the distance that the robot drives in `sim_time`, plus 0.5 m."""
 
 
 class DynamicWindowController(PathFollower):
@@ -46,19 +45,19 @@ class DynamicWindowController(PathFollower):
         )
         self._best: Array | None = None
 
-    def begin(self) -> None:
-        """Reset the critics for a path to another goal."""
+    def reset_for_goal(self) -> None:
+        """Reset goal rotation and critics for another goal."""
         self._goal_rotation.reset()
         self._rotate_to_goal.reset()
         self._oscillation.reset()
 
     @property
     def local_plan(self) -> Path | None:
-        """The trajectory with the best score."""
+        """The trajectory with the best score; None before the first command."""
         return None if self._best is None else Path(self._best)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL if every trajectory collides or is not allowed."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if critics reject all trajectories."""
         tracker = self._locate(pose)
         is_reached = self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining())
         if is_reached and self._robot.turning_radius > 0.0:

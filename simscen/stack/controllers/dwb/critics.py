@@ -1,8 +1,7 @@
 """Critics of DWB, which score and reject trajectories (dwb_critics). Lower scores are better.
 
-Raw scores are in cells, costs, rad, or rad/s and are multiplied by the scale of the critic. As in Nav2, the scales of
-critics that count cells are also multiplied by half the resolution. Nav2's MapGridCritic propagates Manhattan distances
-from cell to cell, through obstacles too; here, they are computed in closed form.
+Raw scores are in cells, costs, rad, or rad/s. They are multiplied by the scale of the critic. As in Nav2, the scales of
+critics that count cells are also multiplied by half the resolution.
 """
 
 import math
@@ -25,12 +24,12 @@ Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
 BATCH_TRAJECTORIES = 50
-"""Number of trajectories that are checked for collisions at once. Usually, one of the first is free."""
+"""Number of trajectories that are checked for collisions at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of n trajectories: raw scores (n,) and scale of each critic by Nav2's name; `legal` (n,): not rejected."""
+    """Raw scores (n,) of n trajectories and scale, by the critic's name in Nav2. `legal` (n,): not rejected."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -48,9 +47,9 @@ class Scores:
 def score_trajectories(
     spec: DwbSpec, costmap: CostmapView, pose: Pose2, goal: Pose2, plan: Array, velocities: Array, ends: Array
 ) -> Scores:
-    """Return the scores of trajectories with these velocities (n, 3) and final poses (n, 3).
+    """Return the scores of trajectories with these velocities (n, 3) and final poses `ends` (n, 3).
 
-    `pose` is that of the robot. The plan (m, 2) must have a point. A trajectory is legal if it ends on the costmap.
+    `pose` is that of the robot. `plan` (m, 2) is not empty. Trajectories that end outside the costmap are rejected.
     """
     forward_distance = spec.forward_point_distance
     forward = ends[:, :2] + forward_distance * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
@@ -82,7 +81,7 @@ def score_trajectories(
 
 
 def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Array:
-    """Return the plan with its last point moved by `distance` m, in the direction from the robot to the goal."""
+    """Return the plan (m, 2) with its last point moved by `distance` m in the direction from the robot to the goal."""
     angle = np.arctan2(goal.y - pose.y, goal.x - pose.x)
     extended = plan.copy()
     extended[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
@@ -90,14 +89,14 @@ def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) 
 
 
 def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
-    """Return the cells (n, 2), as (row, column), at points (n, 2), and which of them are on the costmap."""
+    """Return the cells (n, 2) as (row, column) at points (n, 2), and which of them are on the costmap."""
     cells = np.floor((points[:, ::-1] - np.array(costmap.origin)[::-1]) / costmap.resolution).astype(np.int64)
     on_map: Mask = np.asarray(((cells >= 0) & (cells < np.array(costmap.costs.shape))).all(axis=1))
     return cells, on_map
 
 
 def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
-    """Return the cells (m, 2) of the first part of the plan (n, 2) that lies on known cells of the costmap."""
+    """Return the cells (m, 2) of the first part of the plan (n, 2) on known cells of the costmap."""
     cells, on_map = cells_of(costmap, plan)
     known = on_map.copy()
     known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != NO_INFORMATION
@@ -109,7 +108,10 @@ def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
 
 
 def manhattan_distances(cells: Cells, sources: Cells) -> Array:
-    """Return the Manhattan distance (n,) in cells from cells (n, 2) to the nearest source (m, 2); 0 without sources."""
+    """Return Manhattan distances (n,) in cells from cells (n, 2) to the nearest source (m, 2); 0 without sources.
+
+    Nav2's MapGridCritic propagates the same distances from cell to cell.
+    """
     if not len(sources):
         return np.zeros(len(cells))
     distances = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
@@ -117,7 +119,7 @@ def manhattan_distances(cells: Cells, sources: Cells) -> Array:
 
 
 class RotateToGoalCritic:
-    """Requires the robot to slow down at the goal and then to rotate in place. Scores the error of the heading."""
+    """Scores the heading error at the goal. Rejects velocities at which the robot does not slow down, then stop."""
 
     def __init__(self, stopped_velocity: float, slowing_factor: float) -> None:
         """Take Nav2's trans_stopped_velocity in m/s and slowing_factor."""
@@ -125,7 +127,7 @@ class RotateToGoalCritic:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the state of the previous goal."""
+        """Prepare for a new goal."""
         self._is_rotating = False
 
     def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
@@ -143,19 +145,19 @@ class RotateToGoalCritic:
 
 
 class ObstacleCritic:
-    """Selects a trajectory without a collision, also with moving obstacles (dwb_critics' ObstacleFootprint)."""
+    """Selects a trajectory free of collisions with static and moving obstacles (dwb_critics' ObstacleFootprint)."""
 
     def __init__(self, footprint: Footprint, preferred_clearance: float) -> None:
-        """Take the footprint, and the clearance in m below which a trajectory is only taken if no other has more."""
+        """Take the footprint, and the clearance in m that trajectories should have if possible."""
         self._footprint, self._preferred_clearance = footprint, preferred_clearance
 
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """Return the index of the first trajectory, in this `order` (k,) of indices, with the preferred clearance.
+        """Return the index of the best trajectory; None if there is none. `order` (k,) are indices, the best first.
 
-        If there is none, return the first free one; in a collision, the first that leads out of it; else None. If there
-        are moving obstacles, trajectories that meet none come first, then those that meet one as late as possible.
+        It is the first trajectory with the preferred clearance, or else the first free one. If the robot is in
+        collision, it is the first that leads out. Trajectories that meet a moving obstacle early come last.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
@@ -178,7 +180,7 @@ class ObstacleCritic:
         return int(order[int(free.argmax())]) if free.any() else None
 
     def _meeting_times(self, moving: MovingObstacles, trajectories: Trajectories, order: npt.NDArray[np.intp]) -> Array:
-        """Return the times (k,) in s at which the k trajectories come too close to a moving obstacle, or inf."""
+        """Return the times (k,) in s at which the trajectories in `order` meet a moving obstacle, or inf."""
         times = trajectories.times[:, trajectories.yaw_index[order]]
         gaps = self._footprint.gap(moving, trajectories.poses(order), times, UNCERTAINTY_SIGMAS)
         too_close = (gaps < self._preferred_clearance) & (gaps < gaps[0] - APPROACH_TOLERANCE_M)
@@ -186,7 +188,7 @@ class ObstacleCritic:
 
 
 class DirectionHistory:
-    """Last direction of one velocity component, and the direction that is allowed since the last reversal."""
+    """Last direction of one velocity component, and its allowed direction since the last reversal."""
 
     def __init__(self) -> None:
         self.reset()
@@ -198,7 +200,7 @@ class DirectionHistory:
         """1 or -1 if only this sign is allowed; 0 if both are."""
 
     def update(self, velocity: float) -> bool:
-        """Record a commanded velocity; return whether it reverses the direction."""
+        """Record a commanded velocity. Return whether it reverses the direction."""
         if velocity == 0.0:
             return False
         sign = math.copysign(1.0, velocity)
@@ -210,7 +212,7 @@ class DirectionHistory:
 
 
 class OscillationCritic:
-    """Forbids a second reversal of the direction until the robot has moved or rotated far enough."""
+    """Rejects a second reversal of the direction until the robot has moved or rotated far enough."""
 
     def __init__(self, reset_distance: float, reset_angle: float, x_only_threshold: float) -> None:
         """Take Nav2's oscillation_reset_dist (m), oscillation_reset_angle (rad), and x_only_threshold (m/s)."""
@@ -220,7 +222,7 @@ class OscillationCritic:
         self._reversed_at = Pose2(0.0, 0.0)
 
     def reset(self) -> None:
-        """Forget the directions of the previous path."""
+        """Allow all directions."""
         for direction in self._directions:
             direction.reset()
 
@@ -232,7 +234,7 @@ class OscillationCritic:
         return legal
 
     def record(self, pose: Pose2, command: Twist) -> None:
-        """Record the command given at this pose. Lateral and angular reversals only count at low forward speed."""
+        """Record the command at this pose. Reversals of vy and wz count only if vx is at most x_only_threshold."""
         x, y, theta = self._directions
         has_reversed = x.update(command.vx)
         if abs(command.vx) <= self._x_only_threshold:

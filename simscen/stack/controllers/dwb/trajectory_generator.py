@@ -1,7 +1,4 @@
-"""Trajectory generator of DWB: sampled velocities and their trajectories.
-
-Corresponds to the kinematic parameters, XYThetaIterator and StandardTrajectoryGenerator of dwb_plugins.
-"""
+"""Trajectory generator of DWB (StandardTrajectoryGenerator of dwb_plugins): samples velocities and predicts poses."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,25 +13,25 @@ from simscen.stack.kinematics import VelocityLimits, accumulate_rows, velocity_l
 from simscen.stack.protocols import RobotModel
 
 SAME_VELOCITY_M_S = 1e-5
-"""Nav2's EPSILON: if the range of velocities is smaller, only one velocity is sampled."""
+"""Width of a velocity range below which only one velocity is sampled (EPSILON in Nav2)."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
 """Rounding error allowed for squared speeds."""
 
 
 @dataclass(frozen=True)
 class KinematicParameters(VelocityLimits):
-    """Velocity limits of each axis, the speed limits in m/s in any direction, and the minimum turn rate in rad/s."""
+    """Velocity limits of each axis, limits of the speed in any direction in m/s, and minimum turn rate in rad/s."""
 
     min_speed_xy: float
     max_speed_xy: float
     min_speed_theta: float
 
     def scaled(self, ratio: float) -> "KinematicParameters":
-        """Return limits with velocities multiplied by `ratio`. Unlike in Nav2, the reverse speed is scaled, too."""
+        """Return limits with velocities, also backward, multiplied by `ratio`; unchanged if that is at least 1."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
-        """Return those of the velocities (n, 3) that are within the limits, except for standing still."""
+        """Return the velocities (m, 3) out of `velocities` (n, 3) that are within the limits and not zero."""
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
         turn_rate = np.abs(velocities[:, 2])
         is_slow = (squared_speed + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
@@ -48,7 +45,7 @@ class KinematicParameters(VelocityLimits):
 
 
 def kinematic_parameters(spec: DwbSpec, robot: RobotModel, full_speed: float) -> KinematicParameters:
-    """Return the limits of the specification, bounded by those of the robot. `full_speed` in m/s limits vx."""
+    """Return the limits of the specification, bounded by those of the robot. `full_speed` is the maximum vx in m/s."""
     lateral = full_speed if spec.max_vel_y is None else spec.max_vel_y
     limits = velocity_limits(
         robot,
@@ -66,7 +63,10 @@ def kinematic_parameters(spec: DwbSpec, robot: RobotModel, full_speed: float) ->
 
 
 def project_velocity(now: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
-    """Return the velocity after `seconds` on the way from `now` to `target`; `deceleration` is negative."""
+    """Return the velocity `seconds` after the base starts to change it from `now` to `target`.
+
+    `deceleration` is negative.
+    """
     if now < target:
         return min(target, now + acceleration * seconds)
     return max(target, now + deceleration * seconds)
@@ -75,7 +75,7 @@ def project_velocity(now: float, acceleration: float, deceleration: float, secon
 def velocity_samples(
     now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """Return `count` velocities that can be reached within `seconds`, and 0 if it lies between two of them."""
+    """Return `count` velocities of one axis that can be reached within `seconds`, and 0 if it is between two."""
     now = min(max(now, low), high)
     highest = project_velocity(now, acceleration, deceleration, seconds, high)
     lowest = project_velocity(now, acceleration, deceleration, seconds, low)
@@ -93,7 +93,7 @@ def velocity_samples(
 
 
 def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
-    """Return velocities (n, 3) that can be reached within `seconds`, in order of vx. `counts`: samples of each axis."""
+    """Return velocities (n, 3) that can be reached within `seconds`. `counts` are the numbers of samples per axis."""
     axes = [
         velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
         for velocity, low, high, acceleration, deceleration, count in zip(
@@ -107,8 +107,7 @@ def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, cou
 class Trajectories:
     """Positions `x` and `y` (steps, n) of n trajectories, and headings `yaw` (steps, m) at `times` in s (steps, m).
 
-    Many trajectories have the same headings, which are stored once to save sines: `yaw_index` (n,) is the column of
-    each trajectory in `yaw` and `times`.
+    Trajectories can share headings: `yaw_index` (n,) is the column of each trajectory in `yaw` and `times`.
     """
 
     x: Array
@@ -133,9 +132,9 @@ class Trajectories:
 def generate_trajectories(
     pose: Pose2, now: Twist, velocities: Array, limits: KinematicParameters, seconds: float, length: float, angle: float
 ) -> Trajectories:
-    """Return the trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
+    """Return trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
 
-    No step is longer than `length` m or turns by more than `angle` rad. Trajectories with fewer steps are padded with
+    A step is at most `length` m long and turns by at most `angle` rad. Trajectories with fewer steps are padded with
     their final pose. The heading is constant within a step.
     """
     distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / length
@@ -161,7 +160,7 @@ def generate_trajectories(
 
 
 def _ramp(target: Array, start: float, acceleration: float, deceleration: float, times: Array) -> Array:
-    """Return the velocities (steps, n) at `times` (steps, n) in s on the way from `start` to the targets (n,)."""
+    """Return the velocities (steps, n) at `times` (steps, n) in s while they change from `start` to `target` (n,)."""
     velocities = times * np.where(start < target, acceleration, deceleration)
     velocities += start
     np.maximum(velocities, np.minimum(start, target), out=velocities)
@@ -169,7 +168,7 @@ def _ramp(target: Array, start: float, acceleration: float, deceleration: float,
 
 
 def _accumulate(start: float, steps: Array) -> Array:
-    """Return `start` and the values (m + 1, n) after each of the steps (m, n)."""
+    """Return the cumulative sums (m + 1, n) of steps (m, n), beginning with `start`."""
     values = np.empty((len(steps) + 1, steps.shape[1]))
     values[0], values[1:] = 0.0, steps
     accumulate_rows(values[1:])

@@ -1,7 +1,7 @@
 """Model predictive path integral control (Williams et al. 2017), as in nav2_mppi_controller.
 
-A control sequence is an array (axes, steps) of velocities. Many noisy copies (samples) of the previous sequence are
-simulated and scored. The new sequence is their average, weighted by exp(-cost / temperature).
+A control sequence is an array (axes, steps) of velocities. Each axis is vx, wz, or vy. Noisy copies (samples) of the
+previous sequence are simulated and scored. The new sequence is their average, weighted by exp(-cost / temperature).
 """
 
 import math
@@ -40,9 +40,9 @@ SMOOTHING_KERNELS = {
 }
 """Savitzky-Golay filters of nine points by the order of their polynomial (Savitzky and Golay 1964)."""
 MIN_SMOOTHED_STEPS = 21
-"""Minimum number of steps of a sequence that is smoothed."""
+"""Shorter control sequences are not smoothed."""
 PAST_COMMANDS = 4
-"""Number of previous commands that the filter includes: half of its points."""
+"""Number of previous commands that a filter of nine points needs before the first step."""
 
 
 def sample_weights(
@@ -50,8 +50,8 @@ def sample_weights(
 ) -> Floats:
     """Return the weights (n,) of samples with these costs (n,), proportional to exp(-cost / temperature).
 
-    `gamma` weights the control cost: the product of the sequence and the `noise` (axes, steps, n) that was added to it,
-    divided by the variance of the noise. `deviations` are the standard deviations of the noise of each axis.
+    `noise` (axes, steps, n) was added to the sequence, and `deviations` are its standard deviations by axis. `gamma`
+    weights the control cost: the product of sequence and noise, divided by the variance of the noise.
     """
     total = costs.copy()
     for axis, deviation in enumerate(deviations):
@@ -62,9 +62,9 @@ def sample_weights(
 
 
 def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
-    """Return the sequence, filtered except for its last step; `past` (axes, 4) are the commands before it.
+    """Return the sequence, smoothed except for its last step. `past` (axes, 4) are the commands before the sequence.
 
-    `order` selects the kernel.
+    `order` is a key of SMOOTHING_KERNELS.
     """
     if sequence.shape[1] < MIN_SMOOTHED_STEPS:
         return sequence
@@ -76,9 +76,9 @@ def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
 
 
 def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the sequence limited to what the base can drive, after the current velocity `now` (axes,) as first step.
+    """Return the sequence within the velocity and acceleration limits. Its first step is the velocity `now` (axes,).
 
-    `sequence` is modified. `dt` is the time step in s.
+    Modifies `sequence`. `dt` is the time step in s.
     """
     low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
     increase = (axis_order(limits.acceleration) * dt).tolist()
@@ -96,7 +96,7 @@ def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: floa
 def _limit_axis(
     requested: list[float], now: float, bounds: tuple[float, float], changes: tuple[float, float]
 ) -> list[float]:
-    """Return the velocities of one axis, limited to `bounds` (low, high) and by `changes` per step (up, down)."""
+    """Return the velocities of one axis within `bounds` (low, high), with limited `changes` per step (up, down)."""
     (low, high), (up, down) = bounds, changes
     limited, last = [now], now
     for velocity in requested[1:]:
@@ -115,20 +115,19 @@ def _limit_curvature(sequence: Floats, limits: VelocityLimits) -> None:
 
 
 def shift_sequence(sequence: Floats, steps: float) -> Floats:
-    """Return the sequence without its first `steps` (also fractions of steps), with its last value repeated."""
+    """Return the sequence, advanced by `steps` with linear interpolation. The last value is repeated."""
     index = np.arange(sequence.shape[1], dtype=np.float64)
     return np.stack([np.interp(index + steps, index, row) for row in sequence]).astype(np.float32)
 
 
 PLAN_MARGIN_M = 1.0
-"""Length of path beyond the reach of the rollouts that PathFollowCritic and PathAngleCritic need."""
+"""Length of path that the critics get beyond the reach of the rollouts."""
 SPEED_STD_RATIO = 0.5
-"""Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
-would drive at about 0.5 m/s even if its maximum speed is higher."""
+"""Default standard deviation of the sampled speeds, relative to the maximum speed."""
 
 
 class MppiController(PathFollower):
-    """Keeps a control sequence and optimizes it in each control period."""
+    """Controller that optimizes a control sequence in each control period, starting from the previous sequence."""
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
@@ -168,8 +167,8 @@ class MppiController(PathFollower):
         shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
         self._noise = self._rng.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
-    def begin(self) -> None:
-        """Reset the goal rotation for another goal. The control sequence stays as the initial guess."""
+    def reset_for_goal(self) -> None:
+        """Reset the goal rotation for another goal. The control sequence stays unchanged."""
         self._goal_rotation.reset()
 
     @property
@@ -178,11 +177,11 @@ class MppiController(PathFollower):
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory of the optimized control sequence."""
+        """Trajectory of the optimized control sequence; None before the first command."""
         return None if self._optimal is None else Path(self._poses(self._optimal))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL if all rollouts, or their average, collide."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if all samples, or their average, collide."""
         tracker, self._pose = self._locate(pose), pose
         if self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining()):
             self._reset()
@@ -201,7 +200,10 @@ class MppiController(PathFollower):
         )  # fmt: skip
 
     def _optimize(self, twist: Twist, critic_data: Callable[[Rollouts], CriticData]) -> Twist:
-        """Optimize the sequence, and return its first command. If it collides, reset the sequence and retry."""
+        """Optimize the sequence, and return its first command. If it collides, reset the sequence and retry.
+
+        `critic_data` returns the input of the critics for rollouts.
+        """
         for _ in range(1 + self._spec.retry_attempt_limit):
             velocity = self._initial_velocity(twist)
             is_free = False
@@ -215,10 +217,10 @@ class MppiController(PathFollower):
         raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "every trajectory of the optimizer collides")
 
     def _initial_velocity(self, twist: Twist) -> Floats:
-        """Return the velocity (axes,) from which the new command starts.
+        """Return the velocity (axes,) at the start of the new sequence.
 
-        In open loop, this is the last command. Otherwise, it is the velocity nearest to the last command that the base
-        can reach within one period from its measured velocity.
+        With `open_loop`, it is the last command. Otherwise, it is the velocity nearest to the last command that the
+        base can reach within one period from its measured velocity.
         """
         sent, limits = self._sent[:, -1].astype(np.float64), self._limits
         if self._spec.open_loop:
@@ -230,7 +232,7 @@ class MppiController(PathFollower):
         return reachable.astype(np.float32)
 
     def _iterate(self, velocity: Floats, critic_data: Callable[[Rollouts], CriticData]) -> bool:
-        """Replace the sequence by the weighted average of its noisy copies. Return whether any copy is free."""
+        """Replace the sequence by the weighted average of its noisy copies. Return False if all copies collide."""
         spec, limits, dt = self._spec, self._limits, self._spec.model_dt
         self._sequence[:, 0] = velocity
         if spec.regenerate_noises:
@@ -248,7 +250,7 @@ class MppiController(PathFollower):
         return not all_collide
 
     def _is_valid(self, data: CriticData) -> bool:
-        """Return whether the optimal trajectory is free (nav2_mppi_controller's DefaultOptimalTrajectoryValidator)."""
+        """Return whether the optimal trajectory does not collide (Nav2's DefaultOptimalTrajectoryValidator)."""
         spec, optimal = self._spec.TrajectoryValidator, data.rollouts
         steps = min(round(spec.collision_lookahead_time / data.dt), len(optimal.x))
         if steps == 0:

@@ -19,17 +19,17 @@ from simscen.stack.protocols import CostmapView
 Mask = npt.NDArray[np.bool_]
 
 MOVING_CLEARANCE_M = 0.25
-"""Clearance that rollouts should keep from moving obstacles, plus one standard deviation of their position."""
+"""Clearance that rollouts should keep from moving obstacles, plus one standard deviation of the predicted position."""
 COLLISION_DECAY_S = 1.2
-"""Time after which a predicted collision with a moving obstacle weighs less by a factor of e."""
+"""Time constant of the exponential decay of the weight of predicted collisions with moving obstacles."""
 ESCAPE_TOLERANCE_M = 0.01
 """Distance by which a robot that is already in collision may come closer to the obstacle."""
 
 
 class CellLookup(NamedTuple):
-    """Points (…,) in the frame of the rollouts, with the flat index of the costmap cell at each point.
+    """Points x and y (…,) in the frame of the rollouts, with the flat index of the costmap cell at each point.
 
-    `on_map` marks the points that are on the costmap; None if all of them are.
+    `on_map` marks the points that are on the costmap; None if all points are.
     """
 
     x: Floats
@@ -42,9 +42,9 @@ class CellLookup(NamedTuple):
 class CriticData:
     """Input of the critics for n rollouts.
 
-    `plan`, `pose` (of the robot), and `goal_yaw` are in the frame of the costmap; rollouts and `path` are relative to
-    the position of the robot, without rotation. `dt` is the time step of the rollouts in s, `tolerance` the position
-    tolerance of the goal in m.
+    `plan`, `pose` (of the robot), and `goal_yaw` are in the frame of the costmap. `rollouts` and `path` are relative to
+    the position of the robot, without rotation: the frame of the rollouts. `dt` is the time step in s, `tolerance` the
+    position tolerance of the goal in m.
     """
 
     rollouts: Rollouts
@@ -59,15 +59,14 @@ class CriticData:
 
     @cached_property
     def path(self) -> tuple[Floats, Floats, Floats]:
-        """x, y, yaw (m,) of the plan in the frame of the rollouts."""
+        """x, y, and yaw, each (m,), of the plan in the frame of the rollouts."""
         return self.plan.relative_to(self.pose)
 
     @cached_property
     def furthest_point(self) -> int:
-        """Index of the furthest point of the plan that any rollout reaches (nav2's findPathFurthestReachedPoint).
+        """Index of the furthest point of the plan that any rollout reaches (Nav2's findPathFurthestReachedPoint).
 
-        A rollout reaches the point that is nearest to its end. Unlike in Nav2, points farther along the plan than the
-        length of the rollout do not count.
+        A rollout reaches the point nearest to its end, but not farther along the plan than the rollout is long.
         """
         x, y, _ = self.path
         length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
@@ -106,9 +105,9 @@ class CriticData:
 
     @cached_property
     def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
-        """For each rollout (n,): mean squared nearness to moving obstacles, and weight of its first contact (or 0).
+        """For each rollout (n,): mean squared nearness to moving obstacles, and weight of the first contact; 0 without.
 
-        Later steps of a rollout weigh less, because moving obstacles may change their direction.
+        The nearness is 1 at contact and 0 at MOVING_CLEARANCE_M. Weights decay exponentially with time.
         """
         rollouts, times = self.rollouts, self.times.astype(np.float32)[:, None]
         nearness, touches = self.footprint.discs.nearness(
@@ -130,7 +129,7 @@ class CriticData:
         return self.costmap.distance.ravel()
 
     def lookup(self, x: Floats, y: Floats) -> CellLookup:
-        """Return the cells at points (…,)."""
+        """Return the costmap cells at points (…,) in the frame of the rollouts."""
         view = self.costmap
         scale, (height, width) = np.float32(1.0 / view.resolution), view.costs.shape
         column = x + np.float32(self.pose.x - view.origin[0])
@@ -152,10 +151,9 @@ class CriticData:
         return costs if points.on_map is None else np.where(points.on_map, costs, np.uint8(0))
 
     def collides(self, clearance: Floats, consider_footprint: bool) -> Mask:
-        """Return which rollouts (n,) collide, given their `clearance` (steps, n).
+        """Return which rollouts (n,) collide, given their `clearance` (steps, n) in m.
 
-        A robot may already be in collision according to the costmap, or because the discs are larger than its
-        footprint. Then only rollouts that lead deeper into the obstacle collide, so that the robot can get out.
+        If the robot already is in collision, only rollouts that lead deeper into the obstacle collide.
         """
         current = self._current_clearance[consider_footprint]
         return np.asarray(clearance.min(axis=0) <= min(0.0, current - ESCAPE_TOLERANCE_M))
@@ -169,9 +167,9 @@ class CriticData:
         return float(inscribed[0, 0]), float(footprint[0, 0])
 
     def clearance(self, points: CellLookup, yaw: Floats, consider_footprint: bool) -> Floats:
-        """Return the distance (…,) in m from the robot at points to the nearest obstacle; negative in collision.
+        """Return distances (…,) in m from the robot at points to the nearest obstacle; negative in collision.
 
-        The robot is represented by its inscribed circle or, with `consider_footprint`, by discs that cover its
+        The robot is approximated by its inscribed circle or, with `consider_footprint`, by discs that cover its
         footprint. Off the costmap, the distance is inf.
         """
         discs: CoveringDiscs = self.footprint.discs
@@ -192,7 +190,7 @@ class CriticData:
 
 
 def hypot_in_place(dx: Floats, dy: Floats) -> Floats:
-    """Return the lengths of vectors, and overwrite the arguments. Much faster than np.hypot."""
+    """Return the lengths of vectors (dx, dy). Overwrites the arguments. Much faster than np.hypot."""
     dx *= dx
     dy *= dy
     dx += dy

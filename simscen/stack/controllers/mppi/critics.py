@@ -1,7 +1,7 @@
-"""Critics of MPPI, which compute costs of the rollouts (nav2_mppi_controller), and the manager that adds these up.
+"""Critics of MPPI, which compute costs of rollouts (nav2_mppi_controller), and the manager that adds up the costs.
 
-A critic takes its parameters and the critic data, and returns the cost of each rollout (n,): the described value times
-`cost_weight`.
+A critic takes its parameters and the critic data. It returns the cost of each rollout (n,): the value in its docstring
+times `cost_weight`.
 """
 
 from typing import get_args
@@ -15,10 +15,10 @@ from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Floats
 from simscen.stack.kinematics import accumulate_rows
 
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
-"""Smaller turn rates are replaced by this one, so that the turning radius of a car stays finite."""
+"""Minimum turn rate in the computation of turning radii, so that these stay finite."""
 HALF_TURN_RAD = np.float32(np.pi)
 MAX_COST = 254.0
-"""Highest known cost of a cell, by which CostCritic divides."""
+"""Highest cost of a known cell, by which CostCritic divides."""
 OPTIONAL_CRITICS = ("ObstaclesCritic", "TwirlingCritic", "VelocityDeadbandCritic")
 """Critics that Nav2 does not enable by default."""
 NAV2_CRITICS: tuple[model.CriticName, ...] = tuple(
@@ -31,7 +31,7 @@ class CriticManager:
     """Evaluates the enabled critics in order and adds up their costs."""
 
     def __init__(self, spec: model.Mppi, omni: bool) -> None:
-        """Take the specification; `omni` adds TwirlingCritic to the default critics."""
+        """Take the specification. `omni`: the base is holonomic, so that TwirlingCritic is a default critic, too."""
         default = (*NAV2_CRITICS, "TwirlingCritic") if omni else NAV2_CRITICS
         names: tuple[model.CriticName, ...] = default if spec.critics is None else tuple(spec.critics)
         self._spec = spec
@@ -51,7 +51,7 @@ class CriticManager:
         return total, all_collide
 
     def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:
-        """Return the costs (n,) by a critic or None if it does not apply, and which rollouts collide or None."""
+        """Return the costs (n,) by a critic, and which rollouts (n,) collide; None if not determined by this critic."""
         spec, length = self._spec, data.plan.length
         costs: Floats | None = None
         match name:
@@ -81,9 +81,9 @@ class CriticManager:
 
 
 def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Floats:
-    """Return by how much velocities exceed the limits, integrated over time.
+    """Return the integral over time of the excess of velocities over their limits.
 
-    For a car, the difference in m between the minimum turning radius and a smaller one is added.
+    For a car, the excess includes by how many m the turning radius is too small.
     """
     velocities, limits = data.rollouts.velocities, data.limits
     vx, (low, *_), (high, lateral, _) = velocities[VX], limits.low, limits.high
@@ -116,8 +116,8 @@ def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, M
 def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return costs for the nearness of obstacles, and which rollouts collide.
 
-    Within the collision margin, obstacles cost the more, the nearer they are. Within the inflation radius, the costs
-    are relative to those of the rollout that is farthest from obstacles.
+    The cost increases linearly as the distance falls below the collision margin. A smaller cost within the inflation
+    radius is relative to that of the rollout farthest from obstacles.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
     consider_footprint = spec.consider_footprint is not False
@@ -137,14 +137,14 @@ def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple
 
 
 def goal_critic(spec: model.MppiGoalCritic, data: CriticData) -> Floats:
-    """Return the mean distance to the end of the plan."""
+    """Return the mean distance in m to the end of the plan."""
     x, y, _ = data.path
     distance = hypot_in_place(data.rollouts.x - x[-1], data.rollouts.y - y[-1])
     return np.asarray(spec.cost_weight * distance.mean(axis=0))
 
 
 def goal_angle_critic(spec: model.MppiGoalAngleCritic, data: CriticData) -> Floats:
-    """Return the mean angle to the heading of the goal."""
+    """Return the mean angle in rad between the headings of each rollout and the heading of the goal."""
     angle = absolute_angles(data.rollouts.yaw - np.float32(data.goal_yaw))
     if spec.symmetric_yaw_tolerance:
         angle = np.minimum(angle, HALF_TURN_RAD - angle)
@@ -152,17 +152,17 @@ def goal_angle_critic(spec: model.MppiGoalAngleCritic, data: CriticData) -> Floa
 
 
 def prefer_forward_critic(spec: model.MppiPreferForwardCritic, data: CriticData) -> Floats:
-    """Return the distance driven backward, in m."""
+    """Return the distance in m that each rollout drives backward."""
     return np.asarray(spec.cost_weight * data.dt * -np.minimum(data.rollouts.velocities[VX], 0).sum(axis=0))
 
 
 def twirling_critic(spec: model.MppiTwirlingCritic, data: CriticData) -> Floats:
-    """Return the mean turn rate."""
+    """Return the mean absolute turn rate."""
     return np.asarray(spec.cost_weight * np.abs(data.rollouts.velocities[WZ]).mean(axis=0))
 
 
 def velocity_deadband_critic(spec: model.MppiVelocityDeadbandCritic, data: CriticData) -> Floats:
-    """Return by how much velocities are below the deadband, integrated over time."""
+    """Return the integral over time of the difference by which absolute velocities are below the deadband."""
     vx, vy, wz = spec.deadband_velocities
     deadband = {VX: vx, WZ: wz, VY: vy}
     deficit = np.zeros_like(data.rollouts.velocities[VX])
@@ -177,9 +177,9 @@ def absolute_angles(angles: Floats) -> Floats:
 
 
 def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floats | None:
-    """Return the mean distance between each pose and the plan at the same path length.
+    """Return the mean distance in m between the poses of each rollout and the plan at the same path length.
 
-    Return None if the rollouts cover too little of the plan, or if too much of the covered plan is occupied.
+    Return None if the rollouts cover too little of the plan, or if obstacles cover too much of this part.
     """
     count = data.furthest_point
     if count < max(1, spec.offset_from_furthest):
@@ -207,7 +207,7 @@ def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floa
 
 
 def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Floats:
-    """Return the distance from the end of each rollout to a free point beyond the furthest reached one."""
+    """Return the distance in m from the end of each rollout to a free point of the plan beyond the rollouts."""
     x, y, _ = data.path
     last = len(x) - 1
     index = min(data.furthest_point + spec.offset_from_furthest, last)
@@ -217,9 +217,9 @@ def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Fl
 
 
 def path_angle_critic(spec: model.MppiPathAngleCritic, data: CriticData) -> Floats | None:
-    """Return the angle between the final heading of each rollout and the direction to a point of the plan.
+    """Return the angle in rad between the final heading of each rollout and the direction to a point of the plan.
 
-    Return None if the current heading is within `max_angle_to_furthest` of that direction.
+    Return None if the angle from the current heading is less than `max_angle_to_furthest`.
     """
     path_x, path_y, path_yaw = data.path
     index = min(data.furthest_point + spec.offset_from_furthest, len(path_x) - 1)

@@ -18,14 +18,14 @@ from simscen.stack.protocols import RobotModel
 
 Floats = npt.NDArray[np.float32]
 VX, WZ, VY = 0, 1, 2
-"""Indices of the axes of a control sequence."""
+"""Indices of the axes of a control sequence: forward, turn rate, and sideways."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories: positions (steps, n) in m, headings (steps, n), and velocities (axes, steps, n).
+    """Simulated trajectories: positions (steps, n) in m, headings (steps, n), and velocities (axes, steps, n).
 
-    Positions are relative to that of the robot, but the axes are those of the costmap's frame.
+    Positions are relative to the position of the robot, along the axes of the costmap's frame.
     """
 
     x: Floats
@@ -42,9 +42,9 @@ class Rollouts:
 
 
 def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the velocities: at the first step `now` (axes,), at each later step the control of the step before.
+    """Return the velocities of the base: `now` (axes,) at the first step, then the control of the previous step.
 
-    Their changes are limited by the accelerations. As in Nav2, speed limits are left to ConstraintCritic.
+    Only changes of the velocity are limited. As in Nav2, ConstraintCritic penalizes speeds beyond the limits.
     """
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
@@ -59,7 +59,7 @@ def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt
 
 
 def _limit_changes(velocities: Floats, requested: Floats, change: np.float32) -> None:
-    """Limit the changes of one axis (steps, n) in place, without temporary arrays."""
+    """Set the velocities of one axis (steps, n) to those requested, but change by at most `change` in each step."""
     bound = np.empty_like(velocities[0])
     for (last, now), target in zip(pairwise(velocities), requested, strict=False):
         np.maximum(target, np.subtract(last, change, out=bound), out=now)
@@ -67,7 +67,7 @@ def _limit_changes(velocities: Floats, requested: Floats, change: np.float32) ->
 
 
 def _limit_asymmetric_changes(velocities: Floats, requested: Floats, up: np.float32, down: np.float32) -> None:
-    """Limit the changes of one axis whose deceleration differs from its acceleration, in place."""
+    """Do the same as `_limit_changes` for an axis whose deceleration `down` differs from its acceleration `up`."""
     bound, forward = np.empty_like(velocities[0]), np.empty(velocities[0].shape, np.bool_)
     lowest, highest = np.array((-up, down)), np.array((-down, up))
     for (last, now), target in zip(pairwise(velocities), requested, strict=False):
@@ -79,7 +79,7 @@ def _limit_asymmetric_changes(velocities: Floats, requested: Floats, up: np.floa
 
 
 def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
-    """Return the rollouts of these velocities from the heading `yaw`, which is constant within each step."""
+    """Return the rollouts of these velocities, with the initial heading `yaw`. Headings are constant within a step."""
     step, (steps, count) = np.float32(dt), velocities.shape[1:]
     headings = np.empty((steps + 1, count), np.float32)
     headings[0], later = 0.0, headings[1:]
@@ -96,7 +96,7 @@ def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
 
 
 def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
-    """Delay the velocities of each axis by its `steps`, in place. The last commands `sent` (axes, m) precede them."""
+    """Delay velocities in place by a number of `steps` for each axis. Commands already `sent` (axes, m) come first."""
     for axis, earlier, delay in zip(velocities, sent, steps, strict=False):
         if delay:
             axis[delay:] = axis[1 : len(axis) - delay + 1].copy()
@@ -104,7 +104,7 @@ def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) 
 
 
 def mppi_limits(spec: MppiSpec, robot: RobotModel, full_speed: float) -> VelocityLimits:
-    """Return the limits of the specification, bounded by those of the robot."""
+    """Return the limits of the specification, bounded by those of the robot. `full_speed` is the maximum vx in m/s."""
     lateral = DEFAULT_SPEED_M_S if spec.vy_max is None else spec.vy_max
     return velocity_limits(
         robot,
@@ -117,6 +117,6 @@ def mppi_limits(spec: MppiSpec, robot: RobotModel, full_speed: float) -> Velocit
 
 
 def axis_order(axes: Axes) -> Array:
-    """Return the values of the axes in the order of a control sequence: vx, wz, vy."""
+    """Return values for vx, vy, wz in the order of a control sequence: vx, wz, vy."""
     vx, vy, wz = axes
     return np.array((vx, wz, vy))
