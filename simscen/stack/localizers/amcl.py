@@ -1,4 +1,4 @@
-"""AMCL localizer: updates the particle filter with scans, and moves the pose by odometry in between (nav2_amcl)."""
+"""AMCL localizer (nav2_amcl): updates a particle filter with scans, and moves the pose by odometry in between."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,11 +18,11 @@ from simscen.stack.localizers.particles import covariance_about, summarize
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Estimate after the latest update of the filter.
+    """Estimate after the latest update of the particle filter.
 
-    pose:        map_from_base at the time of the update
-    covariance:  (3, 3) of x, y, yaw of the pose
-    odometry:    odom_from_base at the same time
+    pose:        pose of the robot in the map frame at the time of the update
+    covariance:  covariance (3, 3) of x, y, yaw of the pose
+    odometry:    pose of the robot in the odom frame at the same time
     tick:        tick of the newest scan that the estimate is based on
     """
 
@@ -38,19 +38,18 @@ class Correction:
 
     @cached_property
     def map_from_odom(self) -> Pose2:
-        """The transform that nav2_amcl publishes."""
+        """Pose of the odom frame in the map frame, which nav2_amcl publishes as a transform."""
         return self.pose.compose(self.base_from_odom)
 
 
 class AmclLocalizer:
     """Adaptive Monte Carlo localization on an occupancy grid.
 
-    The first scan of each lidar updates the filter. A later scan updates it if the robot has moved by `update_min_d` or
-    turned by `update_min_a` since the last update. A scan that arrives before the odometry of its tick has to wait, as
-    with tf2's message filter. Between updates, the transform from map to odom is constant: odometry moves the pose, and
-    the motion model increases the covariance.
+    The first scan of each lidar updates the filter. A later scan updates the filter if the robot has moved by
+    `update_min_d` m or turned by `update_min_a` rad since the last update. Scans wait for the odometry of their tick.
 
-    Subclasses may override `reset`, `_correct`, and `_propagated_covariance`.
+    Between updates, odometry moves the pose, and the motion model increases the covariance. Subclasses may override
+    `reset`, `_correct`, and `_propagated_covariance`.
     """
 
     def __init__(
@@ -61,7 +60,7 @@ class AmclLocalizer:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        """Restart with particles around the pose of the estimate, or over all free space if this pose is None."""
         self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
         self._filter.reset(estimate)
         self._initial_estimate = estimate
@@ -73,7 +72,7 @@ class AmclLocalizer:
 
     @cached_property
     def _correction(self) -> Correction:
-        """The latest correction; initially computed from the initial estimate, and only if it is needed."""
+        """The latest correction; before the first update, the initial estimate."""
         initial = self._initial_estimate
         if initial.pose is None:
             pose, covariance = summarize(self._filter.particles)
@@ -102,11 +101,11 @@ class AmclLocalizer:
             self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
 
     def on_imu(self, imu: Imu) -> None:
-        """Ignore the reading. AMCL predicts with odometry only, which an EKF may have fused with the IMU."""
+        """Ignore the reading."""
 
     @property
     def belief(self) -> Belief:
-        """The last correction, propagated with the odometry since then."""
+        """The last correction, moved by the odometry since then."""
         if self._belief is None:
             last = self._correction
             delta = last.base_from_odom.compose(self._odometry.now)
@@ -120,7 +119,7 @@ class AmclLocalizer:
         return self._correction.map_from_odom.compose(self._odometry.now)
 
     def _process(self, scan: Scan) -> None:
-        """Update the filter if an update by this lidar is due. Enough motion makes one update by each lidar due."""
+        """Update the filter if an update by this lidar is due. After enough motion, one update per lidar is due."""
         odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return
@@ -134,7 +133,11 @@ class AmclLocalizer:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by `delta`, the odometry since the last update (None at first), and weight them."""
+        """Move the particles by `delta`, and weight them by the scan.
+
+        `odometry` is the pose in the odom frame at the time of the scan. `delta` is the motion since the last update in
+        the base frame; None at first.
+        """
         if delta is not None:
             self._filter.move(delta)
         self._mark_updated(scan, odometry)

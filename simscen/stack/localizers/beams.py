@@ -12,16 +12,16 @@ from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Scan
 
 Plane = npt.NDArray[np.complex128]
-"""Points or directions as complex numbers x + iy: multiplication rotates, addition translates."""
+"""Points or directions as complex numbers x + iy."""
 Cells = npt.NDArray[np.int32]
 """Flat indices of map cells in a lookup table."""
 
 
 class Field(Protocol):
-    """Lookup table over the cells of a map, such as DistanceField."""
+    """Lookup table over the cells of a map, for example of distances to obstacles."""
 
     def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
-        """Return table indices (n, b) of `points` (b,), given in the base frame, for each of the `poses` (n, 3)."""
+        """Return indices (n, b) into the table of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
         ...
 
 
@@ -29,8 +29,8 @@ class Field(Protocol):
 class Beams:
     """The b valid beams of a scan, m of which hit something.
 
-    `ranges` (b,) are in m; beams with the range `range_max` hit nothing. `unit_vectors` (b,) point along the beams, and
-    `origin` is the position of the lidar, both in the base frame.
+    `ranges` (b,) are in m; `range_max` means no hit. `unit_vectors` (b,) along the beams, and the position `origin` of
+    the lidar, are in the base frame.
     """
 
     ranges: Array
@@ -50,17 +50,14 @@ class Beams:
         return self.ranges.take(hit) * self.unit_vectors.take(hit) + self.origin
 
     def cells(self, field: Field, poses: Array) -> Cells:
-        """Return the cells (n, m) of the endpoints for each of the `poses` (n, 3).
-
-        The last result is cached, because the filter needs it twice for the same poses.
-        """
+        """Return the cells (n, m) of the endpoints `ends` for each of the `poses` (n, 3). The last result is cached."""
         last: tuple[Field, Array, Cells] | None = self.__dict__.get("_cells")
         if last is None or last[0] is not field or last[1] is not poses:
             last = self.__dict__["_cells"] = field, poses, field.endpoint_cells(poses, self.ends)
         return last[2]
 
     def keeping_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
-        """Return the beams that hit nothing, and of those that hit something the `chosen` (m,) ones."""
+        """Return these beams without the hits for which `chosen` (m,) is False. Beams that hit nothing remain."""
         is_kept = self.ranges >= self.range_max
         is_kept[(~is_kept).nonzero()[0][chosen]] = True
         return Beams(self.ranges[is_kept], self.unit_vectors[is_kept], self.origin, self.range_max)
@@ -81,7 +78,7 @@ def evenly_spaced(count: int, chosen_count: int) -> npt.NDArray[np.int64]:
 
 @lru_cache(maxsize=8)
 def _directions(first: float, increment: float, count: int, turn: float) -> Plane:
-    """Return the unit vectors along all beams; cached, since they are the same in all scans of a lidar."""
+    """Return the unit vectors along `count` beams. `turn` is the yaw of the lidar in the base frame. Cached."""
     angles = first + increment * np.arange(count, dtype=np.float64)
     unit_vectors: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
     unit_vectors.flags.writeable = False
@@ -91,8 +88,8 @@ def _directions(first: float, increment: float, count: int, turn: float) -> Plan
 def select_beams(scan: Scan, count: int, min_range: float, max_range: float) -> Beams:
     """Return at most `count` evenly spaced beams of a scan, without invalid (nan) ones.
 
-    Ranges are limited to `max_range` and the lidar's maximum. As in nav2_amcl, ranges up to `min_range` or the lidar's
-    minimum, including -inf, count as the maximum.
+    Ranges are limited to the smaller of `max_range` and the lidar's maximum. As in nav2_amcl, ranges up to `min_range`
+    or the lidar's minimum are replaced by this maximum.
     """
     step = -(-len(scan.ranges) // count) or 1
     ranges, unit_vectors = scan.ranges[::step], directions(scan)[::step]

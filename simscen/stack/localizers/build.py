@@ -1,4 +1,4 @@
-"""Factories of the reference localizers, to which the `component` of their specifications refers."""
+"""Factories of the reference localizers. The `component` of each specification names its factory."""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ from simscen.stack.setting import Setting
 
 
 def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
-    """Return AMCL, or dead reckoning if there is no map to match scans with."""
+    """Build AMCL; dead reckoning without a map."""
     if setting.map is None:
         return DeadReckoning(setting.estimate)
     motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
@@ -35,25 +35,25 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
 
 
 def ekf(spec: model.Ekf, setting: Setting) -> Localizer:
-    """Return an extended Kalman filter that fuses odometry and gyroscope."""
+    """Build an extended Kalman filter that fuses wheel odometry and gyroscope."""
     from simscen.stack.localizers.ekf import EkfLocalizer
 
     return EkfLocalizer(spec, setting.estimate, setting.surroundings.tick_rate)
 
 
 def ground_truth(_spec: model.GroundTruth, setting: Setting) -> Localizer:
-    """Return a localizer that reports the true pose."""
+    """Build a localizer that reports the true pose."""
     return GroundTruthLocalizer(setting.estimate)
 
 
 def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
-    """Return dead reckoning from odometry."""
+    """Build a localizer that only adds up odometry (dead reckoning)."""
     return DeadReckoning(setting.estimate)
 
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Everything that AMCL computes from a map, cached for all runs."""
+    """Sensor model and free space of a map, which all runs share."""
 
     sensor: SensorModel
     free_space: FreeSpace
@@ -61,19 +61,19 @@ class MapModels:
 
 @cached_on_instance
 def map_models(grid: OccupancyGrid, spec: model.Amcl) -> MapModels:
-    """Return the models of a map, cached together with it."""
+    """Return the sensor model and the free space of a map. Cached in the map."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field = obstacle_field(grid, spec.laser_likelihood_max_dist)
     return MapModels(sensor_model(spec, grid, field), FreeSpace(grid))
 
 
 def precompute(spec: model.Amcl, grid: OccupancyGrid) -> None:
-    """Compute and cache the models of a map before runs are forked."""
+    """Compute and cache the models of a map, before worker processes are forked."""
     map_models(grid, spec)
 
 
 def motion_model(spec: model.AmclParameters, holonomic: bool) -> MotionModel:
-    """Return the motion model `robot_model`, or the one that fits a holonomic or non-holonomic robot."""
+    """Return the motion model `robot_model`; if it is not set, the model for a holonomic or non-holonomic robot."""
     alpha = (spec.alpha1, spec.alpha2, spec.alpha3, spec.alpha4)
     if (spec.robot_model or ("omni" if holonomic else "differential")) == "omni":
         return OmniMotionModel((*alpha, spec.alpha5))

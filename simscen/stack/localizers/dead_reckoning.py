@@ -1,7 +1,6 @@
 """Dead reckoning from odometry, and propagation of the covariance of a planar pose.
 
 Source: Probabilistic Robotics, section 5.4. The errors of motion steps are independent, so their covariances add up.
-The functions compute with floats, because numpy is slower for nine numbers.
 """
 
 import math
@@ -19,9 +18,9 @@ Noise = tuple[float, float, float, float, float, float]
 
 
 def propagate_covariance(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
-    """Return the covariance (3, 3) of the pose after a motion by (dx, dy) in the map frame, which adds `noise`.
+    """Return the covariance (3, 3) of a pose after a motion by (dx, dy) in m in the map frame.
 
-    An error of the heading before the motion becomes an error of the position after it.
+    `noise` is the covariance of the errors of this motion.
     """
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     xx_new, xy_new, xa_new, yy_new, ya_new, aa_new = noise
@@ -34,13 +33,13 @@ def propagate_covariance(covariance: Array, dx: float, dy: float, noise: Noise) 
 
 
 def rotation_matrix(yaw: float) -> Array:
-    """Return the matrix (3, 3) that rotates errors from a frame at heading `yaw` to its parent frame."""
+    """Return the matrix (3, 3) that rotates pose errors from a frame with heading `yaw` to its parent frame."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
 
 def rotate_covariance(covariance: Array, yaw: float) -> Noise:
-    """Return a covariance (3, 3), given in a frame at heading `yaw`, in the parent frame as an upper triangle."""
+    """Rotate a covariance (3, 3) from a frame with heading `yaw` to its parent frame. Return the upper triangle."""
     c, s = math.cos(yaw), math.sin(yaw)
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     return (
@@ -52,10 +51,10 @@ def rotate_covariance(covariance: Array, yaw: float) -> Noise:
 def grow_covariance(
     covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float
 ) -> Array:
-    """Return the covariance (3, 3) of the pose after `step` in the base frame, which starts at heading `yaw`.
+    """Return the covariance (3, 3) of a pose with heading `yaw` after the motion `step` in the base frame.
 
-    `translation_noise` is the standard deviation along the path in m after one meter; `rotation_noise` is that of the
-    heading in rad after one meter or one rad.
+    `translation_noise` is the standard deviation in m, along the path, after one meter. `rotation_noise` is the
+    standard deviation of the heading in rad after one meter or one rad.
     """
     c, s = math.cos(yaw), math.sin(yaw)
     dx, dy, length = c * step.x - s * step.y, s * step.x + c * step.y, math.hypot(step.x, step.y)
@@ -66,19 +65,20 @@ def grow_covariance(
 
 
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
-"""Standard deviations of an unknown pose: 100 m for x and y, and a uniform distribution of the heading."""
+"""Standard deviations of x, y, and yaw of an unknown pose: 100 m, 100 m, and that of a uniform distribution."""
 _NOISE = Ekf(type="ekf")
+"""Specification whose default noise parameters are used."""
 
 
 def initial_pose(estimate: Estimate) -> tuple[Pose2, Array]:
-    """Return the initial pose and covariance (3, 3). An unknown pose starts at the origin of the map."""
+    """Return the initial pose and its covariance (3, 3). For an unknown pose, this is the origin of the map."""
     if estimate.pose is None:
         return Pose2(0.0, 0.0, 0.0), np.diag(np.square(_UNKNOWN_STD))
     return estimate.pose, np.diag(np.square(estimate.std))
 
 
 class DeadReckoning:
-    """Localizer that adds odometry to the initial estimate. Its covariance grows with the default noise of `ekf`."""
+    """Localizer that adds odometry to the initial estimate. The covariance grows as with the defaults of the EKF."""
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)
@@ -110,5 +110,5 @@ class DeadReckoning:
 
     @property
     def belief(self) -> Belief:
-        """The integrated pose and its covariance."""
+        """The current pose and its covariance."""
         return self._belief

@@ -22,13 +22,13 @@ Kind = TypeVar("Kind", np.float32, np.uint8)
 
 
 BLOCK_POSES = 512
-"""Number of poses that are evaluated at once. With 60 beams, a block fits into the second-level cache."""
+"""Number of poses that are evaluated at once."""
 BLOCK_CELLS = 2**16
 """Number of cells for which a function is tabulated at once."""
 
 
 def evaluate_in_blocks(evaluate: Callable[[Array], Array], poses: Array) -> Array:
-    """Return the values (n,) of a function of `poses` (n, 3), evaluated in blocks."""
+    """Return the values (n,) of a function of `poses` (n, 3), evaluated in blocks that fit into the processor cache."""
     if len(poses) <= BLOCK_POSES:
         return evaluate(poses)
     return np.concatenate([evaluate(poses[begin : begin + BLOCK_POSES]) for begin in range(0, len(poses), BLOCK_POSES)])
@@ -37,13 +37,13 @@ def evaluate_in_blocks(evaluate: Callable[[Array], Array], poses: Array) -> Arra
 class DistanceField:
     """Distances in m from cell centers to the nearest obstacle cell, as a flat table with a border of one cell.
 
-    Coordinates outside the map are clipped to the border, so that lookups need no range check.
+    Lookups outside the map return the value of the border.
     """
 
     def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, *, walled: bool) -> None:
         """Compute the distances to `obstacles` (height, width), at most `limit` m.
 
-        The border is an obstacle if `walled`. Otherwise, its distance is `limit`.
+        With `walled`, the border is an obstacle. Otherwise, its distance is `limit`.
         """
         bordered = np.pad(obstacles, 1, constant_values=walled)
         distance = np.full(bordered.shape, limit, dtype=np.float32)
@@ -65,19 +65,19 @@ class DistanceField:
         self._corner = np.array([[x], [y]]) / grid.resolution + 1
 
     def tabulate(self, function: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
-        """Return the values of a function of the distance as a flat table. Uses blocks to save memory."""
+        """Return the values of a function of the distance, for all cells, as a flat table with elements of `kind`."""
         result = np.empty(len(self.table), kind)
         for begin in range(0, len(result), BLOCK_CELLS):
             result[begin : begin + BLOCK_CELLS] = function(self.table[begin : begin + BLOCK_CELLS])
         return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
-        """Return positions (2, n) in cells of the bordered table, and headings (n,) in its axes, of `poses` (n, 3)."""
+        """Return positions (2, n) and headings (n,) of `poses` (n, 3) in the table with its border, in cells."""
         positions = self._axes @ poses.T[:2] + self._corner
         return positions.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> Cells:
-        """Return indices into `table` of points, given in cells. The points may be off the map. Overwrites x and y."""
+        """Return indices into `table` of points with coordinates in cells, also outside the map. Overwrites x and y."""
         column = x.clip(0, self._width + 1, out=x).astype(np.int32)
         row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2

@@ -1,6 +1,6 @@
-"""Extended Kalman filter that fuses wheel odometry and a gyroscope, as robot_localization's ekf_node does.
+"""Extended Kalman filter (EKF) that fuses wheel odometry and a gyroscope, as robot_localization's ekf_node does.
 
-Probabilistic Robotics, section 3.3. Prediction and update are those of filterpy's ExtendedKalmanFilter (Labbe).
+Sources: Probabilistic Robotics, section 3.3; filterpy's ExtendedKalmanFilter (Labbe).
 """
 
 import math
@@ -18,23 +18,25 @@ from simscen.stack.localizers.dead_reckoning import initial_pose
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """Indices of the state: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
 VELOCITY_VARIANCE = 1e6
-"""Process noise of the velocity in (m/s)² and (rad/s)²: large, so that only the measurements of a step count."""
-MIN_YAW_RATE_STD_RADPS = 0.002
-"""Standard deviation of the yaw rate by wheels at rest: encoders are too coarse to detect a slow rotation."""
-MAX_YAW_RATE_RADPS = 100.0
-"""Gyroscope readings above this are ignored as broken."""
+"""Process noise of the velocity in (m/s)² and (rad/s)²: large, so that earlier velocities have no effect."""
+MIN_YAW_RATE_STD_RAD_S = 0.002
+"""Standard deviation of the yaw rate that wheels at rest measure."""
+MAX_YAW_RATE_RAD_S = 100.0
+"""Absolute yaw rate from which on gyroscope readings are ignored as invalid."""
 
-_WHEELS = np.zeros((3, 7))
-_WHEELS[[0, 1, 2], [VX, VY, VYAW]] = 1.0
-_GYROSCOPE = np.zeros((1, 7))
-_GYROSCOPE[0, [VYAW, BIAS]] = 1.0
+_WHEELS_MATRIX = np.zeros((3, 7))
+"""Measurement matrix of wheel odometry."""
+_WHEELS_MATRIX[[0, 1, 2], [VX, VY, VYAW]] = 1.0
+_GYROSCOPE_MATRIX = np.zeros((1, 7))
+"""Measurement matrix of a gyroscope."""
+_GYROSCOPE_MATRIX[0, [VYAW, BIAS]] = 1.0
 
 
 class EkfLocalizer:
-    """Localizer with a planar EKF of odometry and gyroscope. It uses no map, so that its error grows with the distance.
+    """Localizer with a planar EKF of odometry and gyroscope. It does not use the map, so that its error grows.
 
-    Each odometry reading measures the velocity since the previous one, with noise that grows with the distance driven.
-    The gyroscope measures the yaw rate plus a bias. Unlike robot_localization, the filter estimates this bias.
+    Each odometry reading measures the mean velocity since the previous reading, with noise that grows with the distance
+    driven. The gyroscope measures the yaw rate plus a bias, which the filter estimates.
     """
 
     def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
@@ -75,7 +77,7 @@ class EkfLocalizer:
     def on_imu(self, imu: Imu) -> None:
         """Store the yaw rate until the next odometry reading."""
         rate = imu.angular_velocity[2]
-        if abs(rate) < MAX_YAW_RATE_RADPS:
+        if abs(rate) < MAX_YAW_RATE_RAD_S:
             self._yaw_rates.append(rate)
 
     @property
@@ -92,21 +94,21 @@ class EkfLocalizer:
         return Pose2(x, y, wrap(yaw))
 
     def _measure_velocity(self, step: Pose2, seconds: float) -> None:
-        """Update the velocity with `step`, the odometry since the last reading, and with the gyroscope."""
+        """Update the velocity with `step`, the motion by odometry since the last reading, and with the gyroscope."""
         transition, noise = np.eye(7), np.zeros((7, 7))
         velocities = [VX, VY, VYAW]
         transition[velocities, velocities], noise[velocities, velocities] = 0.0, VELOCITY_VARIANCE
         noise[BIAS, BIAS] = self._spec.gyro_bias_walk**2 * seconds
         self._predict(transition @ self._filter.x, transition, noise)
         velocity = np.array(mean_velocity(step, seconds))
-        self._update(velocity, _WHEELS, self._wheel_noise(step, velocity, seconds))
+        self._update(velocity, _WHEELS_MATRIX, self._wheel_noise(step, velocity, seconds))
         if self._yaw_rates:
             mean = sum(self._yaw_rates) / len(self._yaw_rates)
             variance = self._spec.gyro_noise**2 / len(self._yaw_rates)
-            self._update(np.array([mean]), _GYROSCOPE, np.array([[variance]]))
+            self._update(np.array([mean]), _GYROSCOPE_MATRIX, np.array([[variance]]))
 
     def _wheel_noise(self, step: Pose2, velocity: Array, seconds: float) -> Array:
-        """Return the covariance (3, 3) of the velocity that the wheels measured."""
+        """Return the covariance (3, 3) of the velocity that wheel odometry has measured."""
         length = math.hypot(step.x, step.y)
         along = velocity[:2] * seconds
         noise = np.zeros((3, 3))
@@ -114,7 +116,7 @@ class EkfLocalizer:
             noise[:2, :2] = self._spec.translation_noise**2 / length * np.outer(along, along)
         noise[2, 2] = self._spec.rotation_noise**2 * (length + abs(step.yaw))
         noise /= seconds**2
-        noise[2, 2] += MIN_YAW_RATE_STD_RADPS**2
+        noise[2, 2] += MIN_YAW_RATE_STD_RAD_S**2
         return noise
 
     def _move(self, seconds: float) -> None:
@@ -138,7 +140,7 @@ class EkfLocalizer:
         self._filter.predict(state)
 
     def _set_state(self, state: Array) -> None:
-        """Set the predicted state. Replaces filterpy's `predict_x`, which would predict linear motion."""
+        """Set the predicted state. Replaces filterpy's `predict_x`, which predicts linear motion."""
         self._filter.x = state
 
     def _update(self, measurement: Array, matrix: Array, noise: Array) -> None:

@@ -18,14 +18,14 @@ _COVARIANCE = np.diag([1e-6, 1e-6, 1e-6])
 class GroundTruthLocalizer:
     """Localizer without errors: reports the true pose, which the sensor TRUTH measures.
 
-    Odometry of other sensors moves the pose in between. Without any true pose, this localizer is dead reckoning.
+    Between true poses, wheel odometry moves the pose. Without true poses, this localizer is dead reckoning.
     """
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart at an estimate; the next true pose replaces it."""
+        """Restart at an estimate, which the next true pose replaces."""
         self._started = False
         self._pose, self._covariance = initial_pose(estimate)
         self._map_from_odom, self._odometry, self._updated = self._pose, Pose2(0.0, 0.0, 0.0), -1
@@ -51,5 +51,5 @@ class GroundTruthLocalizer:
 
     @property
     def belief(self) -> Belief:
-        """The last true pose, moved by odometry since then."""
+        """The last true pose, moved by the odometry since then."""
         return Belief(self._pose, self._covariance, self._map_from_odom, updated=max(self._updated, 0))

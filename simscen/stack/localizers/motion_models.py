@@ -1,8 +1,6 @@
 """Motion models of nav2_amcl, which move particles by odometry, with noise.
 
-Source: the odometry motion model of Probabilistic Robotics, section 5.4 and table 5.6, with the variances of nav2_amcl:
-the alphas multiply squared motions, backward motion is as noisy as forward motion, and the direction of a translation
-below 1 cm is ignored.
+Source: the odometry motion model of Probabilistic Robotics, section 5.4 and table 5.6, with the variances of nav2_amcl.
 """
 
 import math
@@ -16,24 +14,24 @@ from simscen.stack.localizers.dead_reckoning import propagate_covariance
 from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 MIN_BEARING_DISTANCE_M = 0.01
-"""Shortest translation whose direction is used."""
+"""Length of a translation below which its direction is ignored."""
 
 
 class MotionModel(Protocol):
-    """Moves particles by `delta`, the motion that odometry reports, in the base frame before the motion."""
+    """Moves particles by `delta`: the motion by odometry, in the base frame before the motion."""
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
-        """Return `poses` (n, 3), each moved by its own noisy copy of `delta`."""
+        """Return `poses` (n, 3), each moved by `delta` with different random noise."""
         ...
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after `delta`, to first order. `yaw` is the heading before the motion."""
+        """Return a covariance (3, 3) after `delta`, to first order. `yaw` is the heading before the motion."""
         ...
 
 
 @dataclass(frozen=True)
 class DifferentialMotionModel:
-    """Rotates, translates, and rotates (table 5.6); for robots that cannot move sideways. `alpha`: alpha1 … alpha4."""
+    """Rotates, translates, and rotates again; for robots that cannot move sideways. `alpha`: Nav2's alpha1 … alpha4."""
 
     alpha: tuple[float, float, float, float]
 
@@ -61,7 +59,7 @@ class DifferentialMotionModel:
         ))  # fmt: skip
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return (first rotation, translation, second rotation) and the variances of their noise in the same order."""
+        """Return (first rotation, translation, second rotation), and the variances of their noise in the same order."""
         drive = math.hypot(delta.x, delta.y)
         turn = math.atan2(delta.y, delta.x) if drive >= MIN_BEARING_DISTANCE_M else 0.0
         again = wrap(delta.yaw - turn)
@@ -75,7 +73,7 @@ class DifferentialMotionModel:
 
 @dataclass(frozen=True)
 class OmniMotionModel:
-    """Drives, strafes, and turns at once (nav2_amcl::OmniMotionModel), if holonomic. `alpha`: alpha1 … alpha5."""
+    """Drives, strafes, and turns at once; for holonomic robots. `alpha`: Nav2's alpha1 … alpha5."""
 
     alpha: tuple[float, float, float, float, float]
 
@@ -111,6 +109,6 @@ class OmniMotionModel:
 
 
 def _fold_backward(angle: float) -> float:
-    """Return the absolute value of a rotation, or of its difference to half a turn (driving backward) if smaller."""
+    """Return the smaller of |angle| and π - |angle|, so that backward motion is as noisy as forward motion."""
     size = abs(angle)
     return min(size, math.pi - size)

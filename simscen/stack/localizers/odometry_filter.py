@@ -1,8 +1,7 @@
 """Extended Kalman filter that fuses wheel odometry and gyroscope in the odom frame (robot_localization's ekf_node).
 
-Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014), in its
-planar mode (`two_d_mode`). filterpy's KalmanFilter (Labbe) predicts and updates the velocity. The pose is predicted
-from the velocity as in an extended Kalman filter.
+Source: Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014),
+with `two_d_mode`.
 """
 
 import math
@@ -16,7 +15,7 @@ from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model import localizers as model
 from simscen.stack.frames import is_plausible
 from simscen.stack.kinematics import mean_velocity
-from simscen.stack.localizers.ekf import MAX_YAW_RATE_RADPS
+from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S
 from simscen.stack.localizers.kalman_filters import KalmanFilter
 
 VX, VY, VYAW, BIAS = range(4)
@@ -24,7 +23,7 @@ VX, VY, VYAW, BIAS = range(4)
 MIN_VARIANCE = 1e-9
 """Minimum variance of a measurement in (m/s)² or (rad/s)²; the same as in robot_localization."""
 MAX_GYRO_GAP_S = 0.1
-"""Longest time between successive gyroscope readings, and from a reading to the odometry, for these to be used."""
+"""Longest time without a gyroscope reading, after which the angle of rotation by the gyroscope is unknown."""
 
 _WHEELS = np.eye(3, 4)
 _WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))
@@ -35,10 +34,8 @@ _IDENTITIES = {size: np.eye(size) for size in (3, 4)}
 class OdometryFilter:
     """Fuses wheel odometry and the yaw rate of a gyroscope.
 
-    Each update estimates the mean velocity since the previous update. The wheels measure this velocity; the gyroscope
-    measures its yaw rate plus a bias. The variances are those of the readings. The pose is the integral of the velocity
-    and is never corrected afterwards, so that the odom frame does not jump (REP 105). Its covariance is that of the
-    integrated errors, including those that the bias causes.
+    Each update estimates the mean velocity since the previous update. The wheels measure this velocity. The gyroscope
+    measures the yaw rate plus a bias. The pose is the integral of the velocity, so that it does not jump (REP 105).
     """
 
     def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
@@ -68,7 +65,7 @@ class OdometryFilter:
     def fuse(self, odometry: Odometry) -> Odometry | None:
         """Return the filtered odometry at the tick of a reading; None if the reading is unusable or no update is due.
 
-        The first reading is returned unchanged, so that both odometries start in the same odom frame.
+        The first reading is returned unchanged.
         """
         last, last_tick = self._last, self._last_tick
         if not is_plausible(odometry.pose) or (last_tick is not None and odometry.tick <= last_tick):
@@ -96,9 +93,9 @@ class OdometryFilter:
         )  # fmt: skip
 
     def _add_variances(self, odometry: Odometry, gap: float) -> None:
-        """Add the variances of a reading, `gap` s after the previous one, to those of the motion since the last update.
+        """Add the variances of a reading to those of the motion since the last update.
 
-        After lost messages, the gap contains the independent errors of several readings.
+        `gap` is the time in s since the previous reading. After lost messages, it contains the errors of these, too.
         """
         self._period = min(self._period, gap)
         (x, y, yaw), (vx, vy, wz), factor = self._step_variances, odometry.twist_variance, self._period * gap
@@ -107,7 +104,7 @@ class OdometryFilter:
     def _measure(self, wheels: Twist, turned: tuple[float, float] | None, seconds: float) -> None:
         """Predict and update the mean velocity during the last `seconds`.
 
-        `turned` is the angle and its variance by the gyroscope; None without a measurement.
+        `turned` is the angle of rotation by the gyroscope, with its variance; None without a measurement.
         """
         self._filter.Q = self._process_noise * seconds
         self._filter.predict()
@@ -129,7 +126,7 @@ class OdometryFilter:
         cross -= cross.dot(self._filter.K.dot(matrix).T)
 
     def _slips(self, difference: float, variance: float) -> bool:
-        """Return whether the yaw rates of wheels and gyroscope differ by more than their errors explain."""
+        """Return whether the `difference` of the yaw rates of wheels and gyroscope is too large for its `variance`."""
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
         return bool(difference**2 > limit)
@@ -167,8 +164,7 @@ def _diagonal_matrix(values: list[float]) -> Array:
 class GyroscopeIntegral:
     """Integrates the yaw rate of a gyroscope between any two ticks, with the trapezoidal rule.
 
-    Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is assumed to be constant. The next reading corrects
-    the angle, so that errors of this assumption do not accumulate.
+    Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is assumed to be constant.
     """
 
     def __init__(self, tick_rate: int) -> None:
@@ -178,8 +174,8 @@ class GyroscopeIntegral:
         self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
 
     def add(self, tick: int, rate: float, variance: float) -> None:
-        """Add a yaw rate (rad/s) with the variance of its noise. Unusable readings are ignored."""
-        if not abs(rate) < MAX_YAW_RATE_RADPS or (self._tick is not None and tick <= self._tick):
+        """Add a yaw rate (rad/s) with the variance of its noise. Ignore it if it is invalid or not newer."""
+        if not abs(rate) < MAX_YAW_RATE_RAD_S or (self._tick is not None and tick <= self._tick):
             return
         if self._tick is None or tick - self._tick > self._max_gap:
             self._read = None
@@ -190,7 +186,7 @@ class GyroscopeIntegral:
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
-        """Return the angle since the last call in rad and its variance in rad²; None if readings are missing."""
+        """Return the angle of rotation since the last call in rad, and its variance; None if readings are missing."""
         last, self._read = self._read, None
         if self._tick is None or abs(tick - self._tick) > self._max_gap:
             return None

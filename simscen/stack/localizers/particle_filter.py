@@ -1,6 +1,6 @@
-"""The particle filter of AMCL: predict, weigh, estimate, resample.
+"""The particle filter of AMCL: moves, weights, and resamples particles, and estimates the pose.
 
-Thrun, Burgard & Fox, Probabilistic Robotics, tables 8.2 to 8.4; nav2_amcl's pf.c.
+Sources: Thrun, Burgard & Fox, Probabilistic Robotics, tables 8.2 to 8.4; nav2_amcl's pf.c.
 """
 
 import math
@@ -28,11 +28,11 @@ from simscen.stack.localizers.sensor_models import SensorModel
 CONVERGED_WITHIN_M = 0.5
 """The filter has converged if all particles are within this distance of their mean (nav2_amcl's pf.dist_threshold)."""
 _DESCENDANT, _RANDOM = 1.0, 2.0
-"""Marks in the fourth column of drawn particles: descendant of a random particle, and random particle."""
+"""Marks in the fourth column of drawn particles: descendant of a random particle, and new random particle."""
 
 
 class ParticleFilter:
-    """Particles in the map frame that odometry moves and scans weight. Independent of time and of the odom frame.
+    """Particles in the map frame that odometry moves and scans weight.
 
     Subclasses may override `reset`, `_trusted_beams`, and `_resample`.
     """
@@ -49,7 +49,7 @@ class ParticleFilter:
         self.reset(Estimate(None))
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        """Restart with particles around the pose of the estimate, or over all free space if this pose is None."""
         self.particles = self._free_space.initial_particles(estimate, self._bound.max_samples, self._rng)
         self._augmented_mcl = AugmentedMcl(
             self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_fraction
@@ -70,9 +70,8 @@ class ParticleFilter:
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
         """Weight the particles by a scan and resample. Return the estimated pose and its covariance (3, 3).
 
-        Return None if the scan says nothing about the pose: it fits all particles equally well, or none at all. If it
-        fits none, the particles get equal weights, as in nav2_amcl, and the likelihood is zero for Augmented MCL. The
-        estimate is computed before resampling, which would only add noise (Probabilistic Robotics, section 4.3.4).
+        Return None if the scan fits all particles equally well, or none at all. If it fits none, all particles get the
+        same weight. The estimate is computed before resampling, which only adds noise.
         """
         spec, poses = self._spec, self.particles.poses
         exponent, beams = self._trusted_beams(self.beams(scan))
@@ -95,13 +94,13 @@ class ParticleFilter:
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use. Here: 1, and all beams."""
+        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use: by default 1 and all beams."""
         return 1.0, beams
 
     def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
-        """Pass to Augmented MCL how well a scan fits the particles, except those that the last scan drew at random.
+        """Pass the likelihood of a scan to Augmented MCL, at the particles that are not new random particles.
 
-        `weights` (n,) are not normalized; `shift` was subtracted from their logarithms.
+        `weights` (n,) are not normalized. `shift` was subtracted from their logarithms.
         """
         tracked = slice(None) if self._random is None or self._random.all() else ~self._random
         likelihood = float(weights[tracked].sum() / self.particles.weights[tracked].sum())
@@ -112,7 +111,7 @@ class ParticleFilter:
         self._augmented_mcl.observe(log_likelihood * scale, anywhere * scale)
 
     def _resample(self) -> None:
-        """Resample with every `resample_interval`-th scan. If selective, only when few particles carry the weight."""
+        """Resample at every `resample_interval`-th scan; with `selective_resampling`, only if few particles count."""
         self._corrections += 1
         self._random = None
         if self._corrections % self._spec.resample_interval:
@@ -135,9 +134,9 @@ class ParticleFilter:
         self.particles = Particles.with_equal_weights(drawn[:3].T)
 
     def _draw(self, count: int) -> Array:
-        """Return poses in random order, drawn from the particles or, for Augmented MCL, from the free space.
+        """Return random poses from the particles and, for Augmented MCL, from the free space, in random order.
 
-        Rows (count, 4): x, y, yaw, and _RANDOM, _DESCENDANT, or 0.
+        Rows (count, 4) are x, y, yaw, and the mark _RANDOM, _DESCENDANT, or 0.
         """
         drawn = np.zeros((count, 4))
         chosen = systematic_resampling(self.particles.weights, count, self._rng)

@@ -1,4 +1,4 @@
-"""Weighted particles: their initial distribution, their clusters, and the pose estimate with its covariance."""
+"""Weighted particles: initial distribution, clusters, and the pose estimate with its covariance."""
 
 import math
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Keys, bin_
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Poses (n, 3) x, y, yaw in the map frame and their weights (n,), which add up to one.
+    """Poses (n, 3) x, y, yaw in the map frame, and their weights (n,), which add up to one.
 
-    Sums are ten times as fast if each column of `poses` is contiguous, see `empty_poses`.
+    Columns of `poses` should be contiguous (see `empty_poses`), which makes sums ten times as fast.
     """
 
     poses: Array
@@ -42,7 +42,7 @@ class Particles:
 
     @cached_property
     def extent(self) -> tuple[float, float, float]:
-        """Extent of the poses in x, y (m), and yaw (rad, across ±π if that is shorter)."""
+        """Extent of the poses along x and y in m, and in yaw in rad (across ±π if that is smaller)."""
         dx, dy, turned = [values.item(values.argmax()) - values.item(values.argmin()) for values in self.poses.T]
         if turned > math.pi:
             turned = min(turned, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
@@ -56,7 +56,7 @@ class Particles:
         return table
 
     def are_within(self, distance: float) -> bool:
-        """Return whether each particle is at most this far from their mean, in x and in y."""
+        """Return whether all particles are within `distance` m of their mean, along x and along y."""
         if max(self.extent[:2]) <= distance:
             return True
         positions = self.poses[:, :2]
@@ -64,7 +64,7 @@ class Particles:
 
 
 def sample_around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
-    """Return poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
+    """Return random poses (count, 3) from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
     poses = empty_poses(count)
     poses[:] = rng.normal(pose, std, (count, 3))
     poses[:, 2] = wrap_array(poses[:, 2])
@@ -78,7 +78,7 @@ def empty_poses(count: int) -> Array:
 
 
 def wrap_headings(headings: Array) -> Array:
-    """Return the headings (n,) wrapped to [-π, π). Fast if they already are in this interval."""
+    """Return the headings (n,) wrapped to [-π, π). Fast if they are in this interval."""
     if not len(headings):
         return headings
     # argmax takes a fifth of the time of max.
@@ -96,14 +96,14 @@ def equal_weights(count: int) -> Array:
 
 
 class FreeSpace:
-    """Draws poses uniformly from the free cells of a map, or from all cells if none is free."""
+    """Draws poses uniformly from the free cells of a map; from all cells if none is free."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._grid = grid
 
     @cached_property
     def _cells(self) -> npt.NDArray[np.int32]:
-        """Indices of the cells to draw from. Computed only if needed, because large maps have many."""
+        """Flat indices of the cells to draw from."""
         free = np.flatnonzero(self._grid.cells == FREE)
         return (free if len(free) else np.arange(self._grid.cells.size)).astype(np.int32)
 
@@ -116,23 +116,21 @@ class FreeSpace:
         return poses
 
     def initial_particles(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
-        """Return particles around the estimate's pose, or over all free space if it has none."""
+        """Return particles around the pose of the estimate, or over all free space if this pose is None."""
         if estimate.pose is None:
             return Particles.with_equal_weights(self.draw(count, rng))
         return Particles.with_equal_weights(sample_around(estimate.pose, estimate.std, count, rng))
 
 
 MAX_COMPACT_BINS = 8
-"""Maximum number of bins that contain poses whose extent is less than one bin in all three coordinates."""
+"""Maximum number of histogram bins over which compact particles (see `are_compact`) can be distributed."""
 _NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
 
 
 def cluster_labels(keys: Keys) -> Keys:
-    """Return the cluster label (n,) of each particle: particles whose histogram bins `keys` (n,) touch are one cluster.
+    """Return a cluster label (n,) for each particle, given its histogram bin in `keys` (n,).
 
-    Unlike in nav2_amcl's pf_kdtree_cluster, bins also touch at corners, and across ±180° of the heading. A label is the
-    rank of the lowest bin of its cluster. For the few bins of a localized robot, this is three times as fast as scipy's
-    connected_components.
+    Adjacent bins form a cluster. Bins are also adjacent at corners, and across ±180° of the heading.
     """
     occupied, bin_index = np.unique(keys, return_inverse=True)
     x, y, yaw = decode_bins(occupied)
@@ -148,15 +146,11 @@ def cluster_labels(keys: Keys) -> Keys:
 
 
 def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Array]:
-    """Return the pose of the heaviest cluster, and the covariance (3, 3) of all particles about this pose.
+    """Return the mean pose of the heaviest cluster, and the covariance (3, 3) of all particles about this pose.
 
-    nav2_amcl uses the mean of the cluster, which lags behind a moving robot if the sensor model has flat weights. The
-    best particle does not lag, but jumps when another particle becomes the best. Here, two means are combined, weighted
-    by the inverse of their variances: the plain one, and one with the weights to the power `peak_power` (1: no effect).
-    docs/reference/localizers.md has the measurements.
-
-    The covariance is the expected squared error of the pose. As in nav2_amcl, it includes all particles, so that it
-    shows a second cluster. Unlike there, it includes the correlation of position and heading.
+    With `peak_power` 1, it is the plain mean, as in nav2_amcl. Otherwise, the plain mean is combined with a mean whose
+    weights are raised to `peak_power`. This mean lags less behind a moving robot. The two means are weighted by the
+    inverse of their variances (see docs/reference/localizers.md).
     """
     poses, weights = particles.poses, particles.weights
     if not are_compact(particles):
@@ -193,7 +187,7 @@ def _summarize_compact(particles: Particles) -> tuple[Pose2, Array]:
 
 
 def are_compact(particles: Particles) -> bool:
-    """Return whether the extent of the particles is less than one bin, so that they certainly are one cluster."""
+    """Return whether the extent of the particles is less than one histogram bin, so that they are one cluster."""
     x, y, yaw = particles.extent
     return x < BIN_SIZE_M and y < BIN_SIZE_M and yaw < 2 * math.pi / YAW_BINS
 
@@ -211,7 +205,7 @@ def _position_variance(poses: Array, weights: Array, mean: Pose2) -> float:
 
 
 def covariance_about(particles: Particles, pose: Pose2) -> Array:
-    """Return the covariance (3, 3) of the particles about `pose`: the expected squared error of this pose."""
+    """Return the covariance (3, 3) of the particles about `pose`."""
     error = pose_errors(np.array(pose), particles.poses).T
     covariance: Array = (error * particles.weights) @ error.T
     return covariance

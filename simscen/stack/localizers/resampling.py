@@ -1,7 +1,7 @@
-"""Resampling of particles: KLD sampling adapts their number, and Augmented MCL adds random ones to find a lost robot.
+"""Resampling of particles: KLD sampling adapts their number; Augmented MCL adds random particles to find a lost robot.
 
 KLD sampling: Fox, Adapting the Sample Size in Particle Filters Through KLD-Sampling, IJRR 22 (2003), equation 7;
-Probabilistic Robotics, table 8.4. The histogram is nav2_amcl's (pf_kdtree.c): bins of 0.5 m x 0.5 m x 10°.
+Probabilistic Robotics, table 8.4. The histogram has the bins of nav2_amcl (pf_kdtree.c): 0.5 m x 0.5 m x 10°.
 
 Augmented MCL: Thrun, Burgard & Fox, Probabilistic Robotics, section 8.3.5 and table 8.3.
 """
@@ -19,10 +19,9 @@ Indices = npt.NDArray[np.int64]
 
 
 def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) -> Indices:
-    """Return indices (count,), ascending, drawn in proportion to `weights` (n,) with minimum variance.
+    """Return ascending indices (count,), drawn in proportion to `weights` (n,).
 
-    Low-variance sampler of Probabilistic Robotics, table 4.4: an index with weight w is drawn ⌊count·w⌋ or ⌈count·w⌉
-    times.
+    Source: the low-variance sampler of Probabilistic Robotics, table 4.4.
     """
     cumulative = weights.cumsum()
     positions = (np.arange(count) + rng.random()) * (cumulative[-1] / count)
@@ -33,17 +32,17 @@ def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) 
 
 
 BIN_SIZE_M = 0.5
-"""Edge length of a histogram bin; fixed in nav2_amcl, too (pf_kdtree.c)."""
+"""Edge length of a histogram bin."""
 YAW_BINS = 36
-"""Number of bins of the heading: 10° each, as in pf_kdtree.c."""
+"""Number of histogram bins of the heading, 10° each."""
 _OFFSET = 1 << 21
-"""Added to the coordinates x and y of a bin, so that both are positive in its key."""
+"""Number that is added to the coordinates x and y of a bin, so that both are positive in the key."""
 Keys = npt.NDArray[np.int64]
-"""Keys of histogram bins, each of which encodes the integer coordinates x, y, yaw of a bin."""
+"""Keys of histogram bins: numbers that encode the integer coordinates x, y, yaw."""
 
 
 def bin_keys(poses: Array) -> Keys:
-    """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings may be outside of ±π."""
+    """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings need not be wrapped."""
     cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_OFFSET + 2, _OFFSET - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
     return encode_bins(cells[:, 0], cells[:, 1], yaw)
@@ -63,10 +62,10 @@ def decode_bins(keys: Keys) -> tuple[Keys, Keys, Keys]:
 
 @dataclass(frozen=True)
 class KldBound:
-    """Number of samples for which the sampled distribution probably differs from the true one by at most `error`.
+    """KLD bound: number of samples for which the sampled distribution differs from the true one by at most `error`.
 
-    `z` is the quantile of the standard normal distribution for this probability. Like nav2_amcl, simscen uses pf_z =
-    0.99 as the quantile itself, not as the probability 0.99 (whose quantile is 2.33).
+    `z` is the quantile of the standard normal distribution for the probability of this. As in nav2_amcl, the default
+    0.99 is the quantile itself, not the probability.
     """
 
     error: float
@@ -75,10 +74,9 @@ class KldBound:
     max_samples: int
 
     def samples(self, occupied: npt.ArrayLike) -> Keys:
-        """Return the samples needed for numbers of occupied bins, between `min_samples` and `max_samples`.
+        """Return the number of samples needed for each number of occupied bins.
 
-        A single bin means that the pose is certain: Fox's bound is zero, and this returns `min_samples`. nav2_amcl
-        returns `max_samples` instead.
+        The result is between `min_samples` and `max_samples`; `min_samples` for a single bin.
         """
         degrees = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
         spread = 2 / (9 * degrees)
@@ -86,7 +84,7 @@ class KldBound:
         return np.clip(np.ceil(needed), self.min_samples, self.max_samples).astype(np.int64)
 
     def sufficient_count(self, keys: Keys) -> int | None:
-        """Return how many of n samples are sufficient, given their bins (n,) in order; None if n are not sufficient."""
+        """Return how many of the first samples are sufficient, given their bins (n,); None if n are not sufficient."""
         if len(keys) == self.min_samples:  # no smaller number can be sufficient
             return self.min_samples if self.min_samples >= self.samples(len(np.unique(keys))) else None
         is_new = np.zeros(len(keys), dtype=np.int64)
@@ -97,10 +95,9 @@ class KldBound:
 
 
 def kld_sampling(draw: Callable[[int], Array], bound: KldBound) -> Array:
-    """Draw poses (n, 3) with `draw(count)` until the KLD bound is satisfied. Rows may have more than three columns.
+    """Draw poses (n, 3 or more) with `draw(count)` until their number satisfies the KLD bound.
 
-    Fox (2003), table 3, but in blocks instead of one by one: the sequence of poses is cut where it first satisfies the
-    bound. For this, `draw` must return its poses in random order.
+    Source: Fox (2003), table 3, but in blocks instead of one by one. `draw` must return poses in random order.
     """
     poses = draw(bound.min_samples)
     while (count := bound.sufficient_count(bin_keys(poses))) is None:
@@ -111,39 +108,33 @@ def kld_sampling(draw: Callable[[int], Array], bound: KldBound) -> Array:
 PROBE_COUNT = 200
 """Number of random poses at which each scan is evaluated."""
 MIN_BETTER_FRACTION = 0.1
-"""The filter is lost only if at least this fraction of random poses fits recent scans better than the particles."""
+"""Minimum fraction of random poses that fit recent scans better than the particles if the robot is lost."""
 MAX_STRAY_SCANS = 4.0
-"""Random particles and their descendants ("strays") are limited to the number that this many scans may add."""
+"""Random particles and their descendants ("strays") are limited to the number that can be added at this many scans."""
 _MAX_LOG_RATIO = 50.0
 """Maximum logarithm of a likelihood ratio, so that its exponential stays finite."""
 
 
 class AugmentedMcl:
-    """Decides how many random particles to add, from a fast and a slow running average of how well scans fit.
+    """Decides how many random particles to add, from a fast and a slow running average of a likelihood ratio.
 
-    The book and nav2_amcl average the likelihood of the scans. It depends not only on the pose: people, glass, and an
-    outdated map lower it although the pose is right, and then good particles are replaced. Here, each scan is also
-    evaluated at PROBE_COUNT random poses. The averages are those of a ratio: the likelihood of a scan at the particles,
-    divided by its likelihood at the random poses.
+    The ratio is the likelihood of a scan at the particles, divided by its likelihood at PROBE_COUNT random poses.
+    (nav2_amcl averages the likelihood itself, which also decreases if obstacles are not on the map.)
 
-    Random particles are added while the fast average is below the slow one and at least MIN_BETTER_FRACTION of the
-    random poses fit the recent scans better than the particles. If the sensor model has flat weights, it takes many
-    scans to remove wrong particles. Therefore one scan adds at most the fraction `max_fraction`, and random particles
-    and their descendants are limited in total; older ones make room for new ones.
-
-    nav2_amcl resets both averages after it has added random particles, so that it stops after a few dozen particles.
-    This is not necessary here, because the random particles of the last scan are not part of the ratio.
+    Random particles are added while the fast average is below the slow one. Besides, at least MIN_BETTER_FRACTION of
+    the random poses must fit recent scans better than the particles.
     """
 
     def __init__(self, alpha_slow: float, alpha_fast: float, max_fraction: float = 1.0) -> None:
+        """Take Nav2's recovery_alpha_slow and recovery_alpha_fast, and the largest fraction to add at one scan."""
         self.is_enabled, self._max_fraction = alpha_fast > 0, max_fraction
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
         self._better_fraction = RunningAverage(alpha_fast)
 
     def observe(self, tracked: float, anywhere: Array) -> None:
-        """Add a scan by its log likelihoods: the mean over the particles (`tracked`), and those at random poses (n,).
+        """Add the log likelihoods of a scan: the mean over the `tracked` particles, and those `anywhere` (n,).
 
-        The scale must be the same for all scans, see SensorModel.tempering_exponent.
+        `anywhere` are random poses. Likelihoods of different scans must be comparable (SensorModel.tempering_exponent).
         """
         best = float(anywhere.max())
         average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf
@@ -154,23 +145,20 @@ class AugmentedMcl:
 
     @property
     def random_fraction(self) -> float:
-        """Fraction of new particles to draw at random: 1 - fast / slow, limited to the maximum; 0 if not lost."""
+        """Fraction of new particles to draw at random: 1 - fast / slow, at most `max_fraction`; 0 if not lost."""
         slow, fast = self._slow.value, self._fast.value
         if slow <= 0 or self._better_fraction.value < MIN_BETTER_FRACTION:
             return 0.0
         return min(self._max_fraction, max(0.0, 1 - fast / slow))
 
     def kept_fraction(self, stray_weight: float) -> float:
-        """Return the fraction of earlier random particles and descendants to keep, given their weight (0 … 1)."""
+        """Return the fraction of earlier random particles and their descendants to keep, given their weight (0 … 1)."""
         allowed = min(1.0, MAX_STRAY_SCANS * self._max_fraction) - self.random_fraction
         return 1.0 if stray_weight <= allowed else max(0.0, allowed / stray_weight)
 
 
 class RunningAverage:
-    """Average with exponentially decaying weights, or with equal weights if `alpha` is zero.
-
-    The weights are normalized from the first value on (Kingma & Ba, Adam, 2015, section 3).
-    """
+    """Average with exponentially decaying weights, or with equal weights if `alpha` is zero. Without initial bias."""
 
     def __init__(self, alpha: float) -> None:
         self._alpha, self._sum, self._weight = alpha, 0.0, 0.0
@@ -182,5 +170,5 @@ class RunningAverage:
 
     @property
     def value(self) -> float:
-        """The average, 0 before the first value."""
+        """The average; 0 before the first value."""
         return self._sum / self._weight if self._weight else 0.0

@@ -3,9 +3,8 @@
 Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and table 6.3; nav2_amcl's
 likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing are ignored.
 
-The beam model of Thrun, Burgard & Fox, Probabilistic Robotics, section 6.3 and table 6.1, as in nav2_amcl's
-beam_model.cpp. Rays are marched through the distance field, as in Walsh & Karaman, CDDT: Fast Approximate 2D Ray
-Casting for Accelerated Localization (ICRA 2018), section II.
+Beam model: Probabilistic Robotics, section 6.3 and table 6.1; nav2_amcl's beam_model.cpp. Ray casting: Walsh & Karaman,
+CDDT: Fast Approximate 2D Ray Casting for Accelerated Localization (ICRA 2018), section II.
 """
 
 import math
@@ -21,17 +20,17 @@ from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, evaluate_in_blocks
 
 PEAK_POWER_OF_SUMS = 16.0
-"""`peak_power` of models with flat weights 1 + Σ p³: one more fitting beam of 60 adds only 1 to 2 % to the weight."""
+"""`peak_power` of models with the weight 1 + Σ p³, which differs little between good and bad particles."""
 MAX_RANDOM_FRACTION_OF_SUMS = 0.05
-"""`max_random_fraction` of such models: a random particle has half the weight of a good one and survives many scans."""
+"""`max_random_fraction` of models with the weight 1 + Σ p³, with which random particles survive many scans."""
 
 
 class SensorModel(Protocol):
-    """Evaluates particles by a scan."""
+    """Computes the likelihood of a scan at the poses of particles."""
 
     @property
     def peak_power(self) -> float:
-        """Power of the weights that emphasizes the best particles; 1 if the weights are not flat. See `summarize`."""
+        """Power of the weights with which the pose estimate emphasizes the best particles; 1 has no effect."""
         ...
 
     @property
@@ -42,36 +41,34 @@ class SensorModel(Protocol):
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Return the log likelihoods (n,) of the beams at each of the `poses` (n, 3); -inf if impossible, never nan.
 
-        `converged` means that the particles are one narrow cluster, so that beams may be skipped.
+        `converged`: the particles are one narrow cluster, so that beam skipping is allowed.
         """
         ...
 
     def tempering_exponent(self, beams: Beams) -> float:
-        """Return the exponent that makes the likelihoods of scans comparable: 1/beams for a product, 1 for a sum."""
+        """Return an exponent that makes likelihoods of scans with different numbers of beams comparable."""
         ...
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     """Return distances to the surfaces of occupied areas; outside the map the maximum, as in nav2_amcl.
 
-    Maps from SLAM contain only surfaces, but in drawn maps, walls are filled. If their inside counted as an obstacle,
-    particles would be attracted to it, although beams cannot end there.
+    Without cells inside walls, where beams cannot end, walls do not attract particles.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return the solid cells (height, width) that have a neighbor on the map that is not solid."""
+    """Return the solid cells (height, width) with a neighbor on the map that is not solid."""
     padded = np.pad(solid, 1, constant_values=True)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return solid & ~inside
 
 
 class LikelihoodField:
-    """Default model of nav2_amcl: the weight of a particle is 1 + Σ p³, with the likelihoods p of its beams.
+    """Default model of nav2_amcl: the weight of a particle is 1 + Σ p³ over the likelihoods p of its beams.
 
-    nav2_amcl calls this an "ad-hoc weighting scheme", since it is not a product of probabilities. It tolerates beams
-    that hit something that is not on the map, and no pose is impossible.
+    It tolerates beams that hit obstacles that are not on the map.
     """
 
     peak_power, max_random_fraction = PEAK_POWER_OF_SUMS, MAX_RANDOM_FRACTION_OF_SUMS
@@ -93,7 +90,7 @@ class LikelihoodField:
         return evaluate_in_blocks(weigh, poses)
 
     def tempering_exponent(self, beams: Beams) -> float:
-        """Return 1: a sum of cubes has the same scale for any number of beams."""
+        """Return 1: log(1 + Σ p³) grows only slowly with the number of beams."""
         return 1.0
 
 
@@ -102,8 +99,8 @@ class BeamSkipping:
     """Parameters of beam skipping, which ignores beams that hit people or other obstacles that are not on the map.
 
     A beam fits a particle if it ends less than `distance` m from an obstacle. A beam is skipped if it fits at most the
-    fraction `threshold` of the particles. If the fraction `error_threshold` of the beams would be skipped, the pose is
-    wrong, and no beam is skipped.
+    fraction `threshold` of the particles. No beam is skipped if this applies to the fraction `error_threshold` of the
+    beams.
     """
 
     distance: float
@@ -130,7 +127,7 @@ class LikelihoodFieldProb:
         self._exponents: Float32 = np.empty(0, dtype=np.float32)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
-        """Return the logarithms (n,) of the product."""
+        """Return the logarithms (n,) of the products."""
         used = (
             self._used_beams(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
         )
@@ -144,11 +141,11 @@ class LikelihoodFieldProb:
         return evaluate_in_blocks(weigh, poses)
 
     def tempering_exponent(self, beams: Beams) -> float:
-        """Return the exponent of the geometric mean over the beams that hit something."""
+        """Return the exponent that turns the product into a geometric mean over the beams that hit something."""
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self.exponent
 
     def _beam_exponents(self, beams: int) -> Float32:
-        """Return an array (beams,) of `exponent`: a matrix product with it is faster than numpy's sum."""
+        """Return an array (beams,) filled with `exponent`."""
         if beams != len(self._exponents):
             self._exponents = np.full(beams, self.exponent, dtype=np.float32)
         return self._exponents
@@ -164,11 +161,11 @@ class LikelihoodFieldProb:
         return self._logarithm
 
     def _hit_likelihoods(self) -> Float32:
-        """Return the likelihood of a hit in each cell, without the random part."""
+        """Return the likelihood of a hit in each cell, without random ranges."""
         return _hit_likelihoods(self._field, self._z_hit, self._sigma_hit)
 
     def _used_beams(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
-        """Return which beams are not skipped."""
+        """Return which beams (m,) are not skipped."""
         near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
         is_pose_wrong = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
@@ -188,7 +185,7 @@ def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
 
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
-    """Return the ranges (n, b) in m that `beams` would measure at `poses` (n, 3), to within half a cell."""
+    """Return the ranges (n, b) in m that `beams` would have at `poses` (n, 3), to within half a cell."""
     positions, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
     forward, left, c, s = beams.origin.real, beams.origin.imag, np.cos(heading), np.sin(heading)
     angle, cell = heading + beams.bearings, field.resolution
@@ -200,7 +197,7 @@ def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
 
 
 def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float) -> Array:
-    """Return the free lengths of rays (r,) from x, y along `angle`, at most `limit`; all lengths in cells."""
+    """Return the free lengths of rays (r,) from x, y (r,) along `angle` (r,), at most `limit`; all lengths in cells."""
     cos, sin, traveled, active = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
     while active.size:
         column = (x[active] + cos[active] * traveled[active]).astype(np.float32)
@@ -215,7 +212,10 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """Model with ray casting: p of a beam is a mixture of hit, short, maximum, and random ranges; weights 1 + Σ p³."""
+    """Model with ray casting, in which the weight of a particle is 1 + Σ p³ over the likelihoods p of its beams.
+
+    The likelihood is a mixture of hit, short, maximum, and random ranges.
+    """
 
     peak_power: ClassVar[float] = PEAK_POWER_OF_SUMS
     max_random_fraction: ClassVar[float] = MAX_RANDOM_FRACTION_OF_SUMS
@@ -243,5 +243,5 @@ class BeamModel:
         return evaluate_in_blocks(weigh, poses)
 
     def tempering_exponent(self, beams: Beams) -> float:
-        """Return 1: a sum of cubes has the same scale for any number of beams."""
+        """Return 1: log(1 + Σ p³) grows only slowly with the number of beams."""
         return 1.0

@@ -1,1 +1,1 @@
-"""Planners: paths on the global costmap, found by OMPL or by a grid search."""
+"""Planners, which find paths on the global costmap with OMPL or a grid search."""

@@ -1,4 +1,4 @@
-"""Start and goal of a search: checked, with Nav2's error codes, and moved to free cells."""
+"""Checks of the start and the goal of a search, and their displacement to free cells."""
 
 import math
 from collections.abc import Iterator
@@ -15,12 +15,12 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 MAX_ESCAPE_M = 0.5
-"""Maximum distance that a robot too close to an obstacle may drive until it is free."""
+"""Maximum distance from a start too close to an obstacle to the nearest free cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """Start and goal (x, y) of a search, moved to free cells where necessary.
+    """Start and goal (x, y) of a search, moved to free cells if necessary.
 
     `reachable` (height, width) are the free cells that are connected with the start.
     """
@@ -33,9 +33,9 @@ class Endpoints:
 def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """Return the start and goal of the search.
 
-    A start too close to an obstacle is moved to the nearest free point to which a straight line without obstacles
-    leads. A goal that is not reachable is moved to the nearest reachable point within `tolerance` m. Raises
-    START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED, or NO_VALID_PATH.
+    A start too close to an obstacle is moved to the nearest free point that a straight line connects without obstacles.
+    An unreachable goal is moved to the nearest reachable point within `tolerance` m. Raises NavigationFailure with
+    START_OUTSIDE_MAP, GOAL_OUTSIDE_MAP, START_OCCUPIED, GOAL_OCCUPIED, or NO_VALID_PATH.
     """
     _raise_if_blocked(costs, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _raise_if_blocked(costs, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
@@ -72,7 +72,7 @@ def free_points(
 ) -> Iterator[tuple[float, float]]:
     """Yield the position of `pose` if its cell is free, then the centers of free cells, the nearest first.
 
-    `free` (height, width) are the free cells; their centers are at most `max_distance` m away.
+    `free` (height, width) are the free cells. Cells farther away than `max_distance` m are left out.
     """
     row, column = costs.cell((pose.x, pose.y))
     if free[row, column]:
@@ -90,14 +90,14 @@ def free_points(
 
 
 def _is_line_free(costs: TraversalCosts, start: Pose2, point: tuple[float, float]) -> bool:
-    """Return whether no obstacle is on the line from the start to a point."""
+    """Return whether no obstacle is on the line from the start to a point (x, y)."""
     line = densify(np.array([(start.x, start.y), point]), 0.5 * costs.resolution)
     columns, rows = np.floor((line - costs.origin) / costs.resolution).astype(np.int64).T
     return bool((costs.costmap.distance[rows, columns] > 0.0).all())
 
 
 def reachable_bounds(costs: TraversalCosts, ends: Endpoints) -> tuple[float, float, float, float]:
-    """Return the bounding box (min x, min y, max x, max y) of the reachable cells in m."""
+    """Return the bounding box (min x, min y, max x, max y) in m of the reachable cells."""
     rows, columns = np.flatnonzero(ends.reachable.any(axis=1)), np.flatnonzero(ends.reachable.any(axis=0))
     (x, y), size = costs.origin, costs.resolution
     return (

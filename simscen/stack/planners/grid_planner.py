@@ -1,4 +1,4 @@
-"""Grid planners: Nav2's NavFn and SmacPlanner2D, which find the cheapest path from cell to cell for a round robot."""
+"""Grid planners, Nav2's NavFn and SmacPlanner2D: the cheapest path from cell to cell for a round robot."""
 
 import numpy as np
 
@@ -15,19 +15,19 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, Rob
 from simscen.stack.setting import Setting
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
-"""NavFn counts 50 + 0.8 · cost for each cell (nav2_navfn_planner/navfn.hpp)."""
+"""Coefficients of NavFn, in which a cell costs 50 + 0.8 · cost (nav2_navfn_planner/navfn.hpp)."""
 BORDER_CELLS = 2
-"""Width of the border of blocked cells that GridGraph needs around the costmap."""
+"""Width of the border of blocked cells around the costmap, which GridGraph needs."""
 
 
 def navfn(spec: Navfn, setting: Setting) -> Planner:
-    """Build NavFn, with moves in 16 directions instead of the gradient descent on its potential."""
+    """Build NavFn, but with moves in 16 directions instead of a gradient descent on the potential."""
     multiplier = COST_FACTOR * MAX_NON_OBSTACLE / COST_NEUTRAL
     return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, SIXTEEN_NEIGHBORS, True, setting.robot)
 
 
 def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
-    """Build SmacPlanner2D, with moves to the eight neighbors (Moore neighborhood)."""
+    """Build SmacPlanner2D, which moves to the eight neighbors (Moore neighborhood)."""
     return GridPlanner(
         spec.tolerance,
         spec.cost_travel_multiplier,
@@ -39,7 +39,7 @@ def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
 
 
 class GridPlanner:
-    """Plans with Dijkstra's algorithm on the cells, with these (row, column) `moves`. The seed has no effect."""
+    """Plans with Dijkstra's algorithm on the costmap cells. `moves` (rows, columns) connect the cells."""
 
     def __init__(
         self,
@@ -54,7 +54,10 @@ class GridPlanner:
         self._moves, self._smooth, self._robot = moves, smooth, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none."""
+        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none.
+
+        The seed has no effect.
+        """
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
@@ -64,7 +67,7 @@ class GridPlanner:
         return Path(with_headings(densify(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
     def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
-        """Return the path (n, 2) from start to goal through cells, smoothed if possible, without cutting corners."""
+        """Return the path (n, 2) through cell centers, smoothed if possible, that cuts no corners of blocked cells."""
         raw = np.vstack((ends.start, cells[1:-1], ends.goal))
         for points in (smoothed(costs, raw), raw) if self._smooth else (raw,):
             path = avoid_cell_corners(costs, densify(points, SPACING_M))

@@ -1,4 +1,4 @@
-"""OMPL planners of the reference stack: OmplPlanner searches over positions, PosePlanner over poses."""
+"""Planners that use OMPL: OmplPlanner searches over positions, PosePlanner over poses (position and heading)."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -30,26 +30,26 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
-PLANE_ONLY = ("bit_star", "aorrtc", "medial_axis")
-"""Types of planners that PosePlanner replaces by RRT-Connect; OMPL's AORRTC (2.0.1), for example, fails over poses."""
-MIN_RADIUS_M = 0.2
-"""Planned turning radius of a long robot that can turn in place, so that it rarely has to."""
-RADIUS_RATIO = 1.15
-"""Ratio of the planned turning radius of a car to its minimum, so that the controller can correct to both sides."""
+POSITION_PLANNERS = ("bit_star", "aorrtc", "medial_axis")
+"""Types of planners that do not search over poses. PosePlanner replaces them by RRT-Connect."""
+MIN_TURNING_RADIUS_M = 0.2
+"""Turning radius in plans of a long robot, which could also turn in place."""
+TURNING_RADIUS_RATIO = 1.15
+"""Ratio of the turning radius in plans of a car to its minimum, so that the controller can correct to both sides."""
 FINAL_CHECKS_PER_STEP = 50
-"""Number of poses per step of a found path at which the footprint is finally checked."""
+"""Number of poses between two poses of a found path at which the footprint is finally checked."""
 MAX_DEEPER_M = 0.01
-"""Distance by which a footprint in collision may get deeper into the obstacle while it leaves it."""
+"""Distance by which a footprint in collision may get deeper into the obstacle before it leaves the obstacle."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """Parameters of one attempt of PosePlanner to find a path in a region.
+    """Parameters of one attempt of PosePlanner to find a path in the reachable cells.
 
-    bounds:              bounding box of the region (min x, min y, max x, max y) in m
-    contains:            returns whether a point (x, y) is in the region
-    clearance:           clearance in m around the footprint
-    iteration_fraction:  fraction of `max_iterations`
+    bounds:              bounding box of the reachable cells (min x, min y, max x, max y) in m
+    contains:            function that returns whether a point (x, y) is in a reachable cell
+    clearance:           required clearance in m around the footprint
+    iteration_fraction:  fraction of `max_iterations` for this attempt
     spacing:             distance in m between two collision checks
     """
 
@@ -61,16 +61,21 @@ class Attempt:
 
 
 class PosePlanner:
-    """Searches over poses and checks the footprint at each pose, for cars and long robots."""
+    """Planner for cars and long robots: searches over poses, and checks the footprint at each pose."""
 
     def __init__(self, spec: OmplParameters, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
         self._inscribed = robot.inscribed_radius
-        self._type = "rrt_connect" if spec.type in PLANE_ONLY else spec.type
-        self._turning_radius = spec.minimum_turning_radius or max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
+        self._type = "rrt_connect" if spec.type in POSITION_PLANNERS else spec.type
+        self._turning_radius = spec.minimum_turning_radius or max(
+            TURNING_RADIUS_RATIO * robot.turning_radius, MIN_TURNING_RADIUS_M
+        )
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return the cheapest path of `pose_searches` searches: poses in the map frame, at most 5 cm apart."""
+        """Return the cheapest path of several searches: poses in the map frame, at most 5 cm apart.
+
+        Raises NavigationFailure if there is no path.
+        """
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         field = DistanceLookup(costmap if self._spec.allow_unknown else self._block_unknown(costmap))
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
@@ -97,18 +102,18 @@ class PosePlanner:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _configure(self, planner: Any) -> None:
-        """Set the parameters of OMPL's planner."""
+        """Set the parameters of a planner of OMPL."""
         if isinstance(self._spec, PlannerSpec):
             set_parameters(planner, self._spec)
 
     def _cost(self, costs: TraversalCosts, poses: Array) -> float:
-        """Return the cost of a path (n, 3), including `cusp_penalty` for each change of direction."""
+        """Return the cost of a path (n, 3), including `cusp_penalty` for each change of the driving direction."""
         steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
         midpoints = 0.5 * (poses[1:, :2] + poses[:-1, :2])
         return float((steps * costs.at(midpoints)).sum()) + self._spec.cusp_penalty * int(cusps(poses).size)
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield the attempts in order: with less and less clearance, and finally with finer collision checks."""
+        """Yield attempts with decreasing clearance, the last one with finer collision checks."""
         bounds, reachable = reachable_bounds(costs, ends), ends.reachable
         size, (x0, y0) = costs.resolution, costs.origin
         rows, columns = reachable.shape
@@ -127,7 +132,7 @@ class PosePlanner:
             yield Attempt(bounds, contains, clearance, fraction, spacing)
 
     def _is_collision_free(self, costs: TraversalCosts, poses: Array) -> bool:
-        """Return whether the footprint is free of collisions along the path, also between the checks of the search."""
+        """Return whether the footprint is free of collisions along a path (n, 3). Checks more poses than the search."""
         fractions = np.arange(FINAL_CHECKS_PER_STEP) / FINAL_CHECKS_PER_STEP
         yaw = np.unwrap(poses[:, 2])
         unwrapped = np.column_stack((poses[:, :2], yaw))
@@ -136,12 +141,12 @@ class PosePlanner:
         return bool(self._footprint.free(costs.costmap, checked).all() and np.isfinite(costs.at(checked[:, :2])).all())
 
     def _block_unknown(self, costmap: CostmapView) -> CostmapView:
-        """Return a copy of the costmap in which the robot does not fit in unknown cells."""
+        """Return a copy of the costmap in which unknown cells count as too close to an obstacle."""
         limited = np.minimum(costmap.distance, np.float32(self._inscribed))
         return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, limited, costmap.distance))
 
     def _move_goal_to_fit(self, costmap: CostmapView, goal: Pose2, points: Iterable[tuple[float, float]]) -> Pose2:
-        """Return the goal moved to the first of the points where the footprint fits with the heading of the goal."""
+        """Return the goal moved to the first point where the footprint fits. Raises GOAL_OCCUPIED otherwise."""
         poses = np.array([(*point, goal.yaw) for point in points])
         free = self._footprint.free(costmap, poses)
         if not free.any():
@@ -150,10 +155,9 @@ class PosePlanner:
         return Pose2(*poses[free.argmax()].tolist())
 
     def _escape_path(self, costs: TraversalCosts, start: Pose2) -> Array:
-        """Return poses (n, 3) from the start to the nearest pose where the footprint fits.
+        """Return poses (n, 3) on the shortest arc from the start to a pose where the footprint fits.
 
-        Out of a collision, they follow the shortest arc that does not lead deeper into the obstacle. Raises
-        START_OCCUPIED if there is none.
+        The arc may not lead deeper into an obstacle. Raises START_OCCUPIED if there is no such arc.
         """
         costmap, best = costs.costmap, None
         for arc in escape_arcs(self._space, self._turning_radius, start):
@@ -170,7 +174,7 @@ class PosePlanner:
         return best
 
     def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
-        """Return a check of poses: in the region, and free of collisions with the clearance, except near the `ends`."""
+        """Return a check that poses are reachable, free of collisions, and, except near `ends`, have clearance."""
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance
         # The distances are those between cell centers, which are wrong by up to a cell diagonal.
@@ -191,15 +195,15 @@ class PosePlanner:
 
 
 FINE_SPACING_CELLS = 0.125
-"""Spacing of the collision checks, in cells, after a search whose path was blocked between its checks."""
+"""Spacing of the collision checks after a search has returned a path through a blocked cell."""
 MAX_SEARCHES = 4
-"""Number of searches with different seeds before planning fails, because a search may miss a narrow gap."""
+"""Number of searches with different seeds before planning fails."""
 REPEATED_REWIRE_FACTOR = 1.6
-"""Default `rewire_factor` after a search without a path: longer motions find narrow gaps, but take more time."""
+"""Default `rewire_factor` after a search without a path. It permits longer motions, which find narrow gaps."""
 
 
 class OmplPlanner:
-    """Searches over positions, for a disc with the inscribed radius of the robot."""
+    """Planner for compact robots: searches over positions of a disc with the inscribed radius of the robot."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
@@ -217,7 +221,7 @@ class OmplPlanner:
         return Path(with_headings(points, goal))
 
     def _avoid_narrow_gaps(self, costs: TraversalCosts, ends: Endpoints) -> tuple[TraversalCosts, Endpoints]:
-        """Return costs and endpoints with narrow gaps blocked, unless these gaps are the only way to the goal."""
+        """Return costs and endpoints with narrow gaps blocked; unchanged if the goal is only reachable through them."""
         if self._spec.gap_clearance == 0.0:
             return costs, ends
         wide = costs.without_narrow_gaps(self._spec.gap_clearance, (ends.start, ends.goal))
@@ -242,16 +246,16 @@ class OmplPlanner:
 
 
 def make_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
-    """Return the search problem, bounded by the cells that are reachable from the start."""
+    """Return the search problem within the bounding box of the reachable cells."""
     return Problem(ends.start, ends.goal, reachable_bounds(costs, ends), costs.between)
 
 
 LONG_HULL_RATIO = 2.0
-"""Ratio of circumscribed to inscribed radius above which the planner takes the heading of the robot into account."""
+"""Ratio of circumscribed to inscribed radius above which a robot is long, so that its heading is planned, too."""
 
 
 def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Build the planner for the requested state space, or for the one that fits the robot."""
+    """Build the planner for the state space of `state_space_for`."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return OmplPlanner(spec, setting.robot)
@@ -259,10 +263,10 @@ def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
 
 
 def state_space_for(requested: StateSpace, robot: RobotModel) -> Literal["holonomic", "se2", "dubins", "reeds_shepp"]:
-    """Return the state space to plan in.
+    """Return the state space to plan in. "holonomic" means positions only.
 
-    "auto" means "reeds_shepp" for a car, "se2" for a long robot, and otherwise "holonomic" (positions only). "se2" is
-    replaced by "dubins" with tight arcs if the robot cannot move sideways, because its heading is that of its path.
+    "auto" means "reeds_shepp" for a car, "se2" for a long robot, and otherwise "holonomic". If the robot cannot move
+    sideways, "se2" is replaced by "dubins".
     """
     space = requested
     if space == "auto":

@@ -1,8 +1,4 @@
-"""OMPL search over positions in the plane, with the costs of a costmap. Seeded, and limited by iterations.
-
-OMPL has one random generator for the whole process. It is seeded again for each search, before any other object of OMPL
-is created. The log of OMPL is silenced, because it warns about the repeated seed, although the seed takes effect.
-"""
+"""OMPL search over positions in the plane, with the costs of a costmap. Seeded, and limited by iterations."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -18,9 +14,9 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 
 Point = tuple[float, float]
 Motion = Callable[[float, float, float, float], float]
-"""Returns the cost of a straight motion from (x, y) to (x, y): at least its length in m; inf if blocked."""
+"""Function that returns the cost of a motion from (x, y) to (x, y): at least its length in m; inf if blocked."""
 Termination = Callable[[], bool]
-"""Function that OMPL calls in each iteration. The search stops when it returns True."""
+"""Function that OMPL calls in each iteration. The search stops when the result is True."""
 
 PLANNERS: dict[str, Callable[[Any], Any]] = {
     "rrt_connect": og.RRTConnect,
@@ -30,9 +26,9 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
     "aorrtc": og.AORRTC,
     "kpiece": og.KPIECE1,
 }
-"""OMPL planners by the `type` in the specification; called with the space information."""
+"""OMPL planners by the `type` in the specification. The argument is OMPL's space information."""
 FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
-"""Planners that stop at their first path. The others continue to improve the path."""
+"""Types of planners that stop at their first path. All others continue to improve the path."""
 DEFAULT_RANGE_M = 1.0
 """Default of the parameter `range`."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
@@ -40,13 +36,13 @@ DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 CHECK_PERIOD = 16
 """Number of iterations between two evaluations of the condition that ends a search."""
 PERTURBATIONS_M = (0.5, 0.15)
-"""Distances by which the simplification moves states to reduce the cost of the path, in one pass for each distance."""
-ou.setLogLevel(ou.LOG_NONE)
+"""Distances by which path simplification moves states, one after the other."""
+ou.setLogLevel(ou.LOG_NONE)  # OMPL warns that its random generator is seeded again, although this has an effect
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m, with costs of motions."""
+    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y) in m. `motion` returns costs."""
 
     start: Point
     goal: Point
@@ -55,7 +51,7 @@ class Problem:
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Validates a motion by its cost: one call of Python instead of one for each state along the motion."""
+    """Accepts motions with a finite cost."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -67,7 +63,7 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no 
 
 
 class _AcceptEveryMotion(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Accepts all motions. For BIT*, which computes the cost of a motion first and drops motions that cost inf."""
+    """Accepts all motions: BIT* drops motions with infinite cost by itself."""
 
     def checkMotion(self, _a: Any, _b: Any) -> bool:
         """Return True."""
@@ -92,7 +88,7 @@ class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl 
 
 
 class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Objective: the cost of a motion. Derived from path length, because OMPL has informed sampling only for that."""
+    """Objective: the cost of a motion. Subclass of the path length, for which OMPL has informed sampling."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -108,7 +104,7 @@ class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # o
 
 
 class StateValidity:
-    """Checks that a state is not in a blocked cell."""
+    """Accepts states that are not in a blocked cell."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -124,20 +120,17 @@ def _impossible(_ax: float, _ay: float, _bx: float, _by: float) -> float:
 
 
 class OmplSearch:
-    """One search by one of OMPL's planners. Subclasses may restrict where it samples, and change when it stops."""
+    """One search by a planner of OMPL. Subclasses may override `_make_validity` and `_make_termination`."""
 
     def __init__(self, spec: PlannerSpec, problem: Problem, seed: int) -> None:
-        """Prepare a search with the planner and the parameters of a specification.
-
-        A planner that improves its path stops after `improving_iterations`, BIT* after `max_batches` batches.
-        """
+        """Take the planner and its parameters, the problem, and the seed of the random generator."""
         self.spec, self.problem, self.seed = spec, problem, seed
         self._callbacks: list[Any] = []
 
     def solve(self, *, simplify: bool) -> list[Point] | None:
-        """Return the points of a path from start to goal; None if no exact solution was found in `max_iterations`.
+        """Return the points of a path from start to goal; None if there is no exact solution after `max_iterations`.
 
-        With `simplify`, the path is shortened and its states are moved to reduce its cost.
+        With `simplify`, the path is shortened, and its states are moved to reduce the cost.
         """
         try:
             return self._solve(simplify)
@@ -146,7 +139,7 @@ class OmplSearch:
                 callback.motion = _impossible
 
     def _solve(self, simplify: bool) -> list[Point] | None:
-        ou.RNG.setSeed(self.seed)
+        ou.RNG.setSeed(self.seed)  # before any object of OMPL is created: it has one generator for the whole process
         problem, information = self.problem, self._make_information()
         motions = information.getMotionValidator()
         ends = _state(information, problem.start), _state(information, problem.goal)
@@ -172,7 +165,7 @@ class OmplSearch:
         return [(state[0], state[1]) for state in path.getStates()]
 
     def _configure(self, planner: Any) -> None:
-        """Set the parameters of a planner."""
+        """Set the parameters of a planner of OMPL."""
         if self.spec.type == "bit_star":
             planner.setUseKNearest(False)
             planner.setRewireFactor(DEFAULT_BIT_STAR_REWIRE_FACTOR)
@@ -181,7 +174,7 @@ class OmplSearch:
         set_parameters(planner, self.spec)
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Return the termination condition of this planner."""
+        """Return the termination condition: after `max_iterations`, or when a path has been improved enough."""
         spec = self.spec
         if spec.type in FEASIBLE_ONLY:
             return stop_after(spec.max_iterations)
@@ -212,7 +205,7 @@ class OmplSearch:
         return information
 
     def _make_objective(self, information: Any) -> Any:
-        """Return the objective: OMPL's path length, whose heuristic is fast, plus the cost beyond the length."""
+        """Return the cost of motions as objective; if possible, as OMPL's path length plus the rest of the cost."""
         motion = self.problem.motion
         if self.spec.type == "informed_rrt_star":
             whole = _MotionCost(information, motion)
@@ -229,7 +222,7 @@ class OmplSearch:
 
 
 def set_parameters(planner: Any, spec: PlannerSpec) -> None:
-    """Set those parameters of the specification that have a value and that this planner of OMPL supports."""
+    """Set the parameters of the specification that have a value and that a planner of OMPL supports."""
     for setter, value in (
         ("setSamplesPerBatch", spec.samples_per_batch),
         ("setRewireFactor", spec.rewire_factor),
@@ -241,9 +234,9 @@ def set_parameters(planner: Any, spec: PlannerSpec) -> None:
 
 
 def _simplify(simplifier: Any, path: Any, steps: int) -> None:
-    """Shorten a path and move its states where that reduces the cost.
+    """Shorten a path, and move its states if that reduces the cost, in passes of at most `steps` steps.
 
-    Each pass has at most `steps` steps. OMPL's own simplify() is not used, because it stops by wall-clock time.
+    OMPL's simplify() is not used, because it stops by wall-clock time.
     """
     simplifier.partialShortcutPath(path, steps, steps // 2)
     for distance in PERTURBATIONS_M:
@@ -260,7 +253,7 @@ def _state(information: Any, point: Point) -> Any:
 def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterations: int = 0) -> Termination:
     """Return a termination condition: after `iterations`, or after `min_iterations` as soon as `is_done` returns True.
 
-    `is_done` is called once per `CHECK_PERIOD` iterations. In between, itertools answers without running Python code.
+    `is_done` is called once per `CHECK_PERIOD` iterations.
     """
 
     def answers() -> Iterator[Iterable[bool]]:
@@ -270,4 +263,4 @@ def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterat
                 break
         yield repeat(True)
 
-    return chain.from_iterable(answers()).__next__
+    return chain.from_iterable(answers()).__next__  # itertools answers most calls without running Python code

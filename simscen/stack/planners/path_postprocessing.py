@@ -11,7 +11,7 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 SPACING_M = 0.05
 """Distance between the points of a finished path."""
 SMOOTHING_PASSES, MAX_COST_RATIO = 8, 1.003
-"""Maximum number of smoothing passes, and maximum ratio of the cost after smoothing to the cost before."""
+"""Maximum number of smoothing passes, and maximum ratio of the costs after and before smoothing."""
 
 
 def densify(points: Array, spacing: float) -> Array:
@@ -27,14 +27,14 @@ def densify(points: Array, spacing: float) -> Array:
 
 
 def with_headings(points: Array, goal: Pose2) -> Array:
-    """Return the poses (n, 3) of points (n, 2): each heads to the next point, the last one as the goal."""
+    """Return poses (n, 3) at points (n, 2): each heads to the next point, the last pose has the heading of the goal."""
     steps = np.diff(points, axis=0)
     yaw = np.append(np.arctan2(steps[:, 1], steps[:, 0]), goal.yaw)
     return np.column_stack((points, yaw))
 
 
 def smoothed(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path (n, 2) with corners rounded as far as no cell on it is blocked and its cost hardly rises."""
+    """Return the path (n, 2) with rounded corners, as long as it is not blocked and the cost hardly increases."""
     cost = costs.along(points)
     for _ in range(SMOOTHING_PASSES):
         other = points.copy()
@@ -47,14 +47,13 @@ def smoothed(costs: TraversalCosts, points: Array) -> Array:
 
 
 CORNER_OFFSET_CELLS = 0.02
-"""Distance in cells at which a path is led around the corner of a blocked cell."""
+"""Distance in cells at which a path passes the corner of a blocked cell."""
 
 
 def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path (n, 2), led around the corners of blocked cells that it cuts.
+    """Return the path (n, 2) with detours around the corners of blocked cells that it cuts.
 
-    Return None if it crosses more of a blocked cell than a corner. If it cuts any corner, the points of the result are
-    at most one cell apart.
+    Return None if the path crosses more of a blocked cell than a corner.
     """
     if not np.isfinite(costs.at(points)).all():
         return None
@@ -80,9 +79,9 @@ def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
 
 
 def _cells_beside(before: Array, after: Array) -> tuple[Array, Array]:
-    """Return the two cells between which each diagonal step from `before` to `after` passes; all as (column, row).
+    """Return both cells next to each diagonal step from `before` to `after`, all (n, 2) as (column, row).
 
-    The first ones (n, 2) are in the column of `after`, the second ones in the column of `before`.
+    The first cells are in the column of `after`, the second cells in the column of `before`.
     """
     return np.column_stack((after[:, 0], before[:, 1])), np.column_stack((before[:, 0], after[:, 1]))
 

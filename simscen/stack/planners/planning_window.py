@@ -1,4 +1,4 @@
-"""Planning on large costmaps: search only a window around start and goal first, and enlarge it if needed."""
+"""Planning on large costmaps: search a window around start and goal first, and enlarge the window if necessary."""
 
 import contextlib
 import math
@@ -10,20 +10,21 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_FULL_SEARCH_CELLS = 1_000_000
-"""Costmaps up to this size are always searched completely: 50 x 50 m at 5 cm."""
+"""Size up to which costmaps are searched completely at once: 50 x 50 m with a cell size of 5 cm."""
 WINDOW_MARGIN_M = 10.0
 """Minimum margin of the first window around start and goal."""
 WINDOW_MARGIN_RATIO = 1 / 3
 """Margin of the first window as a fraction of the distance from start to goal."""
 
-Plan = Callable[[CostmapView, Pose2, Pose2, int], Path]
+PlanFunction = Callable[[CostmapView, Pose2, Pose2, int], Path]
+"""Function with the arguments and the result of `Planner.plan`."""
 
 
-def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-    """Plan with `plan` in a window around start and goal, then in larger windows, and finally on the whole costmap.
+def plan_in_windows(plan: PlanFunction, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+    """Call `plan` for a window around start and goal, then for larger windows, and finally for the whole costmap.
 
-    A path from a window is returned only if no path that leaves the window can be shorter. Raises the failure of the
-    last search.
+    A path in a window is returned only if no path that leaves the window can be shorter. Raises the failure of the last
+    call.
     """
     margin = max(WINDOW_MARGIN_M, WINDOW_MARGIN_RATIO * start.distance(goal))
     while costmap.costs.size > MAX_FULL_SEARCH_CELLS:
@@ -39,7 +40,7 @@ def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2,
 
 
 def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
-    """Return the part of the costmap within `margin` m of start and goal along x and y; None if one is off the map."""
+    """Return the part of the costmap with a margin around start and goal; None if start or goal is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []
     for ends, corner, cells in (
@@ -56,9 +57,9 @@ def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float)
 
 
 def _min_length_outside(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """Return the minimum length in m of a path that leaves a part of the costmap; inf if no path can.
+    """Return the minimum length in m of a path that leaves a part of the costmap; inf if no path can leave the part.
 
-    Such a path touches a side of the part. It is at least as long as the line to the goal mirrored at this side.
+    This is the length of a line from the start to the goal mirrored at the nearest side of the part.
     """
     shortest = math.inf
     for axis, start_coordinate, goal_coordinate, lateral in (

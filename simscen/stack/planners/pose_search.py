@@ -1,4 +1,4 @@
-"""OMPL search over poses, for cars and for robots that fit through a gap only with some headings."""
+"""OMPL search over poses (position and heading), for cars and long robots."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -22,11 +22,11 @@ PoseCheck = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
 """Maximum distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""A step whose chord is shorter than this fraction of its length contains a cusp. Arcs have larger ratios."""
+"""Ratio of chord to length of a step below which the step contains a cusp."""
 CUSP_TOLERANCE_M = 1e-4
 """Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60
-"""Attempts to shorten the path by removing states. OMPL's own simplify() would stop by wall-clock time."""
+"""Number of attempts to shorten the path by removing states."""
 
 
 def search_poses(
@@ -42,13 +42,14 @@ def search_poses(
     check_spacing: float = POSE_SPACING_M,
     configure: Callable[[Any], None] = lambda _: None,
 ) -> list[Pose2] | None:
-    """Return poses from start to goal, `POSE_SPACING_M` apart; None if no path was found in `iterations`.
+    """Return poses from start to goal, POSE_SPACING_M apart; None if there is no path after `iterations`.
 
-    `planner_type` is a key of PLANNERS. `bounds` are (min x, min y, max x, max y) in m. `valid` is evaluated every
-    `check_spacing` m. `configure` sets the parameters of OMPL's planner.
-
-    "dubins" drives only forward and "reeds_shepp" also backward, both on arcs of at least `turning_radius` m; "se2"
-    moves in any direction.
+    planner_type:    key of PLANNERS
+    space:           "dubins" drives only forward, "reeds_shepp" also backward, "se2" in any direction
+    turning_radius:  minimum radius of arcs in m; without effect for "se2"
+    bounds:          (min x, min y, max x, max y) in m
+    valid:           check of single poses, called every `check_spacing` m
+    configure:       sets the parameters of OMPL's planner
     """
     ou.RNG.setSeed(seed)
     states = _space(space, turning_radius)
@@ -82,11 +83,7 @@ def search_poses(
 
 
 def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
-    """Return poses on the Reeds-Shepp paths between waypoints, at most `POSE_SPACING_M` apart, including all cusps.
-
-    Without its cusps, a path would be shorter than the motion of the robot. OMPL's bindings (2.0.1) do not return the
-    arcs of a path, so that cusps are found by comparing chord and length of each step.
-    """
+    """Return poses on the Reeds-Shepp paths between waypoints, at most POSE_SPACING_M apart, including all cusps."""
     state, poses = states.allocState(), [_pose(waypoints[0])]
     for first, last in pairwise(waypoints):
         length = states.distance(first, last)
@@ -106,7 +103,7 @@ def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
 
 
 def _cusps(pose_at: Callable[[float], Pose2], low: float, high: float) -> list[float]:
-    """Return the lengths along a path, between `low` and `high` in m, at which the driving direction changes."""
+    """Return the path lengths in m, between `low` and `high`, at which the driving direction changes."""
     first_pose, last_pose = pose_at(low), pose_at(high)
     if math.hypot(last_pose.x - first_pose.x, last_pose.y - first_pose.y) > MIN_CHORD_RATIO * (high - low):
         return []
@@ -139,11 +136,11 @@ def _state(information: Any, pose: Pose2) -> Any:
 ESCAPE_DIRECTIONS = 16
 """Number of directions in which a holonomic base may leave a collision."""
 ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Curvatures of the arcs on which other bases may leave a collision, relative to the maximum curvature."""
+"""Curvatures, relative to the maximum, of the arcs on which all other bases may leave a collision."""
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
-    """Yield arcs on which the robot may leave a collision: poses (n, 3) over `MAX_ESCAPE_M`, "dubins" only forward."""
+    """Yield arcs of MAX_ESCAPE_M on which the robot may leave a collision, as poses (n, 3)."""
     length_along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
     if space == "se2":
         for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
@@ -155,7 +152,7 @@ def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[A
 
 
 def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) -> Array:
-    """Return poses (n, 3) at lengths (n,) in m along an arc that leaves the base in the direction `heading`."""
+    """Return poses (n, 3) at path lengths (n,) in m along an arc that leaves the base in the direction `heading`."""
     turned = curvature * length_along
     chord = length_along * np.sinc(turned / (2.0 * math.pi))
     direction = start.yaw + heading + 0.5 * turned
@@ -165,7 +162,7 @@ def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) ->
 
 
 class DistanceLookup:
-    """Looks up single distances of a costmap in a memoryview, in a tenth of numpy's time."""
+    """Fast lookup of single distances of a costmap."""
 
     def __init__(self, costmap: CostmapView) -> None:
         self.costmap = costmap

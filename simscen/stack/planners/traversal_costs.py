@@ -1,4 +1,4 @@
-"""Traversal costs: cost per meter of path on a costmap, as in Nav2's planners."""
+"""Traversal costs on a costmap: costs per meter of path, as in Nav2's planners."""
 
 import copy
 import math
@@ -14,24 +14,23 @@ from simscen.stack.costmap.layers import MAX_NON_OBSTACLE, NO_INFORMATION
 from simscen.stack.protocols import CostmapView, RobotModel
 
 UNKNOWN_COSTS = 253
-"""Cost that is assumed for an unknown cell: just above that of the most expensive free cell (nav2_navfn_planner)."""
+"""Cost of an unknown cell: just above the highest cost of a free cell (nav2_navfn_planner)."""
 NO_ROTATION_COST_FACTOR = 4.0
-"""Factor on costs where a robot that is not round cannot turn in place, because it may get stuck there."""
-EXEMPT_RADIUS_M = 0.5
-"""Half the edge length of the square around start and goal in which narrow gaps are allowed."""
+"""Factor on the costs of cells in which a robot that is not round cannot turn in place."""
+EXEMPT_HALF_SIDE_M = 0.5
+"""Half the side length of the square around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
 """Minimum distance in cells between two samples of the costs along a line."""
 SAMPLE_SPACING_RATIO = 0.4
-"""Distance between two samples along a motion of a search, relative to the inscribed radius. An obstacle blocks at
-least a disc of this radius; between two samples, a line can enter the disc by at most 2 % of the radius."""
+"""Distance between two samples along a motion of a search, relative to the inscribed radius. Between two samples, a
+line can enter a disc of this radius, which an obstacle blocks, by at most 2 % of the radius."""
 
 
 class TraversalCosts:
     """Traversal costs per meter on a costmap, `rates` (height, width): 1 in free space, inf in blocked cells.
 
-    The costs are those of nav2_smac_planner, 1 + `multiplier` · cost / 252, but integrated along a path instead of from
-    cell to cell. A cell is blocked if the inscribed circle of the robot does not fit there, or if the cell is unknown
-    and `allow_unknown` is False. `stride` is the distance in m between two samples of `between`.
+    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner. A cell is blocked if the inscribed circle of the
+    robot does not fit there, or if the cell is unknown and `allow_unknown` is False.
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
@@ -52,21 +51,21 @@ class TraversalCosts:
         # If unknown cells are blocked, a single one blocks a motion, so that each cell must be sampled.
         search_spacing = SAMPLE_SPACING_RATIO * robot.inscribed_radius if allow_unknown else 0.0
         self.stride = max(SAMPLE_SPACING_CELLS * costmap.resolution, search_spacing)
+        """Distance in m between two samples of `between`."""
         self.cache: dict[object, Any] = {}
         """Cached results derived from these costs, reused by the next plan if the costs have not changed."""
         self._last_motion: tuple[float, float, float, float] | None = None
         self._last_cost = 0.0
 
     def without_narrow_gaps(self, clearance: float, exempt: Sequence[tuple[float, float]]) -> "TraversalCosts":
-        """Return a copy in which all gaps are blocked where the robot has less than `clearance` m on each side.
+        """Return a copy with blocked cells in all gaps where the robot has less than `clearance` m on each side.
 
-        A cell is part of such a gap if no cell within `clearance` has more clearance. Cells near one of the `exempt`
-        points keep their costs.
+        Cells near the `exempt` points (x, y) keep their costs.
         """
         reach = math.ceil(clearance * self._per_meter)
         wide = self.costmap.distance > np.float32(self.inscribed + clearance)
         narrow = squared_distances_within(wide, reach) > reach * reach
-        side = math.ceil(EXEMPT_RADIUS_M * self._per_meter)
+        side = math.ceil(EXEMPT_HALF_SIDE_M * self._per_meter)
         for point in exempt:
             row, column = self.cell(point)
             narrow[max(0, row - side) : row + side + 1, max(0, column - side) : column + side + 1] = False
@@ -76,7 +75,7 @@ class TraversalCosts:
         return costs
 
     def reusing_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
-        """Return this object, with the cache of `previous` (of the previous plan) if the costs are the same."""
+        """Return this object. If `previous`, the object of the previous plan, has the same costs, use its cache."""
         if previous is not None and np.array_equal(previous.rates, self.rates):
             self.cache = previous.cache
         return self
@@ -87,7 +86,7 @@ class TraversalCosts:
         return np.isfinite(self.rates)
 
     def cell(self, point: tuple[float, float]) -> tuple[int, int]:
-        """Return the row and column of a point, which may be outside the map."""
+        """Return the cell (row, column) at a point, possibly outside the map."""
         x, y = (point[0] - self.origin[0]) / self.resolution, (point[1] - self.origin[1]) / self.resolution
         return math.floor(y), math.floor(x)
 
@@ -102,12 +101,9 @@ class TraversalCosts:
         return rates
 
     def between(self, ax: float, ay: float, bx: float, by: float) -> float:
-        """Return the cost of the straight motion from a to b, both on the map; inf if it is blocked.
-
-        The last result is cached, because OMPL asks for cost and validity of a motion one after the other.
-        """
+        """Return the cost of the straight motion from a to b, both on the map; inf if it is blocked."""
         motion = (ax, ay, bx, by)
-        if motion == self._last_motion:
+        if motion == self._last_motion:  # OMPL asks for cost and validity of a motion one after the other
             return self._last_cost
         dx, dy = bx - ax, by - ay
         length = math.sqrt(dx * dx + dy * dy)
@@ -129,7 +125,7 @@ class TraversalCosts:
         return total
 
     def along(self, points: Array) -> float:
-        """Return the cost of a polyline (n, 2); inf if it is blocked."""
+        """Return the cost of a polyline (n, 2); inf if it leads through a blocked cell."""
         steps = np.diff(points, axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         counts = np.ceil(lengths * self._per_meter / SAMPLE_SPACING_CELLS).astype(np.int64)
@@ -141,6 +137,6 @@ class TraversalCosts:
 
 
 def _padded_view(rates: npt.NDArray[np.float32]) -> Any:
-    """Return the cells as a flat memoryview, padded with inf. Indexing takes a tenth of numpy's time."""
+    """Return the cells as a flat memoryview, padded with inf, for fast indexing."""
     padded: Any = np.append(rates.reshape(-1), np.full(rates.shape[1] + 1, np.inf, dtype=np.float32))
     return memoryview(padded)
