@@ -1,6 +1,6 @@
 """Collision monitor (nav2_collision_monitor): slows the robot down before obstacles in the latest scans.
 
-It does not use map and costmap. If the stack predicts moving obstacles, it checks their predicted positions.
+It uses neither map nor costmap. If the stack predicts moving obstacles, it checks their predicted positions.
 """
 
 import math
@@ -77,7 +77,7 @@ class CollisionMonitor:
         `odometry` is the pose of the robot in the odom frame when the scan was taken.
         """
         self._arrivals[scan.sensor] = tick, scan.tick
-        nearest = _nearest(scan)
+        nearest = _shortest_range(scan)
         if nearest is None:
             return
         self._scan_ticks[scan.sensor] = scan.tick
@@ -217,7 +217,7 @@ def _miter_factor(normals: Array) -> float:
     return float(1.0 / np.cos(np.diff(angles, append=angles[0] + math.tau).max() / 2))
 
 
-def _nearest(scan: Scan) -> float | None:
+def _shortest_range(scan: Scan) -> float | None:
     """Return the shortest valid range in m; None if the scan has no returns."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
@@ -70,7 +71,9 @@ class Footprint:
         if self._is_round:
             return np.asarray(np.hypot(x, y) - self.circumscribed)
         local = np.stack((cosine * x + sine * y, cosine * y - sine * x), axis=-1).reshape(-1, 2)
-        signed = np.where(_inside(self._corners, local), -1.0, 1.0) * _edge_distances(self._corners, local)
+        signed = np.where(points_in_polygon(self._corners.tolist(), local), -1.0, 1.0) * _edge_distances(
+            self._corners, local
+        )
         return np.asarray(signed.reshape(x.shape))
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -192,18 +195,8 @@ def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    inside = _inside(corners, points)
+    inside = points_in_polygon(corners.tolist(), points)
     return np.asarray(points[inside & (np.hypot(points[:, 0], points[:, 1]) > inscribed - resolution)])
-
-
-def _inside(corners: Array, points: Array) -> Mask:
-    """Return which of the points (n, 2) are inside the polygon with these corners (m, 2)."""
-    inside: Mask = np.zeros(len(points), dtype=bool)
-    for (ax, ay), (bx, by) in zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True):
-        if ay != by:
-            crosses = (ay > points[:, 1]) != (by > points[:, 1])
-            inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
-    return inside
 
 
 def _edge_distances(corners: Array, points: Array) -> Array:

@@ -85,7 +85,7 @@ class Task:
 
         `code` is a plain number if a stack of another package uses a code that has no name here.
         """
-        details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
+        details: dict[str, Value] = {"error_code": int(code), "error_name": _error_name(code), "message": message}
         dropped = self._end_action(tick, EventKind.GOAL_FAILED, **details)
         self._failure = code
         if self._stop_on_failure:
@@ -130,7 +130,7 @@ class Task:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
         self._failure = None
-        details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code)}
+        details: dict[str, Value] = {"error_code": int(code), "error_name": _error_name(code)}
         return (Event(tick, EventKind.NAVIGATION_ENDED, result.value, details),)
 
     @property
@@ -144,5 +144,5 @@ class Task:
         return Event(tick, kind, self.goal.name, {"index": self._accepted - 1, **data})
 
 
-def _name(code: ErrorCode | int) -> str:
+def _error_name(code: ErrorCode | int) -> str:
     return code.name if isinstance(code, ErrorCode) else ""

@@ -20,7 +20,7 @@ MAX_TIME_STEP_S = 0.1
 UNCERTAINTY_SIGMAS = 0.5
 """Number of standard deviations of their position by which moving obstacles are inflated."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Decrease of the distance to a moving obstacle above which a robot that is already too close approaches it."""
+"""Decrease of the distance to a moving obstacle above which the robot approaches the obstacle."""
 
 
 class CollisionChecker:

@@ -12,8 +12,7 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 DEFAULT_SPEED_M_S = 0.5
 """Nav2's default of desired_linear_vel and of MPPI's vx_max."""
 SAME_GOAL_M = 0.1
-"""Distance between the ends of successive paths up to which they lead to the same goal, so that the controller is not
-reset: corrections of the localizer move the goal in the odom frame."""
+"""Maximum distance between the ends of two successive paths to the same goal."""
 
 
 class PathFollower:
