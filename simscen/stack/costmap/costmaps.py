@@ -88,7 +88,7 @@ class Costmaps:
 
     def clear_local(self) -> None:
         """Clear the local costmap, except for obstacles outside the field of view of all lidars."""
-        self.local_costmap.clear(unseen=self._local_range)
+        self.local_costmap.clear(unseen_margin=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
         """Clear the global costmap: entirely, or only within the range of the local costmap."""

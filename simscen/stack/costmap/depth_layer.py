@@ -108,7 +108,7 @@ def above_ground(
     away:          horizontal distances of the points from the camera in m, top row first
     heights:       heights in m above the plane on which the robot stands; nan for pixels without a point
     max_slope:     maximum slope angle of the ground in rad
-    max_step:      height in m up to which the lowest point of a column is ground, even on an upright face
+    max_step:      height in m up to which the lowest point of a column is not on a step
     known_ground:  points on cells that earlier images showed as ground
     """
     max_rise, upright = math.tan(max_slope), _upright(away, heights)

@@ -23,7 +23,7 @@ BLOCK_SIZE = 150_000
 """Number of values that are compared at once: they fit into a processor cache."""
 
 Squares = npt.NDArray[np.uint16]
-_STEPS: Squares = (np.arange(1, MAX_REACH_CELLS + 1) ** 2).astype(np.uint16)[:, None, None]
+_SQUARED_OFFSETS: Squares = (np.arange(1, MAX_REACH_CELLS + 1) ** 2).astype(np.uint16)[:, None, None]
 
 
 def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squares:
@@ -81,7 +81,7 @@ class _AxisPass:
         self.values: Squares = padded[reach : reach + height]
         """Input values (rows, columns)."""
         self._buffer = buffer.reshape(reach, -1, width)
-        self._steps = np.broadcast_to(_STEPS[:reach], self._buffer.shape)
+        self._steps = np.broadcast_to(_SQUARED_OFFSETS[:reach], self._buffer.shape)
         if reuse:
             self._steps = self._steps.copy()  # adding a contiguous array takes half the time
         count, (row, column) = self._buffer.shape[1], padded.strides

@@ -18,7 +18,7 @@ CellIndices = npt.NDArray[np.int64]
 _minimum, _maximum = np.minimum.reduce, np.maximum.reduce
 
 MAX_CACHED_CELLS = 10_000
-"""Largest grid whose cell centers are cached: about a local costmap."""
+"""Number of cells of the largest grid whose cell centers are cached."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class GridFrame:
         return np.array((1, self.shape[1]))
 
     def points(self, indices: CellIndices) -> Plane:
-        """Return the centers x + iy (n,) of cells (n,)."""
+        """Return the centers x + iy (n,) of the cells with these flat indices (n,)."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
             return _cell_centers(indices, columns, self.resolution, corner)
@@ -128,7 +128,7 @@ def _all_cell_centers(shape: tuple[int, int], size: float) -> Plane:
     return _cell_centers(np.arange(shape[0] * shape[1]), shape[1], size)
 
 
-Cell = TypeVar("Cell", bound=np.generic)
+ValueType = TypeVar("ValueType", bound=np.generic)
 
 GOAL_EDGE_MARGIN_M = 0.6
 """Distance from the edge of the window at which a plan ends if the goal is outside."""
@@ -153,7 +153,9 @@ def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> 
     return offset[0] > min(ROLL_RATIO * across, max_offset) or offset[1] > min(ROLL_RATIO * up, max_offset)
 
 
-def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, fill: float) -> npt.NDArray[Cell]:
+def shift_layer(
+    layer: npt.NDArray[ValueType], before: GridFrame, after: GridFrame, fill: float
+) -> npt.NDArray[ValueType]:
     """Return a copy of the layer for another window of the same size. New cells get the value `fill`."""
     shifted = np.full(after.shape, fill, dtype=layer.dtype)
     steps = [round((after.origin[axis] - before.origin[axis]) / after.resolution) for axis in (1, 0)]

@@ -77,7 +77,7 @@ class LayeredCostmap:
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
         self._inflation = _inflation(spec, surroundings.robot, resolution)
-        self._margin_cells = _in_cells(_reach(spec, surroundings.robot), resolution)
+        self._margin_cells = _reach_cells(_reach(spec, surroundings.robot), resolution)
         self._min_group_size = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._revision, self._keepout_change, self._scans = 0, 0, 0
         self._latest_readings: dict[str, tuple[Pose2, Scan | Image]] = {}
@@ -95,7 +95,7 @@ class LayeredCostmap:
         self._recompute(
             None
             if grid is None
-            else _costs(
+            else _map_costs(
                 grid, self._inflation, spec.lethal_cost_threshold, self._margin_cells, self._tracks_unknown
             ).copy()
         )
@@ -156,15 +156,15 @@ class LayeredCostmap:
         if self._tracks_unknown:
             self._update_unknown(base, reading)
 
-    def clear(self, clear_within: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
+    def clear(self, clear_within: float = math.inf, unseen_margin: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
 
-        Obstacles outside the field of view of all lidars are kept, up to `unseen` m beyond the circumscribed radius:
-        the robot may back up into them.
+        Obstacles outside the field of view of all lidars are kept up to `unseen_margin` m beyond the circumscribed
+        radius, because the robot may back up into them.
         """
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
-        radius = self._surroundings.robot.circumscribed_radius + unseen
+        radius = self._surroundings.robot.circumscribed_radius + unseen_margin
         out_of_view = self._live.out_of_view(scans[-1][0], radius, scans) if scans else None
         if latest and math.isfinite(clear_within):
             self._live.clear_around(latest[-1][0], clear_within)
@@ -340,12 +340,14 @@ def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
 
 def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
     """Compute and cache the costs of a map without keepout zones, before worker processes are forked."""
-    inflation, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
-    _costs(grid, inflation, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
+    inflation, margin = _inflation(spec, robot, grid.resolution), _reach_cells(_reach(spec, robot), grid.resolution)
+    _map_costs(grid, inflation, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
 
 
 @cached_on_instance
-def _costs(grid: OccupancyGrid, inflation: Inflation, threshold: int, reach_cells: int, tracks_unknown: bool) -> Costs:
+def _map_costs(
+    grid: OccupancyGrid, inflation: Inflation, threshold: int, reach_cells: int, tracks_unknown: bool
+) -> Costs:
     """Return the costs of a map without zones and live obstacles, cached for all runs."""
     unknown = layer_without_zones(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
     return inflation.costs(static_distances(grid, threshold, reach_cells), unknown)
@@ -356,5 +358,5 @@ def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Infla
     return shared_inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
 
 
-def _in_cells(reach: float, resolution: float) -> int:
+def _reach_cells(reach: float, resolution: float) -> int:
     return max(2, math.ceil(reach / resolution))  # at least the neighbors of a wall, if cells are coarse

@@ -16,7 +16,7 @@ from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, project_depth_image, seen_through
-from simscen.stack.costmap.grid_frame import Cell, CellIndices, Cells, GridFrame, shift_layer
+from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, ValueType, shift_layer
 from simscen.stack.costmap.layers import Mask, Squared
 from simscen.stack.localizers.beams import Plane, directions
 
@@ -143,7 +143,7 @@ WHOLE_GRID: Window = slice(None), slice(None)
 
 
 class ObstacleLayer:
-    """Cells marked as obstacles. Lidars do not clear marks of depth cameras, nor depth cameras those of lidars."""
+    """Live obstacles: cells that sensors have marked. Lidars and depth cameras do not clear each other's marks."""
 
     def __init__(self, spec: CostmapSpec, inscribed: float, frame: GridFrame) -> None:
         self._spec, self._inscribed = spec, inscribed
@@ -182,7 +182,7 @@ class ObstacleLayer:
 
     def mark(self, cells: Cells) -> None:
         """Mark cells (n, 2) as obstacles seen by a lidar."""
-        _set(self._scanned, cells, True)
+        _set_values(self._scanned, cells, True)
         self._marked = np.flatnonzero(self._scanned)
 
     def roll(self, frame: GridFrame) -> None:
@@ -268,10 +268,10 @@ class ObstacleLayer:
         heights = self._heights[marked[:, 0], marked[:, 1]]
         is_cleared = seen_through(marked, heights, self._frame, image, base, self._spec)
         is_cleared |= self._under_robot(self._frame.centers(marked), base)
-        _set(self._heights, marked[is_cleared], np.nan)
+        _set_values(self._heights, marked[is_cleared], np.nan)
         cells, heights, ground = project_depth_image(image, base, self._frame, self._spec, self._ground)
-        _set(self._ground, ground, True)
-        new = (_get(walls, cells) > MAX_WALL_SQUARED_CELLS) & ~self._under_robot(self._frame.centers(cells), base)
+        _set_values(self._ground, ground, True)
+        new = (_values_at(walls, cells) > MAX_WALL_SQUARED_CELLS) & ~self._under_robot(self._frame.centers(cells), base)
         cells = cells[new]
         self._heights[cells[:, 0], cells[:, 1]] = heights[new]
         return np.concatenate((marked[is_cleared], cells))
@@ -287,11 +287,11 @@ class ObstacleLayer:
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
 
 
-def _get(layer: npt.NDArray[Cell], cells: Cells) -> npt.NDArray[Cell]:
+def _values_at(layer: npt.NDArray[ValueType], cells: Cells) -> npt.NDArray[ValueType]:
     return layer[cells[:, 0], cells[:, 1]]
 
 
-def _set(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:
+def _set_values(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:
     layer[cells[:, 0], cells[:, 1]] = value
 
 

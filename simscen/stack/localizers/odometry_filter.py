@@ -23,7 +23,7 @@ VX, VY, VYAW, BIAS = range(4)
 MIN_VARIANCE = 1e-9
 """Minimum variance of a measurement in (m/s)² or (rad/s)²; the same as in robot_localization."""
 MAX_GYRO_GAP_S = 0.1
-"""Longest time without a gyroscope reading, after which the angle of rotation by the gyroscope is unknown."""
+"""Longest gap between gyroscope readings over which the yaw rate is integrated."""
 
 _WHEELS = np.eye(3, 4)
 _WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))

@@ -251,7 +251,7 @@ def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
     full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
     ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
     map_.update(Pose2(3.9, 3.0), ahead)
-    map_.clear(unseen=3.0)
+    map_.clear(unseen_margin=3.0)
     assert at(map_, 1.48, 3.0)[0] == 254
 
 
