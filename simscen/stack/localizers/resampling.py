@@ -64,7 +64,7 @@ def decode_bins(keys: Keys) -> tuple[Keys, Keys, Keys]:
 class KldBound:
     """KLD bound: number of samples for which the sampled distribution differs from the true one by at most `error`.
 
-    `z` is the quantile of the standard normal distribution for the probability of this. As in nav2_amcl, the default
+    `z` is the quantile of the standard normal distribution for the required probability. As in nav2_amcl, the default
     0.99 is the quantile itself, not the probability.
     """
 
@@ -132,9 +132,9 @@ class AugmentedMcl:
         self._better_fraction = RunningAverage(alpha_fast)
 
     def observe(self, tracked: float, anywhere: Array) -> None:
-        """Add the log likelihoods of a scan: the mean over the `tracked` particles, and those `anywhere` (n,).
+        """Add log likelihoods of a scan: `tracked`, the mean over the particles, and `anywhere` (n,), at random poses.
 
-        `anywhere` are random poses. Likelihoods of different scans must be comparable (SensorModel.tempering_exponent).
+        Likelihoods of different scans must be comparable (see SensorModel.tempering_exponent).
         """
         best = float(anywhere.max())
         average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf

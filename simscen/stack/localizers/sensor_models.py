@@ -53,7 +53,7 @@ class SensorModel(Protocol):
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     """Return distances to the surfaces of occupied areas; outside the map the maximum, as in nav2_amcl.
 
-    Without cells inside walls, where beams cannot end, walls do not attract particles.
+    Cells inside walls are not obstacles, because beams cannot end there.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 

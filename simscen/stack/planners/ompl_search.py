@@ -115,7 +115,7 @@ class StateValidity:
         return self.motion(x, y, x, y) < math.inf
 
 
-def _impossible(_ax: float, _ay: float, _bx: float, _by: float) -> float:
+def _infinite_cost(_ax: float, _ay: float, _bx: float, _by: float) -> float:
     return math.inf
 
 
@@ -136,7 +136,7 @@ class OmplSearch:
             return self._solve(simplify)
         finally:
             for callback in self._callbacks:  # OMPL's bindings leak their callbacks: release the costmap
-                callback.motion = _impossible
+                callback.motion = _infinite_cost
 
     def _solve(self, simplify: bool) -> list[Point] | None:
         ou.RNG.setSeed(self.seed)  # before any object of OMPL is created: it has one generator for the whole process

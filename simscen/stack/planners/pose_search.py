@@ -52,7 +52,7 @@ def search_poses(
     configure:       sets the parameters of OMPL's planner
     """
     ou.RNG.setSeed(seed)
-    states = _space(space, turning_radius)
+    states = _make_space(space, turning_radius)
     limits = ob.RealVectorBounds(2)
     for axis in (0, 1):
         limits.setLow(axis, bounds[axis])
@@ -117,7 +117,7 @@ def _pose(state: Any) -> Pose2:
     return Pose2(state.getX(), state.getY(), state.getYaw())
 
 
-def _space(kind: Space, turning_radius: float) -> Any:
+def _make_space(kind: Space, turning_radius: float) -> Any:
     if kind == "dubins":
         return ob.DubinsStateSpace(turning_radius)
     if kind == "reeds_shepp":

@@ -22,8 +22,7 @@ EXEMPT_HALF_SIDE_M = 0.5
 SAMPLE_SPACING_CELLS = 0.67
 """Minimum distance in cells between two samples of the costs along a line."""
 SAMPLE_SPACING_RATIO = 0.4
-"""Distance between two samples along a motion of a search, relative to the inscribed radius. Between two samples, a
-line can enter a disc of this radius, which an obstacle blocks, by at most 2 % of the radius."""
+"""Distance between two samples along a motion of a search, relative to the inscribed radius."""
 
 
 class TraversalCosts:
@@ -48,7 +47,7 @@ class TraversalCosts:
         self.rates: npt.NDArray[np.float32] = rates
         self._per_meter = 1.0 / costmap.resolution
         self._flat_rates = _padded_view(rates)
-        # If unknown cells are blocked, a single one blocks a motion, so that each cell must be sampled.
+        # An obstacle blocks at least a disc of the inscribed radius, but a single unknown cell may block a motion, too.
         search_spacing = SAMPLE_SPACING_RATIO * robot.inscribed_radius if allow_unknown else 0.0
         self.stride = max(SAMPLE_SPACING_CELLS * costmap.resolution, search_spacing)
         """Distance in m between two samples of `between`."""
