@@ -29,7 +29,7 @@ BATCH_TRAJECTORIES = 50
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Raw scores (n,) of n trajectories and scale, by the critic's name in Nav2. `legal` (n,): not rejected."""
+    """Scores of n trajectories: raw scores (n,) and scale of each critic by name. `legal` (n,): not rejected."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -119,7 +119,7 @@ def manhattan_distances(cells: Cells, sources: Cells) -> Array:
 
 
 class RotateToGoalCritic:
-    """Scores the heading error at the goal. Rejects velocities at which the robot does not slow down, then stop."""
+    """Critic at the goal: the robot must slow down to a stop, and then rotate in place. Scores the heading error."""
 
     def __init__(self, stopped_velocity: float, slowing_factor: float) -> None:
         """Take Nav2's trans_stopped_velocity in m/s and slowing_factor."""
@@ -154,10 +154,10 @@ class ObstacleCritic:
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """Return the index of the best trajectory; None if there is none. `order` (k,) are indices, the best first.
+        """Return the first index in `order` (k,) of a free trajectory; None if none is free.
 
-        It is the first trajectory with the preferred clearance, or else the first free one. If the robot is in
-        collision, it is the first that leads out. Trajectories that meet a moving obstacle early come last.
+        Trajectories with the preferred clearance take precedence. If the robot is in collision, a trajectory is free if
+        it leads out. Trajectories that meet no moving obstacle come first, then those that meet one late.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)

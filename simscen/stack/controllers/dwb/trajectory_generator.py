@@ -130,15 +130,20 @@ class Trajectories:
 
 
 def generate_trajectories(
-    pose: Pose2, now: Twist, velocities: Array, limits: KinematicParameters, seconds: float, length: float, angle: float
+    pose: Pose2,
+    now: Twist,
+    velocities: Array,
+    limits: KinematicParameters,
+    seconds: float,
+    max_step_m: float,
+    max_step_rad: float,
 ) -> Trajectories:
     """Return trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
 
-    A step is at most `length` m long and turns by at most `angle` rad. Trajectories with fewer steps are padded with
-    their final pose. The heading is constant within a step.
+    Trajectories with fewer steps than others are padded with their final pose. The heading is constant within a step.
     """
-    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / length
-    turn_steps = np.abs(velocities[:, 2]) * seconds / angle
+    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / max_step_m
+    turn_steps = np.abs(velocities[:, 2]) * seconds / max_step_rad
     step_counts = np.maximum(1.0, np.ceil(np.maximum(distance_steps, turn_steps)))
     _, first, yaw_index = np.unique(velocities[:, 2] + 1j * step_counts, return_index=True, return_inverse=True)
     count, dt = step_counts[first], seconds / step_counts[first]
