@@ -134,7 +134,7 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
     plan = FollowedPlan(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
-        plan.compare(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
+        plan.update_occupied(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
         assert plan.is_blocked() == blocked
     assert plan.remaining() == pytest.approx(2.95, abs=0.05)
 
@@ -152,7 +152,7 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
     for made, now, tighter in ((roomy, narrow, True), (narrow, narrow, False), (narrow, roomy, False)):
         plan = ClearancePlan(line, robot.inscribed_radius, made)
-        plan.compare(now)
+        plan.update_occupied(now)
         assert plan.has_lost_clearance() == tighter
 
 
