@@ -17,7 +17,7 @@ def length(way):
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
 
 
-def test_ways_along_its_sixteen_directions_are_exact_and_others_three_percent_longer_at_most():
+def test_paths_in_16_directions_are_exact_and_others_at_most_3_percent_longer():
     lattice = GridGraph(np.ones((60, 60), dtype=bool))
     for goal in ((10, 50), (50, 10), (50, 50), (30, 50)):
         assert length(lattice.shortest_path((10, 10), goal)) == pytest.approx(math.dist((10, 10), goal))
@@ -39,7 +39,7 @@ def test_no_move_cuts_a_corner_or_jumps_over_a_cell():
                 assert free[row, column]
 
 
-def test_a_wall_has_no_way_through_and_ends_must_be_free():
+def test_no_path_leads_through_a_wall_and_ends_must_be_free():
     lattice = GridGraph(blocked((20, 20), (slice(None), 10)))
     assert lattice.shortest_path((5, 5), (5, 15)) is None
     assert lattice.shortest_path((5, 10), (5, 15)) is None

@@ -16,12 +16,12 @@ def circles(imports: Mapping[str, set[str]]) -> list[str]:
         left = {module: needed - ends for module, needed in left.items() if module not in ends}
 
 
-def test_a_circle_of_modules_is_seen():
+def test_import_cycle_is_detected():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == ["b", "c"]
     assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
-def test_no_modules_import_each_other_in_a_circle_not_even_inside_functions():
+def test_modules_have_no_import_cycle_even_inside_functions():
     graph = grimp.build_graph("simscen", cache_dir=None)
     assert len(graph.modules) > 100
     assert circles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []

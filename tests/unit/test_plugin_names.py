@@ -11,7 +11,7 @@ import simscen.plugin as public
 
 
 @pytest.mark.parametrize("name", public.__all__)
-def test_a_name_is_what_it_says(name: str) -> None:
+def test_public_name_equals_the_name_of_its_object(name: str) -> None:
     value = getattr(public, name)
     if getattr(value, "__module__", "").startswith("simscen.") and hasattr(value, "__name__"):
         if get_origin(value) is Annotated:

@@ -145,7 +145,7 @@ def test_replanning_at_a_rate_is_unconditional() -> None:
     assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
 
 
-def test_at_a_rate_a_nearly_finished_plan_is_replaced_only_if_blocked() -> None:
+def test_replanning_at_a_rate_near_the_goal_replaces_only_blocked_plans() -> None:
     """IsGoalNearby and ValidatePath of Nav2's default trees."""
     bench, near = Bench(replanning="rate", replanning_rate=2.0), Goal("near", Pose2(4.5, 3.0))
     assert bench.steps(40, near) == ["goal"]

@@ -159,7 +159,7 @@ def test_trail_has_small_steps_without_oscillations() -> None:
     assert np.diff(trail.along).max() < 0.1
 
 
-def test_a_round_robot_retraces_too() -> None:
+def test_round_robot_retraces() -> None:
     way = driven((Twist(0.3, 0.0, 0.6), 2.0))
     end = run(behavior(round_robot(), way), view_of(round_robot(), Flatland()))[-1]
     assert min(end.distance(came) for came in way) < 0.03

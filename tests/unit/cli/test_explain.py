@@ -28,7 +28,7 @@ def test_topic_is_explained_with_keys_units_defaults_and_example(simscen) -> Non
     assert "Example: collisions: {max: 0}" in out
 
 
-def test_bare_value_is_explained(simscen) -> None:
+def test_value_without_keys_is_explained(simscen) -> None:
     assert "Value: duration in s" in simscen("explain", "trigger.time").out
 
 

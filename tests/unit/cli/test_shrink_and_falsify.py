@@ -58,7 +58,7 @@ def measured(run: Any) -> list[Any]:
     return [[verdict["id"], verdict["status"], verdict["findings"]] for verdict in run["verdicts"]]
 
 
-def test_only_what_causes_the_failure_is_left(tmp_path: Path) -> None:
+def test_shrink_keeps_only_the_cause_of_the_failure(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     done = simscen(tmp_path, "shrink", "a.scenario.yaml", "-j", 2)
     assert done.returncode == 0, done.stderr
@@ -165,7 +165,7 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, met
 
 
 @pytest.mark.slow
-def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_path: Path) -> None:
+def test_random_search_without_a_failure_bounds_the_failure_rate(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
     done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
     assert done.returncode == 0, done.stderr

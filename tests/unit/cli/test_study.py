@@ -49,7 +49,7 @@ def case(folder: Path) -> ET.Element:
     return found
 
 
-def test_a_study_finds_what_lowers_the_margin(tmp_path: Path) -> None:
+def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> None:
     done = study(tmp_path, SCENARIO + RANDOM, "--out", "out")
     assert done.returncode == 1, done.stderr
     found = results(tmp_path)["study"]
@@ -192,7 +192,7 @@ def test_invalid_studies_are_refused(
     assert told in done.err
 
 
-def test_logs_of_runs_that_pass_are_deleted_if_wanted(tmp_path: Path) -> None:
+def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
     study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 12, "--keep-logs", "failed")
     runs = results(tmp_path)["runs"]
     assert {run["outcome"] for run in runs} == {"passed", "failed"}

@@ -78,9 +78,7 @@ def test_without_configuration_nothing_is_collected(run, project: Path) -> None:
 
 
 @pytest.mark.slow
-def test_where_the_configuration_names_folders_scenarios_are_collected_there_and_nowhere_else(
-    run, project: Path
-) -> None:
+def test_scenarios_are_collected_only_in_the_configured_folders(run, project: Path) -> None:
     (project / "pytest.ini").write_text("[pytest]\nsimscen_paths = scenarios\nsimscen_seed = 9\n")
     (project / "other").mkdir()
     (project / "other/elsewhere.scenario.yaml").write_text(ROOM)
@@ -93,9 +91,7 @@ def test_where_the_configuration_names_folders_scenarios_are_collected_there_and
     ]  # fmt: skip
 
 
-def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_with_line_and_hint(
-    run, project: Path
-) -> None:
+def test_runs_are_items_with_name_and_tags_and_invalid_files_are_errors_with_line_and_hint(run, project: Path) -> None:
     (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
     code, told = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
     assert code == 2, told
@@ -109,7 +105,7 @@ def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_w
 
 
 @pytest.mark.slow
-def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail(run, project: Path) -> None:
+def test_items_pass_fail_skip_and_xfail_with_the_messages_of_simscen(run, project: Path) -> None:
     code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--junitxml=junit.xml", "--simscen-out=logs")
     assert code == 1, told
     assert re.search(r"2 failed, 3 passed, 1 skipped, 1 xfailed", told)
@@ -129,7 +125,7 @@ def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail
 
 
 @pytest.mark.slow
-def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: Path) -> None:
+def test_xdist_workers_share_one_output_folder_and_last_failed_is_known(run, project: Path) -> None:
     code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
     assert code == 1, told
     assert "1 failed, 1 passed" in told
@@ -153,7 +149,7 @@ def test_invalid_stack_and_seed_are_usage_errors(run, project: Path, ini: str, a
     assert code == 2 and why in told and "Traceback" not in told
 
 
-def test_the_fixture_runs_a_scenario_in_a_test_and_says_why_it_did_not_pass(run, project: Path) -> None:
+def test_fixture_runs_a_scenario_in_a_test_and_reports_why_it_failed(run, project: Path) -> None:
     (project / "test_own.py").write_text(TEST)
     code, told = run("-p", "no:xdist", "test_own.py")
     assert code == 1, told

@@ -52,7 +52,7 @@ def run(tmp_path: Path):
     return call
 
 
-def test_every_promise_of_a_component_is_an_item_and_nothing_else_is_run(run) -> None:
+def test_contract_run_collects_only_the_promises_of_the_component(run) -> None:
     code, told = run("-v", "-p", "no:xdist", "--simscen-contract", 'own:Checker={"part": 0.9}')
     assert code == 0, told
     assert "a reset forgets the goal before" in told
@@ -61,7 +61,7 @@ def test_every_promise_of_a_component_is_an_item_and_nothing_else_is_run(run) ->
 
 
 @pytest.mark.slow
-def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
+def test_broken_promise_reports_observed_and_promised_behavior(run) -> None:
     code, told = run("-p", "no:xdist", "--simscen-contract", 'own:Spec={"part": 3.0}', "test_theirs.py")
     assert code == 1, told
     assert "says that a robot at (2.26, -1.0, 0.5) has reached (2.0, -1.0, 0.5)" in told
@@ -71,7 +71,7 @@ def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
 
 
 @pytest.mark.slow
-def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
+def test_contract_accepts_the_name_of_a_shipped_type_and_xdist_workers(run) -> None:
     code, told = run("-n1", "--simscen-contract", "simple", "-k", "reset")
     assert code == 0, told
     assert "1 passed" in told
@@ -125,7 +125,7 @@ def test_untestable_target_is_a_readable_error(refused, target: str) -> None:
     assert "Traceback" not in told
 
 
-def test_a_pytest_that_asks_for_no_contract_imports_nothing_of_simscen_but_the_plug_in(run) -> None:
+def test_pytest_without_a_contract_imports_only_the_plug_in_of_simscen(run) -> None:
     probe = "print('loaded', *sorted(m for m in sys.modules if m.startswith('simscen') or m in ('numpy', 'pydantic')))"
     code, told = run("-q", "-p", "no:xdist", probe=probe)
     assert code == 0, told

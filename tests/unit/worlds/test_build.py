@@ -14,7 +14,7 @@ def test_an_empty_world_is_a_small_free_map():
     assert not built.map.cells.any()
 
 
-def test_the_same_world_is_built_the_same_bit_for_bit():
+def test_world_built_twice_is_bit_identical():
     world = World("w", tuple(Solid(Box((1.0, 0.3, 1.0)), Pose3(k, 0.1 * k, 0.5), f"b{k}") for k in range(20)))
     assert pickle.dumps(build_world_and_map(world, 0.3)) == pickle.dumps(build_world_and_map(world, 0.3))
 

@@ -48,7 +48,7 @@ def covered(solids, height):
 
 @settings(max_examples=40, deadline=None)
 @given(st.tuples(*[st.floats(0.05, 3)] * 3), NEAR, NEAR, st.sampled_from(range(6)), st.floats(-math.pi, math.pi))
-def test_a_box_on_any_of_its_sides_is_the_same_box(size, x, y, side, yaw):
+def test_box_on_any_of_its_sides_is_converted_exactly(size, x, y, side, yaw):
     roll, pitch = [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, 3)][side]
     turned = Pose3.from_rpy(0, 0, 0, roll * math.pi / 2, pitch * math.pi / 2, yaw)
     low = merge_solids([Solid(Box(size), turned)]).vertices[:, 2].min()
@@ -162,7 +162,7 @@ def test_additions_of_the_file_come_last():
     assert [obstacle.name for obstacle in done.obstacles] == ["theirs", "mine"]
 
 
-def test_a_slippery_plate_stays_slippery():
+def test_friction_of_a_plate_is_kept():
     world, changes = converted(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
     assert (world.solids[0].friction, changes) == (0.3, [])
 

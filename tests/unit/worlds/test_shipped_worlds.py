@@ -66,7 +66,7 @@ def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
 
 
 @needs_data
-def test_our_map_of_tb3_sandbox_agrees_with_the_shipped_one_where_a_robot_can_be():
+def test_map_of_tb3_sandbox_agrees_with_the_shipped_map_where_a_robot_can_be():
     home = DATA / "nav2_tb3_sandbox"
     world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
     built = build_world_and_map(world, LIDAR)
@@ -76,7 +76,7 @@ def test_our_map_of_tb3_sandbox_agrees_with_the_shipped_one_where_a_robot_can_be
 
 
 @needs_data
-def test_every_barn_world_admits_a_disc_of_37_cm_and_its_shortest_way_is_no_longer_than_the_reference():
+def test_every_barn_world_admits_a_disc_of_37_cm_with_a_shortest_path_up_to_the_reference_length():
     rows = [line.split(",") for line in (DATA / "barn_sample" / "scenarios.csv").read_text().split()[1:]]
     for number, reference in ((row[0], float(row[9])) for row in rows):
         world = load_sdf(DATA / "barn_sample" / f"world_{number}.world", root=DATA, lenient=True)

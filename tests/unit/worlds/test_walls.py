@@ -39,7 +39,7 @@ def test_a_hairpin_has_no_endless_spike():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_pieces_shorter_than_the_wall_is_thick_stay_whole_and_in_place(seed):
+def test_wall_segments_shorter_than_the_thickness_keep_shape_and_place(seed):
     points = np.cumsum(np.random.default_rng(seed).uniform(-0.3, 0.3, (12, 2)), axis=0).tolist()
     pieces = [plan(solid) for solid in wall_solids([(x, y) for x, y in points], 0.3, 1.0, "w")]
     assert all(piece.is_valid and piece.exterior.is_ccw for piece in pieces)
@@ -48,5 +48,5 @@ def test_pieces_shorter_than_the_wall_is_thick_stay_whole_and_in_place(seed):
     assert line.buffer(0.3 + 1e-9).covers(shapely.union_all(pieces))
 
 
-def test_a_wall_of_one_point_is_no_wall():
+def test_wall_of_one_point_gives_no_solids():
     assert wall_solids([(1.0, 1.0), (1.0, 1.0)], 0.1, 1.0, "w") == []

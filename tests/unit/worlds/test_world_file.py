@@ -15,7 +15,7 @@ def spec(**parts):
     return WorldSpec.model_validate({"simscen": 1, **parts})
 
 
-def test_walls_obstacles_and_objects_arrive_where_they_were_written():
+def test_walls_obstacles_and_objects_have_the_poses_of_the_file():
     world = world_from_spec(
         spec(
             walls=[{"points": [[0.0, 0.0], [5.0, 0.0]]}, {"name": "shelf", "points": [[0.0, 2.0], [5.0, 2.0]]}],
@@ -55,7 +55,7 @@ def test_a_door_hangs_on_its_first_post_and_opens_by_a_quarter_turn():
     assert ajar.pose.plane == pytest.approx((1.0, 3.0, math.pi))
 
 
-def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
+def test_moving_object_keeps_its_speed_and_start_time():
     move = {"through": [[4.0, 1.0], [4.0, 3.0]], "speed": 0.5, "repeat": "back_and_forth", "start": "2 s"}
     objects = [{"name": "cart", "box": [0.5, 0.5, 0.5], "pose": {"x": 2.0, "y": 1.0}, "move": move}]
     path = world_from_spec(spec(objects=objects), "w").bodies[0].path
@@ -64,7 +64,7 @@ def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
     assert path.poses[-1] == pytest.approx((4.0, 3.0, math.pi / 2))
 
 
-def test_a_map_becomes_walls_and_stays_the_map():
+def test_map_of_a_world_is_kept_and_gives_its_walls():
     cells = np.zeros((20, 20), np.int8)
     cells[5, 5:15] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 1.0, 0.0))

@@ -106,7 +106,7 @@ def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
     assert stds[1] < stds[0] / 3
 
 
-def test_the_first_correction_has_a_covariance_too() -> None:
+def test_first_correction_has_a_covariance() -> None:
     scatter = CovarianceEstimator()
     scatter.propagate_poses(Pose2(0.0, 0.0, 0.0), None)
     covariance = scatter.estimate(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)

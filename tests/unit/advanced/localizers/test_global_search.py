@@ -38,7 +38,7 @@ def test_search_near_a_wrong_estimate_finds_the_pose(pose: Pose2) -> None:
     assert fits[0] > GlobalSearch(grid()).score(estimate[np.newaxis], scanned(pose))[0] + 0.05
 
 
-def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
+def test_equal_scans_give_bit_identical_poses() -> None:
     view = scanned(PLACES[0])
     first, again = (GlobalSearch(grid()).search(view) for _ in range(2))
     assert np.array_equal(first[0], again[0])

@@ -38,17 +38,17 @@ def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[f
     return exponent, None if counting is None else counting.tolist()
 
 
-def test_a_scan_that_fits_counts_in_full_with_all_its_beams() -> None:
+def test_scan_that_fits_the_map_has_full_weight() -> None:
     assert asked(NEAR, 20, 0, 0) == (1.0, None)
 
 
 @pytest.mark.parametrize(("on_walls", "in_the_open", "worth"), [(17, 3, 1.0), (12, 8, 3 / 7), (8, 12, 0.0)])
-def test_a_scan_of_which_few_beams_fit_counts_for_less(on_walls: int, in_the_open: int, worth: float) -> None:
+def test_scan_with_few_fitting_beams_has_less_weight(on_walls: int, in_the_open: int, worth: float) -> None:
     assert asked(NEAR, on_walls, in_the_open, 0)[0] == pytest.approx(worth, abs=1e-9)
 
 
 @pytest.mark.parametrize("poses", [NEAR, SPREAD])
-def test_a_scan_that_hardly_touches_the_map_counts_for_nothing_even_if_that_fits(poses: Array) -> None:
+def test_scan_with_few_beams_on_the_map_has_no_weight(poses: Array) -> None:
     """Regression: the scan had its full weight, and moved particles from unknown rooms back into the map."""
     assert asked(poses, 2, 0, 30)[0] == 0.0
 
@@ -62,7 +62,7 @@ def test_beams_that_leave_the_map_are_not_compared() -> None:
     assert asked(NEAR, 2, 1, 1)[1] == [True, True, True, False]
 
 
-def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> None:
+def test_beams_without_a_hit_are_kept_if_others_are_excluded() -> None:
     beams = Beams(np.array([1.0, 9.0, 2.0, 3.0]), np.ones(4, dtype=np.complex128), 0j, 9.0)
     kept = beams.keeping_hits(np.array([True, False, True]))
     assert kept.ranges.tolist() == [1.0, 9.0, 3.0]

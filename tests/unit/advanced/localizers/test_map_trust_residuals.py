@@ -31,12 +31,12 @@ def explained(away: float) -> float:
     return float(hit / (hit + 0.5 / 10.0))
 
 
-def test_beams_that_end_at_the_wall_are_off_by_nothing() -> None:
+def test_beams_that_end_at_the_wall_have_no_residual() -> None:
     assert misfit(WALL, WALL) == pytest.approx((explained(0.0), 0.0))
 
 
 @pytest.mark.parametrize("away", [0.1, 0.2])
-def test_beams_count_for_what_they_are_off_by_as_far_as_the_map_explains_them(away: float) -> None:
+def test_residual_is_weighted_by_the_probability_that_the_beam_hit_the_wall(away: float) -> None:
     share = explained(away)
     assert misfit(WALL - away) == pytest.approx((share, (share * away / SIGMA) ** 2), rel=1e-3)
 

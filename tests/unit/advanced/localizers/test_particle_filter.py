@@ -32,7 +32,7 @@ def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
 
 
-def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
+def test_some_particles_rotate_with_odometry_if_scan_matching_disagrees() -> None:
     poses = poses_after(Pose2(0.0, 0.0, 0.3), Pose2(0.0, 0.0, 0.5))
     by_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
@@ -40,7 +40,7 @@ def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
 
 
 @pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
-def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalization: str, stays: bool) -> None:
+def test_random_particles_are_added_only_without_relocalization(relocalization: str, stays: bool) -> None:
     """For a group of particles that no longer fits the scans."""
     spec = ScanMatchingAmcl.model_validate({
         "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,

@@ -20,7 +20,7 @@ Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2
 
 
 @pytest.mark.parametrize(("resolution", "unknown"), [(0.1, 0.5), (0.1, 0.97), (0.3, 0.9), (1.5, 0.5), (0.1, 0.0)])
-def test_the_map_ends_in_unknown_cells_next_to_free_ones(resolution: float, unknown: float) -> None:
+def test_map_ends_at_unknown_cells_next_to_free_cells(resolution: float, unknown: float) -> None:
     """It also ends more than a meter behind a wall."""
     rng = np.random.default_rng(3)
     cells = np.where(rng.random((40, 30)) < 0.5, FREE, OCCUPIED)

@@ -54,7 +54,7 @@ def test_covariance_is_consistent_with_the_errors(imu: bool, is_quick: bool) -> 
     assert low <= np.sum(values) <= high
 
 
-def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
+def test_gyroscope_without_rotation_outweighs_slipping_wheels() -> None:
     """The wheels measure 1 rad/s and the gyroscope 0 rad/s, which is far more precise."""
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     feed(subject, 40, Pose2(0.0125, 0, 0.025), 0.0)
@@ -65,7 +65,7 @@ def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
     assert subject.belief.covariance[2, 2] < alone.belief.covariance[2, 2]
 
 
-def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
+def test_gyroscope_bias_is_estimated_at_standstill() -> None:
     """Without the estimate of the bias, the heading would be wrong by 0.04 rad."""
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     feed(subject, 400, Pose2(0, 0, 0), 0.004)
@@ -90,7 +90,7 @@ def test_broken_gyroscope_is_ignored(bad: float) -> None:
     assert subject.belief.pose == pytest.approx((0.4, 0, 0))
 
 
-def test_the_uncertainty_of_a_straight_way_is_that_of_the_closed_form() -> None:
+def test_covariance_of_a_straight_path_equals_the_closed_form() -> None:
     """σ² of the heading grows with the way; across the way it is the integral of the swing, rn² L³ / 3."""
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     feed(subject, 400, Pose2(0.025, 0, 0), None)

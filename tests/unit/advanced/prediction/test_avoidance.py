@@ -82,7 +82,7 @@ def test_without_prediction_the_robot_collides() -> None:
     assert d.min_clearance < 0.1
 
 
-def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
+def test_robot_at_its_goal_evades_and_returns() -> None:
     goal = Goal("here", Pose2(1.0, 0.0), xy_tolerance=0.25)
     d = among(start(goal), lambda _: [], 10.0)
     assert d.result == "SUCCEEDED"

@@ -306,7 +306,7 @@ def test_garbage_scan_creates_no_tracks() -> None:
 
 
 @pytest.mark.parametrize("seen", [1.2, 1.8, 2.5])
-def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: float) -> None:
+def test_circle_fit_of_an_arc_converges_from_half_a_radius_away(seen: float) -> None:
     """Its points are where the circle's equation has them, `seen` rad of it, as from the origin."""
     middle, radius = 2.0 + 1.0j, 0.3
     towards = math.pi + math.atan2(middle.imag, middle.real)

@@ -71,7 +71,7 @@ def same_ring(ring, other):
 
 
 @pytest.mark.parametrize("shuffle", range(5))
-def test_a_ring_comes_back_from_its_sides_in_any_order(shuffle):
+def test_ring_is_assembled_from_its_sides_in_any_order(shuffle):
     (ring,) = rings_from_segments(segments(square(2.0), shuffle=shuffle))
     assert same_ring(ring, square(2.0))
     assert signed_area(ring) == pytest.approx(4.0)
@@ -89,7 +89,7 @@ def test_a_round_ring_stays_round():
     assert len(ring) == 180
 
 
-def test_an_open_cut_is_none():
+def test_open_cross_section_raises():
     with pytest.raises(OpenCrossSection):
         rings_from_segments(segments(square(1.0))[:-1])
 
@@ -103,7 +103,7 @@ def test_outer_rings_without_holes_stay_whole_and_others_become_triangles():
     assert any(same_ring(piece, room[2]) for piece in pieces)
 
 
-def test_a_ring_with_too_many_corners_is_taken_apart():
+def test_ring_with_too_many_corners_is_split():
     pieces = simple_polygons([circle(3.0, 400)])
     assert all(len(piece) <= 200 for piece in pieces)
     assert sum(map(signed_area, pieces)) == pytest.approx(Polygon(circle(3.0, 400)).area)
@@ -115,7 +115,7 @@ A_HOLE_THAT_TOUCHES_THE_OUTSIDE = [(0, 0), (0, 1), (0, 2), (0, 4), (1, 0), (1, 2
 @settings(max_examples=30, deadline=None)
 @example(A_HOLE_THAT_TOUCHES_THE_OUTSIDE)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12, unique=True))
-def test_any_blocks_cover_what_they_covered(cells):
+def test_pieces_of_any_grid_cells_cover_the_same_area(cells):
     """Unions of grid cells: rings that touch at corners, holes, islands in holes."""
     union = union_all([Polygon(square(1.0, float(x), float(y))) for x, y in cells])
     parts = list(union.geoms) if union.geom_type == "MultiPolygon" else [union]

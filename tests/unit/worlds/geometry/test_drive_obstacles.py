@@ -38,17 +38,17 @@ def way(degrees, robot=TURTLEBOT):
     return ShortestPaths(mesh, BOUNDS, 0.22).length(Pose2(1, 3, 0), Pose2(6, 3, 0))
 
 
-def test_a_world_without_ground_but_the_floor_stays_the_same_object():
+def test_world_without_ramps_is_returned_unchanged():
     solids = (box("wall", 1, 0, 0.1, 4, 1.0),)
     assert drive_obstacles(solids, *TURTLEBOT) is solids
 
 
-def test_the_shortest_way_leads_over_a_ramp_that_the_robot_climbs_and_not_over_its_sides():
+def test_shortest_path_leads_over_a_climbable_ramp_but_not_over_its_sides():
     # Round the corners of the ramps' sides, which are higher than a step but for their first 30 cm.
     assert 7.0 < way(5) < 8.5
 
 
-def test_no_way_leads_over_a_ramp_that_is_too_steep_or_for_a_robot_that_stays_on_the_floor():
+def test_no_path_leads_over_a_ramp_that_the_robot_cannot_climb():
     assert way(30) == math.inf
     assert way(5, (0.1, 0.0, 0.0)) == math.inf
 
@@ -59,7 +59,7 @@ def test_ramp_and_platform_join_without_a_wall_between_them():
     assert names.count("up") == names.count("down") == pytest.approx(18, abs=2)
 
 
-def test_a_concave_solid_with_a_low_part_stays_in_the_way_as_a_whole():
+def test_concave_solid_with_a_low_part_is_an_obstacle_as_a_whole():
     """Forks 3 cm high before a mast: wheels may roll on them, but nobody plans to."""
     forks, mast = (box("jack", x, 0, length, 0.5, height) for x, length, height in ((0.5, 1.0, 0.03), (1.1, 0.2, 1.2)))
     jack = merge_solids([forks, mast])

@@ -12,7 +12,7 @@ ROUND = tuple((0.2 * cos(2 * pi * k / 16), 0.2 * sin(2 * pi * k / 16)) for k in 
 
 @pytest.mark.parametrize("ring", [SQUARE, ROUND], ids=["square", "round"])
 @pytest.mark.parametrize("turned", [0, 1, 2, 4])
-def test_a_polygon_overlaps_itself_with_whatever_corner_it_begins(ring, turned):
+def test_polygon_overlaps_itself_whichever_corner_is_first(ring, turned):
     assert polygons_overlap(ring, (*ring[turned:], *ring[:turned]))
 
 

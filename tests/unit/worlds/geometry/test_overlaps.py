@@ -20,7 +20,7 @@ def test_a_point_inside_or_near_a_solid_names_it():
     assert first_solid_in_disc(here, (3.0, 0.65), 0.14, BODY) is None
 
 
-def test_only_what_is_as_high_as_the_robot_counts():
+def test_only_solids_at_the_height_of_the_robot_count():
     table = Solid(Box((2, 2, 0.05)), Pose3(0, 0, 0.75), "table")
     carpet = Solid(Box((2, 2, 0.01)), Pose3(0, 0, 0.005), "carpet")
     assert first_solid_in_disc((table, carpet), (0, 0), 0.2, BODY) is None
@@ -39,7 +39,7 @@ def test_distances_are_computed_only_to_solids_nearby(monkeypatch):
     assert len(near) < 10
 
 
-def test_asking_imports_no_heavy_library():
+def test_overlap_check_imports_no_heavy_library():
     code = (
         "import sys; from simscen.worlds.geometry.overlaps import first_solid_in_disc;"
         "from simscen.core.geometry.shapes import Box, Solid, Extrusion;"

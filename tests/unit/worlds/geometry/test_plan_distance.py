@@ -12,7 +12,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 BODY = (0.05, 0.4)
 
 
-def test_a_sphere_blocks_with_what_it_has_below_the_top_of_the_robot():
+def test_sphere_blocks_with_its_part_below_the_top_of_the_robot():
     ball = merge_solids([Solid(Sphere(1.0), Pose3(0, 0, 1.0))])
     assert horizontal_distance(ball, (2.0, 0.0), (0.05, 0.4)) == pytest.approx(2 - math.sqrt(1 - 0.6**2), abs=0.001)
     assert horizontal_distance(ball, (0.0, 0.0), (0.05, 0.4)) == 0.0

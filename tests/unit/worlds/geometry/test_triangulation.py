@@ -58,7 +58,7 @@ def test_extents_of_round_shapes_are_exact():
     assert np.allclose(mesh.vertices.min(axis=0), [-0.37, -0.37, -1.0], atol=1e-12)
 
 
-def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
+def test_merged_mesh_has_all_solids_and_the_owner_of_each_face():
     turned = Pose3.from_rpy(5, 0, 0.5, 0, 0, math.pi / 2)
     mesh = merge_solids([Solid(Box((2.0, 1.0, 1.0)), turned, "a"), Solid(Cylinder(0.2, 1.0), Pose3(x=-3), "b")])
     box = mesh.vertices[mesh.faces[mesh.owners == 0]].reshape(-1, 3)
@@ -87,12 +87,12 @@ def test_convex_shapes_are_their_own_hulls():
             assert judge.convex_hull.volume == pytest.approx(judge.volume, rel=1e-9)
 
 
-def test_nothing_fuses_to_an_empty_mesh():
+def test_no_solids_merge_to_an_empty_mesh():
     mesh = merge_solids([])
     assert mesh.vertices.shape == (0, 3)
     assert mesh.faces.shape == (0, 3)
 
 
-def test_a_mesh_is_taken_as_it_is():
+def test_mesh_is_returned_unchanged():
     mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], dtype=np.int32))
     assert triangulate(mesh) is mesh

@@ -70,18 +70,18 @@ def test_a_wall_thinner_than_a_cell_is_not_lost():
     assert (grid.cells == OCCUPIED).sum() == 40
 
 
-def test_things_above_or_below_the_lidar_are_not_on_the_map():
+def test_solids_above_or_below_the_lidar_are_not_on_the_map():
     solids = Solid(Box((1, 1, 0.1)), Pose3(0, 0, 0.05)), Solid(Box((1, 1, 0.1)), Pose3(3, 0, 2.0))
     assert not (grid_of(*solids).cells == OCCUPIED).any()
 
 
-def test_outside_of_a_closed_building_nothing_is_known():
+def test_cells_outside_of_a_closed_building_are_unknown():
     grid = grid_of(*ROOM)
     inside, beyond = grid.values_at(np.array([[2.0, 1.5], [-0.5, -0.5]])).tolist()
     assert (inside, beyond) == (FREE, UNKNOWN)
 
 
-def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
+def test_outside_is_free_if_it_has_a_place_or_a_door_is_open():
     yard = grid_of(*ROOM, places={"yard": Pose2(4.5, 1.0, 0.0)}, bounds=(0, 0, 5, 3))
     open_door = grid_of(*ROOM[:3])
     for grid in (yard, open_door):
@@ -97,12 +97,12 @@ def test_rotated_or_winged_building_is_still_closed(yaw):
     assert (inside, beyond, corner) == (FREE, UNKNOWN, UNKNOWN)
 
 
-def test_a_field_of_posts_is_free_all_over():
+def test_field_of_posts_has_no_unknown_cells():
     posts = [Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x in range(5) for y in range(5)]
     assert not (grid_of(*posts).cells == UNKNOWN).any()
 
 
-def test_an_open_mesh_leaves_only_its_outline():
+def test_open_mesh_occupies_only_its_outline():
     box = triangulate(Box((2.0, 2.0, 1.0)))
     open_box = Mesh(box.vertices, box.faces[box.faces.min(axis=1) != 1])  # some sides are missing
     grid = grid_of(Solid(open_box, Pose3(z=0.3)))
@@ -129,7 +129,7 @@ def test_a_map_that_would_be_too_large_is_refused_with_its_size():
         grid_of(bounds=(-1e4, -1e4, 1e4, 1e4))
 
 
-def test_a_world_of_places_alone_has_a_map_that_holds_them():
+def test_map_of_a_world_without_solids_contains_its_places():
     built = grid_of(places={"a": Pose2(3, 2), "b": Pose2(8, 2)}, bounds=(3, 2, 8, 2))
     assert built.values_at(np.array([[3.0, 2.0], [8.0, 2.0]])).tolist() == [FREE, FREE]
 
@@ -144,7 +144,7 @@ def speckled(seed, shape=(30, 40), share=0.3):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_walls_made_of_a_map_draw_that_map_again(seed):
+def test_walls_built_from_a_map_give_the_same_map(seed):
     grid = speckled(seed)
     mesh = merge_solids(walls_from_map(grid, 1.0))
     again = occupied_cells(grid, cross_section(mesh, 0.5))
@@ -160,13 +160,13 @@ def test_walls_enclose_just_the_occupied_cells_and_rise_to_their_height():
     assert mesh.vertices[:, 2].max() == 1.5
 
 
-def test_a_long_wall_is_six_faces_however_many_cells_it_has():
+def test_long_wall_has_six_faces_for_any_number_of_cells():
     cells = np.zeros((100, 1000), np.int8)
     cells[20:24, 10:990] = OCCUPIED
     assert len(merge_solids(walls_from_map(OccupancyGrid(cells, 0.05), 1.0)).faces) == 12
 
 
-def test_a_map_without_walls_makes_none():
+def test_map_without_walls_gives_no_solids():
     assert walls_from_map(OccupancyGrid(np.zeros((5, 5), np.int8), 0.05), 1.0) == []
 
 

@@ -36,7 +36,7 @@ def test_a_lattice_that_ends_within_a_solid_shows_the_part_that_is_on_it():
     assert np.array_equal(shifted, whole[6:, 7:])
 
 
-def test_nothing_touches_nothing():
+def test_empty_cross_section_touches_no_cells():
     assert not touched_cells(CrossSection(np.empty((0, 2, 2)), np.empty(0, np.int32)), (4, 4)).any()
 
 

@@ -27,7 +27,7 @@ def pgm(path, header, body=b""):
 
 @needs_gold
 @pytest.mark.parametrize("image", ["testmap.png", "testmap.bmp", "testmap.pgm"])
-def test_nav2s_own_test_map_loads_as_its_loader_loads_it(image):
+def test_nav2_test_map_loads_as_in_nav2(image):
     expected = np.loadtxt(GOLD / "expected_grid.txt", dtype=int)
     grid, notes = load_map(RosMapSpec.model_validate(yaml.safe_load((GOLD / "testmap.yaml").read_text())), GOLD / image)
     assert np.array_equal(grid.cells, expected)
@@ -103,7 +103,7 @@ def test_all_formats_and_depths_of_the_same_map_agree(tmp_path):
         assert np.array_equal(load_map(spec(), path)[0].cells, expected), path.name
 
 
-def test_gray_205_that_counts_as_free_is_worth_a_warning(tmp_path):
+def test_gray_205_that_counts_as_free_gives_a_warning(tmp_path):
     path = pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
     assert load_map(spec(free_thresh=0.196), path)[1] == ()
     (note,) = load_map(spec(free_thresh=0.25), path)[1]

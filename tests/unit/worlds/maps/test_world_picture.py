@@ -52,5 +52,5 @@ def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
     assert near(color_at(image, built, *beside), FREE_COLOR)
 
 
-def test_an_empty_world_has_a_picture_too():
+def test_empty_world_has_a_picture():
     assert draw_world(build_world_and_map(World("w", ()), 0.2), 0.2).size == (1200, 1200)

@@ -108,7 +108,7 @@ def test_a_world_ten_kilometers_away_is_as_exact_as_one_at_the_origin():
     assert np.quantile(np.abs(near[both] - there[both]), 0.999) < 1e-4
 
 
-def test_bodies_come_move_and_go():
+def test_bodies_are_added_moved_and_removed():
     scene = RayScene(merge_solids([]))
     origins, directions = around(1, (0, 0, 0.3))
     assert scene.cast(origins, directions)[0] == math.inf
@@ -120,7 +120,7 @@ def test_bodies_come_move_and_go():
     assert scene.cast(origins, directions)[0] == math.inf
 
 
-def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodies():
+def test_ranges_do_not_depend_on_earlier_queries_or_the_order_of_bodies():
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
     one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
@@ -150,7 +150,7 @@ def field(count):
 
 
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 361, 5000])
-def test_rays_meet_what_the_package_of_embree_says_of_each_alone_to_the_last_bit(count):
+def test_rays_equal_single_rays_of_the_embree_package_bit_for_bit(count):
     mesh = field(1500)
     device = EmbreeDevice()
     theirs = EmbreeScene(device, True)
@@ -164,7 +164,7 @@ def test_rays_meet_what_the_package_of_embree_says_of_each_alone_to_the_last_bit
             assert np.array_equal(RayScene(mesh).cast(origins, directions, reach), told)
 
 
-def test_a_scene_survives_a_fork_and_others_are_built_there():
+def test_scene_survives_a_fork_and_the_child_can_build_others():
     mesh, (origins, directions) = field(200), around(720, (1.0, 2.0, 0.3))
     here = RayScene(mesh).cast(origins, directions)
     child = os.fork()
@@ -187,13 +187,13 @@ for _ in range(200):
 """
 
 
-def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
+def test_garbage_collected_scene_does_not_crash():
     """Embree 2 did, once in a hundred runs in one process: its device went before its scenes."""
     assert subprocess.run([sys.executable, "-c", COLLECTED], check=False).returncode == 0
 
 
 @pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
-def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
+def test_fan_gives_the_ranges_of_its_single_rays(first, beams, field):
     """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
     scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
@@ -221,7 +221,7 @@ def test_rays_within_a_cone_match_brute_force():
 
 
 @pytest.mark.parametrize("spread", [0.0, 3.0])
-def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_nearer(spread):
+def test_body_beyond_the_reach_of_all_rays_is_skipped_until_it_is_nearer(spread):
     """Also where rays begin in several places, and where a body lies far from the origin of its frame."""
     off = merge_solids([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
     scene, (origins, directions) = RayScene(merge_solids([])), around(8, (0.0, 0.0, 0.5))
@@ -235,7 +235,7 @@ def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_near
 
 @pytest.mark.parametrize("turns", range(4))
 @pytest.mark.parametrize("tilt", [1e-19, 1.8e-18, 1e-17, 1e-9])
-def test_rays_that_rounding_tilts_meet_what_level_ones_meet(turns, tilt):
+def test_rays_tilted_by_rounding_give_the_ranges_of_level_rays(turns, tilt):
     """Embree took whole packets for nothing whose rays part by the sign of next to nothing."""
     ends = [Solid(Box((0.2, 10.0, 2.0)), Pose3(x, 0, 1)) for x in (-5, 5)]
     scene, fan = RayScene(merge_solids([*ROOM, *ends])), RayFan(-math.pi, math.pi / 180, 360)

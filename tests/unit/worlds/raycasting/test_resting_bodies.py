@@ -70,7 +70,7 @@ def test_order_of_bodies_does_not_change_the_result(monkeypatch, many, several):
 
 
 @pytest.mark.parametrize("reach", [2.5, 9.0, math.inf])
-def test_rays_hit_resting_bodies_at_the_same_points_as_alone(reach):
+def test_merged_resting_bodies_give_the_ranges_of_separate_bodies(reach):
     together, alone = RayScene(WALLS), RayScene(WALLS)
     for poses in list(changes())[::6]:
         together.set_bodies(placed(poses), HOMES)
@@ -82,7 +82,7 @@ def test_rays_hit_resting_bodies_at_the_same_points_as_alone(reach):
         assert met.sum() > 10 * min(reach, 8)
 
 
-def test_things_at_home_take_no_scene_of_their_own(monkeypatch):
+def test_resting_bodies_share_one_mesh_scene(monkeypatch):
     """One is for all; then those of the halves that are left of it, and of who went."""
     built = list[int]()
     make = mesh_scene.MeshScene.__init__
@@ -103,7 +103,7 @@ def test_things_at_home_take_no_scene_of_their_own(monkeypatch):
     assert len(built) <= 1 + 1 + math.ceil(math.log2(len(HOMES)))
 
 
-def test_which_heights_are_looked_at_changes_not_one_bit():
+def test_height_range_of_a_scene_does_not_change_the_ranges():
     """Rays that tilt ever more have what they may meet taken anew, and only so often."""
     tilts = [*np.linspace(0.0, 0.6, 20).tolist(), 0.0, -0.6]
     lenses = [Pose3.from_rpy(0.4, 0.1, 0.8, 0.5 * tilt, tilt, 0.3) for tilt in tilts]

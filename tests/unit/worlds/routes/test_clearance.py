@@ -54,7 +54,7 @@ def test_points_are_pushed_off_the_nearest_solid():
     assert field.push_away(points, 0.3) == pytest.approx(expected, abs=0.001)
 
 
-def test_where_nothing_stands_everything_is_far_away():
+def test_clearance_is_large_everywhere_in_an_empty_world():
     field = clearance_field(merge_solids([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.has_clearance(np.zeros((3, 2)), 100.0).all()
     assert field.free_cells(100.0).all()
@@ -66,7 +66,7 @@ def test_upright_solids_need_one_cross_section():
     assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_LEVELS
 
 
-def test_a_low_shelf_is_seen_between_the_heights_of_the_robot():
+def test_thin_shelf_within_the_height_of_the_robot_is_an_obstacle():
     shelf = merge_solids([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
     field = clearance_field(shelf, empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.exact(np.array([[0.0, 0.0]]))[0] < 0

@@ -15,7 +15,7 @@ POST = merge_solids([Solid(Cylinder(0.5, 1.0), Pose3(0, 0, 0.5))])
 FIELD = clearance_field(POST, empty_grid((-3, -3, 3, 3), 0.05, "w"), (0.03, 0.4))
 
 
-def test_a_wild_detour_around_a_post_becomes_the_taut_string_on_its_side():
+def test_detour_around_a_post_is_tightened_on_its_side_of_the_post():
     tangents = 2 * math.sqrt(2.0**2 - 0.8**2)
     arc = 0.8 * (math.pi - 2 * math.acos(0.8 / 2.0))
     for side in (1, -1):

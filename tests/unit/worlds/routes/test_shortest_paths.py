@@ -33,13 +33,13 @@ def around_circle(a, b, radius):
     return math.sqrt(da**2 - radius**2) + math.sqrt(db**2 - radius**2) + radius * arc
 
 
-def test_in_an_empty_world_the_shortest_way_is_straight():
+def test_shortest_path_in_an_empty_world_is_straight():
     assert ways().length(Pose2(-3, -2), Pose2(4, 1)) == pytest.approx(math.hypot(7, 3))
 
 
 @pytest.mark.parametrize("radius", [0.1, 0.25, 0.5])
 @pytest.mark.parametrize("goal", [(3.0, 0.2), (2.0, -1.0), (2.5, 0.5)])
-def test_around_a_post_it_is_two_tangents_and_an_arc(radius, goal):
+def test_shortest_path_around_a_post_is_two_tangents_and_an_arc(radius, goal):
     search = ways(Solid(Cylinder(0.8, 1.0), Pose3(0, 0, 0.5)), radius=radius)
     expected = around_circle((-3.0, 0.1), goal, 0.8 + radius)
     straight = shapely.LineString([(-3.0, 0.1), goal]).distance(shapely.Point(0, 0))
@@ -47,7 +47,7 @@ def test_around_a_post_it_is_two_tangents_and_an_arc(radius, goal):
     assert search.length(Pose2(-3.0, 0.1), Pose2(*goal)) == pytest.approx(expected, rel=0.005)
 
 
-def test_around_the_corner_of_a_wall_it_bends_by_an_arc_about_the_corner():
+def test_shortest_path_around_a_wall_has_an_arc_about_the_corner():
     search = ways(box(0.0, -3.0, 0.2, 6.0))  # its upper end is at y = 0
     x, h = 2.0, -2.0
     to_corner = math.hypot(x - 0.1, h)
@@ -77,7 +77,7 @@ def visibility_graph(polygons, a, b, radius):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_among_random_boxes_it_agrees_with_a_visibility_graph_within_one_percent(seed):
+def test_shortest_path_among_random_boxes_is_that_of_a_visibility_graph_within_one_percent(seed):
     rng = np.random.default_rng(seed)
     solids, polygons = [], []
     for _ in range(9):
@@ -91,7 +91,7 @@ def test_among_random_boxes_it_agrees_with_a_visibility_graph_within_one_percent
     assert ways(*solids).length(Pose2(*start), Pose2(*goal)) == pytest.approx(expected, rel=0.01)
 
 
-def test_the_way_keeps_its_distance():
+def test_shortest_path_keeps_the_radius_of_the_robot_from_obstacles():
     rng = np.random.default_rng(3)
     posts = [(x, y) for x, y in rng.uniform(-4, 4, (30, 2)).tolist() if abs(x) + abs(y) < 7]
     search = ways(*(Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x, y in posts))
@@ -99,7 +99,7 @@ def test_the_way_keeps_its_distance():
     assert min(way.distance(shapely.Point(post)) for post in posts) > 0.2 + R - 0.01
 
 
-def test_a_closed_room_has_no_way_out_and_a_door_must_be_wide_enough():
+def test_path_out_of_a_room_needs_a_door_that_is_wide_enough():
     def room(door):
         walls = [box(0, -2, 4.2, 0.1), box(-2.05, 0, 0.1, 4.0), box(2.05, 0, 0.1, 4.0)]
         half = (4.2 - door) / 2
@@ -111,7 +111,7 @@ def test_a_closed_room_has_no_way_out_and_a_door_must_be_wide_enough():
     assert ways(*room(2 * R + 0.10)).length(inside, Pose2(1, 4)) == pytest.approx(4.19, abs=0.06)
 
 
-def test_where_the_disc_does_not_fit_there_is_no_way():
+def test_no_path_leads_to_a_goal_where_the_disc_does_not_fit():
     search = ways(box(0, 0, 1, 1))
     assert search.length(Pose2(-3, 0), Pose2(0, 0)) == math.inf
     assert search.length(Pose2(-3, 0), Pose2(0.6, 0)) == math.inf
@@ -131,7 +131,7 @@ def test_a_point_cannot_pass_through_a_sheet():
     assert ways(*wall, radius=0.0).length(Pose2(-1, 0), Pose2(1, 0)) > 20.0
 
 
-def test_lengths_are_given_from_stop_to_stop_also_beyond_the_bounds():
+def test_lengths_are_given_for_each_leg_even_outside_the_bounds():
     built = build_world_and_map(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
     stops = [Pose2(-3, 3), Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3)]
     legs = legs_between(built, [(start, Goal("g", goal)) for start, goal in itertools.pairwise(stops)], R)

@@ -42,7 +42,7 @@ ROOM = [
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(boxes, max_size=5))
-def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest(solids: list[Solid]) -> None:
+def test_simple_path_is_no_shorter_than_the_exact_shortest_path(solids: list[Solid]) -> None:
     plain = simple_paths_between([*ROOM, *solids], 0.2, Z)
     assert plain is not None
     length = plain.length((0.5, 2.0), (3.5, 2.0))
@@ -54,7 +54,7 @@ def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest
         assert exact.length(START, GOAL) == math.inf
 
 
-def test_a_sealed_room_is_proven_and_the_wall_between_is_where() -> None:
+def test_sealed_room_is_unreachable_and_its_narrowest_gap_is_in_the_wall() -> None:
     solids = [*ROOM, wall(2.5, 0.0, 4.0, "partition")]
     exact = ShortestPaths(merge_solids(solids), BOUNDS, 0.2, Z)
     assert not exact.may_reach(START, GOAL)
@@ -77,7 +77,7 @@ OUTLINE = ((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2))
 
 @settings(max_examples=60, deadline=None)
 @given(boxes, st.floats(0.5, 3.5), spots, st.floats(-3.0, 3.0))
-def test_a_footprint_overlaps_what_its_points_are_in(box: Solid, x: float, y: float, yaw: float) -> None:
+def test_footprint_overlaps_boxes_that_contain_its_points(box: Solid, x: float, y: float, yaw: float) -> None:
     pose = Pose2(x, y, yaw)
     told = first_solid_in_footprint([box], OUTLINE, pose, Z) is not None
     assert (

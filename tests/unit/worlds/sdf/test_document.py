@@ -51,7 +51,7 @@ def test_the_number_of_elements_is_limited(refuse, monkeypatch):
     assert "more than 1000 elements" in problem.message
 
 
-def test_a_kind_of_element_is_looked_up_once_however_often_it_is_there(tmp_path, monkeypatch):
+def test_repeated_unknown_element_is_looked_up_once(tmp_path, monkeypatch):
     looks = []
     real = difflib.get_close_matches
     monkeypatch.setattr(

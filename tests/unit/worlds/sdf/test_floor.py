@@ -37,7 +37,7 @@ def test_everything_is_lowered_by_the_height_of_the_floor_and_a_note_says_so(loa
         pytest.param(slab(5, 8, 0, at="-2.5 0") + slab(5, 8, 0, at="2.5 0") + CRATE, id="tiles"),
     ],
 )
-def test_slab_that_everything_stands_on_is_the_floor(load, content):
+def test_slab_that_supports_everything_is_the_floor(load, content):
     world = load(content)
     assert world.solids[0].pose.z == pytest.approx(-0.05)
     assert len(world.notes) == 1

@@ -30,7 +30,7 @@ def test_a_link_may_be_placed_relative_to_another_link(load):
     assert position(world) == pytest.approx((5, 1, 1))
 
 
-def test_a_frame_stands_on_what_it_is_attached_to(load):
+def test_frame_is_placed_relative_to_its_attached_frame(load):
     world = load(
         model(
             "<link name='a'><pose>2 0 0 0 0 0</pose></link>"
@@ -41,7 +41,7 @@ def test_a_frame_stands_on_what_it_is_attached_to(load):
     assert position(world) == pytest.approx((3, 0, 3))
 
 
-def test_a_joint_stands_on_its_child_link_unless_it_says_otherwise(load):
+def test_joint_is_placed_relative_to_its_child_link_by_default(load):
     joint = "<joint name='j' type='fixed'><parent>world</parent><child>a</child><pose{}>0 0 1 0 0 0</pose></joint>"
     rest = f"<link name='a'><pose>2 0 0 0 0 0</pose></link><link name='b'><pose relative_to='j'/>{BOX}</link>"
     assert position(load(model(rest + joint.format("")))) == pytest.approx((2, 0, 1))
@@ -67,7 +67,7 @@ def test_names_reach_into_nested_models(load):
     assert position(world) == pytest.approx((1, 2, 3))
 
 
-def test_models_may_stand_on_frames_and_other_models_of_the_world(load):
+def test_models_may_be_placed_relative_to_frames_and_models_of_the_world(load):
     world = load(
         f"<model name='table'><static>1</static><pose>4 0 0 0 0 0</pose><link name='a'>{BOX}</link></model>"
         f"<model name='cup'><static>1</static><pose relative_to='table::a'>0 0 1 0 0 0</pose>"

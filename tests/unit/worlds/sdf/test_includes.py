@@ -69,7 +69,7 @@ def test_the_new_name_is_checked_like_any_other(refuse, models, name, message):
     assert message in refuse(include("model://crate", f"<name>{name}</name>"), search=[models])[0].message
 
 
-def test_without_a_pose_of_its_own_an_include_keeps_that_of_the_model(load, tmp_path):
+def test_include_without_a_pose_keeps_that_of_the_model(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
     assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
 
@@ -94,7 +94,7 @@ def test_model_included_in_a_static_model_is_static(load, tmp_path):
     assert world.solids[0].pose.position == (1, 2, 0)
 
 
-def test_a_merged_include_lends_its_names_and_takes_its_owners_static(load, tmp_path):
+def test_merged_include_exposes_its_names_and_takes_static_from_its_owner(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static>")
     ball = f"<collision name='c'><geometry>{BALL}</geometry></collision>"
     on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose>{ball}</link>"
@@ -117,13 +117,13 @@ def test_a_folder_without_a_model_is_refused(refuse, tmp_path):
     assert "neither model.config nor model.sdf" in refuse(include("m"))[0].message
 
 
-def test_gazebos_own_sun_and_ground_need_not_be_there(load, models):
+def test_sun_and_ground_plane_of_gazebo_need_no_files(load, models):
     world = load(include("model://sun") + include("model://ground_plane") + include("model://crate"), search=[models])
     assert len(world.solids) == 1
     assert not world.notes
 
 
-def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
+def test_missing_model_lists_the_searched_folders(refuse, models):
     (problem,) = refuse(f"\n  {include('model://crates')}", search=[models])
     assert (problem.path, problem.line, problem.col) == ("shop.world", 3, 13)
     assert "model://crates: no such file or directory" in problem.message
@@ -131,7 +131,7 @@ def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
 
 
 @pytest.mark.parametrize(("tag", "message"), [("poes", "did you mean <pose>?"), ("xacro:include", "expand it first")])
-def test_an_include_is_not_half_understood(refuse, models, tag, message):
+def test_unsupported_elements_of_an_include_are_refused(refuse, models, tag, message):
     text = include("model://crate", f"<{tag}>1 0 0 0 0 0</{tag}>")
     (problem,) = refuse(f"<sdf version='1.9' xmlns:xacro='x'><world name='w'>{text}</world></sdf>", search=[models])
     assert problem.hint.startswith(message)
@@ -176,7 +176,7 @@ def test_online_models_are_not_fetched(refuse):
     )
 
 
-def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
+def test_include_cycle_is_refused_with_its_chain(tmp_path, load, refuse):
     for here, there in (("a", "b"), ("b", "a")):
         write(tmp_path, here, extra=include(f"../{there}"))
     (problem,) = refuse(include("a"))
@@ -184,7 +184,7 @@ def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
     assert "include cycle: a/model.sdf → b/model.sdf → a/model.sdf" in problem.message
 
 
-def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse, monkeypatch):
+def test_exponentially_nested_includes_are_refused(tmp_path, refuse, monkeypatch):
     monkeypatch.setattr(model_tree, "MAX_MODELS", 1000)
     for level in range(8):
         inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
@@ -228,26 +228,26 @@ class TestContainment:
         write(folder, shape="<box><size>7 7 7</size></box>")
         return folder
 
-    def test_a_way_out_by_dots_is_refused(self, refuse, outside):
+    def test_relative_path_out_of_the_root_is_refused(self, refuse, outside):
         (problem,) = refuse(include(f"../{outside.name}/crate"))
         assert "outside the scenario root" in problem.message
 
-    def test_an_absolute_way_out_is_refused_whether_or_not_it_exists(self, refuse, outside):
+    def test_absolute_path_out_of_the_root_is_refused_whether_or_not_it_exists(self, refuse, outside):
         for uri in (f"file://{outside}/crate", str(outside / "nothing"), "/etc/passwd"):
             assert "outside the scenario root" in refuse(include(uri))[0].message
 
-    def test_a_symbolic_link_out_is_refused(self, refuse, outside, tmp_path):
+    def test_symbolic_link_out_of_the_root_is_refused(self, refuse, outside, tmp_path):
         (tmp_path / "link").symlink_to(outside / "crate")
         assert "outside the scenario root" in refuse(include("link"))[0].message
         (tmp_path / "m").mkdir()
         (tmp_path / "m" / "model.sdf").symlink_to(outside / "crate" / "model.sdf")
         assert "outside the scenario root" in refuse(include("m"))[0].message
 
-    def test_model_uris_do_not_climb_either(self, refuse, outside, tmp_path):
+    def test_model_uris_out_of_the_root_are_refused(self, refuse, outside, tmp_path):
         (problem,) = refuse(include(f"model://../../{outside.name}/crate"), search=[tmp_path])
         assert "outside" in problem.message
 
-    def test_a_folder_the_user_allows_is_inside(self, load, outside):
+    def test_folder_allowed_by_the_user_can_be_read(self, load, outside):
         assert len(load(include("model://crate"), search=[outside]).solids) == 1
 
     def test_the_world_itself_must_be_inside(self, outside, tmp_path):
@@ -266,11 +266,11 @@ class TestContainment:
         (tmp_path / "b").symlink_to(tmp_path / "a")
         assert "symbolic link loop" in refuse(include("a"))[0].message
 
-    def test_a_pipe_is_refused_and_not_waited_for(self, refuse, tmp_path):
+    def test_named_pipe_is_refused_without_waiting(self, refuse, tmp_path):
         os.mkfifo(tmp_path / "pipe.sdf")
         assert "not a regular file" in refuse(include("pipe.sdf"))[0].message
 
-    def test_names_with_nul_or_without_end_are_refused(self, refuse):
+    def test_names_with_nul_and_very_long_names_are_refused(self, refuse):
         assert "not a usable path" in refuse(include("a" * 5000))[0].message
         assert "not a usable path" in refuse(include("a" * 300))[0].message
         assert "control character" in refuse(include("a\u202eb"))[0].message

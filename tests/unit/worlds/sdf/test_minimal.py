@@ -93,14 +93,14 @@ def test_unsupported_geometry_is_an_error_with_its_position(data: Path, name: st
     assert start in problem.message
 
 
-def test_lenient_loading_leaves_it_out_and_says_so(data: Path) -> None:
+def test_lenient_loading_skips_unsupported_geometry_with_a_note(data: Path) -> None:
     world = load(data, "include_plus", lenient=True)
     assert len(world.solids) == 1
     assert any("include_plus.sdf: world[w]" in note and "skipped" in note for note in world.notes)
 
 
 @pytest.mark.parametrize("name", [name for name in REFUSED if name not in ("gazebo_root", "include_plus", *EMPTY)])
-def test_lenient_loading_that_leaves_nothing_is_an_error(data: Path, name: str) -> None:
+def test_lenient_loading_that_skips_everything_is_an_error(data: Path, name: str) -> None:
     with pytest.raises(InvalidInput, match="nothing is left of this world"):
         load(data, name, lenient=True)
 

@@ -21,7 +21,7 @@ BARN = ("world_1", "world_40", "world_55", "world_111", "world_217", "world_289"
 
 
 @pytest.mark.parametrize("name", BARN)
-def test_barn_cylinders_stand_where_the_saved_state_has_them(data: Path, name: str) -> None:
+def test_barn_cylinders_have_the_poses_of_the_saved_state(data: Path, name: str) -> None:
     world = load_sdf(data / "barn_sample" / f"{name}.world", root=data)
     expected = _cylinders(data / "barn_sample" / f"{name}.world")
     assert len(world.solids) == len(expected) > 190
@@ -74,7 +74,7 @@ def test_concave_walls_are_not_filled(data: Path) -> None:
     np.testing.assert_allclose(distances, [6.8514, 6.8614, 10.3208, 10.3208], atol=0.001)
 
 
-def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
+def test_warehouse_map_matches_the_warehouse_world(data: Path) -> None:
     """Occupied cells of the map within 15 cm of the solids at lidar height, but for a shift of the whole map."""
     folder = data / "aws_small_warehouse"
     world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
@@ -88,7 +88,7 @@ def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
     assert np.mean(away[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
 
 
-def test_units_are_honored_and_up_axis_is_not_as_in_gazebo(data: Path) -> None:
+def test_unit_applies_and_up_axis_is_ignored_as_in_gazebo(data: Path) -> None:
     """The hexagon says inches and Y_UP and stands upright along z: 0.55 x 1.4 m wide, up to 1.4 m high."""
     world = _sandbox(data)
     hand = next(solid for solid in world.solids if solid.name.endswith("left_hand"))
@@ -146,7 +146,7 @@ def _map_range(
     return np.where(hit.any(axis=0), ranges, np.inf)
 
 
-def test_an_empty_world_with_only_a_floor_says_so(data: Path) -> None:
+def test_published_world_with_only_a_floor_is_empty_with_a_note(data: Path) -> None:
     folder = data / "nav2_tb3_sandbox"
     world = load_sdf(folder / "worlds/tb3_empty_world.sdf.xacro", root=folder, lenient=True)
     assert not world.solids

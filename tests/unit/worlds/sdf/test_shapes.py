@@ -60,7 +60,7 @@ def test_invalid_sizes_are_errors_at_their_line(refuse, geometry, message):
     assert message in problem.message
 
 
-def test_a_lenient_load_leaves_only_the_wrong_shape_out(load):
+def test_lenient_loading_skips_only_the_invalid_shape(load):
     text = shaped("<box><size>1 1 1</size></box>") + shaped("<box/>").replace("'m'", "'n'")
     world = load(text, lenient=True)
     assert len(world.solids) == 1
@@ -77,7 +77,7 @@ BOX = shaped("<box><size>1 1 1</size></box>").replace("'m'", "'n'")
 
 
 class TestPlanes:
-    def test_the_ground_is_the_simulators_own(self, load):
+    def test_ground_plane_is_left_to_the_simulator(self, load):
         world = load(shaped(plane()) + BOX)
         assert [solid.name for solid in world.solids] == ["n::a::c"]
         assert not world.notes
@@ -119,7 +119,7 @@ def area(solids):
 
 
 class TestPolylines:
-    def test_one_outline_is_one_solid_whichever_way_it_runs(self, load):
+    def test_one_outline_is_one_solid_in_either_orientation(self, load):
         for points in (SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]]):
             (solid,) = load(shaped(outline(points))).solids
             assert isinstance(solid.shape, Extrusion)
@@ -160,7 +160,7 @@ class TestPolylines:
     @given(st.lists(st.lists(coordinates, min_size=3, max_size=6, unique=True), min_size=1, max_size=3))
     @example([[(-1, 6), (6, -5), (1, 4), (-2, -6)]])
     @example([[(0, 0), (-5, -1), (6, -4)], [(2, -6), (0, 1), (8, 8), (0, 0)], [(0, 0), (0, 1), (3, -4)]])
-    def test_trapezoids_cover_the_odd_area_of_any_outlines_once(self, outlines):
+    def test_trapezoids_cover_the_even_odd_area_of_any_outlines_once(self, outlines):
         pieces = [shapely.Polygon(piece) for piece in trapezoids([np.array(o, float) for o in outlines])]
         assert sum(piece.area for piece in pieces) == pytest.approx(float(odd_area(outlines)), abs=1e-6)
         assert all(piece.exterior.is_ccw for piece in pieces)
@@ -237,24 +237,24 @@ class TestHeightmaps:
         assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3])
 
     @pytest.mark.parametrize("height", [np.nan, -9999.0])
-    def test_a_tiff_with_cells_without_a_height_is_refused(self, refuse, tmp_path, height):
+    def test_tiff_with_missing_heights_is_refused(self, refuse, tmp_path, height):
         Image.fromarray(np.array([[0, 1], [height, 0]], np.float32)).save(tmp_path / "h.png", format="TIFF")
         assert "a height is negative or not a number" in refuse(shaped(heightmap()))[0].message
 
-    def test_pos_moves_it(self, load, tmp_path):
+    def test_heightmap_is_moved_by_its_pos(self, load, tmp_path):
         self.save(tmp_path, [[0, 0], [0, 0]])
         (solid,) = load(shaped(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
         assert solid.pose.position == (1, 2, 3)
 
-    def test_one_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
+    def test_image_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
         Image.new("L", (3000, 3000)).save(tmp_path / "h.png")
         assert "3000 x 3000 pixels; an edge must have 2 to 513" in refuse(shaped(heightmap()))[0].message
 
-    def test_a_bomb_is_refused(self, refuse, tmp_path):
+    def test_decompression_bomb_is_refused(self, refuse, tmp_path):
         Image.new("1", (14_000, 14_000)).save(tmp_path / "h.png")
         assert "image too large" in refuse(shaped(heightmap()))[0].message
 
-    def test_no_image_is_refused(self, refuse, tmp_path):
+    def test_file_that_is_not_an_image_is_refused(self, refuse, tmp_path):
         (tmp_path / "h.png").write_bytes(b"GeoTIFF")
         assert "not a readable image" in refuse(shaped(heightmap()))[0].message
 

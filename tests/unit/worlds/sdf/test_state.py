@@ -26,7 +26,7 @@ def test_a_saved_link_pose_is_a_world_pose(load):
     assert xs(load(model() + state(saved))) == [9]
 
 
-def test_nested_models_are_saved_in_the_world_frame_too(load):
+def test_saved_poses_of_nested_models_are_world_poses(load):
     nested = model("n", f"<link name='a'>{BOX}</link><link name='b'>{BOX}</link>")
     inner = "<pose>3 0 0 0 0 0</pose><link name='b'><pose>4 0 0 0 0 0</pose></link>"
     saved = f"<model name='m'><pose>7 0 0 0 0 0</pose><model name='n'>{inner}</model></model>"
@@ -56,7 +56,7 @@ def test_free_models_start_where_they_were_saved(load):
     assert world.bodies[0].pose.x == 7
 
 
-def test_states_of_unknown_models_do_no_harm(load):
+def test_states_of_unknown_models_are_ignored(load):
     assert xs(load(model() + state("<model name='gone'><pose>7 0 0 0 0 0</pose></model>"))) == [1]
 
 
@@ -86,7 +86,7 @@ def test_inapplicable_state_is_an_error(refuse, saved, message):
         ("<sphere><radius>1</radius></sphere>", Sphere(2.0)),
     ],
 )
-def test_a_saved_scale_multiplies_sizes_and_moves_nothing(load, written, expected):
+def test_saved_scale_multiplies_sizes_but_not_positions(load, written, expected):
     shape = f"<collision name='c'><pose>0.5 0 0 0 0 0</pose><geometry>{written}</geometry></collision>"
     world = load(
         model(content=f"<link name='a'>{shape}</link>") + state("<model name='m'><scale>2 3 4</scale></model>")

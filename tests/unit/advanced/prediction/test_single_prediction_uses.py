@@ -46,14 +46,14 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     return nearest
 
 
-def test_without_any_use_of_prediction_the_robot_collides() -> None:
+def test_robot_without_prediction_collides() -> None:
     assert least("nobody") < 0.0
 
 
-def test_the_collision_monitor_alone_brakes_for_it() -> None:
+def test_collision_monitor_with_prediction_prevents_the_collision() -> None:
     assert least("monitor") > 0.0
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_each_controller_alone_avoids_the_crossing_obstacle(controller: str) -> None:
+def test_each_controller_with_prediction_prevents_the_collision(controller: str) -> None:
     assert least("controller", controller) > 0.0
