@@ -1,4 +1,4 @@
-"""Tests that each use of the prediction alone prevents a collision."""
+"""Tests that each single use of the prediction prevents a collision."""
 
 from typing import Any
 
@@ -18,42 +18,44 @@ CONTROLLERS: dict[str, dict[str, Any]] = {
 }
 
 
-def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
-    """The least clearance of a robot whose avoidance is off, where only the controller or the monitor is told."""
+def min_clearance(user: str, controller: str = "regulated_pure_pursuit") -> float:
+    """Return the minimum clearance if `user` (controller, monitor or none) is the only user of the prediction."""
     world, grid = Flatland().room(7, 8), Flatland().room(7, 8).grid((-0.5, -0.5, 7.5, 8.5))
-    own = {"type": controller, **CONTROLLERS[controller]}
-    spec = StackSpec.model_validate({"profile": "advanced", "localizer": {"type": "ground_truth"}, "controller": own})
+    options = {"type": controller, **CONTROLLERS[controller]}
+    spec = StackSpec.model_validate(
+        {"profile": "advanced", "localizer": {"type": "ground_truth"}, "controller": options}
+    )
     goal = Goal("beyond", Pose2(6.0, 4.0))
-    driven = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
-    stack = driven.stack.inner
+    d = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
+    stack = d.stack.inner
     stack._prediction.steer = lambda tick, command, *seen: command
     original = stack._on_costmaps_updated
 
     def update(tick: int, frames: Frames) -> None:
         original(tick, frames)
-        if heed != "monitor":
+        if user != "monitor":
             stack._monitor.on_moving(no_moving_obstacles())
-        if heed != "controller":
+        if user != "controller":
             stack._costmaps.local_costmap.moving = no_moving_obstacles()
 
     stack._on_costmaps_updated = update
     world.discs.append((4.5, 0.5, 0.3))
-    nearest = 9.0
-    while driven.tick < 10.5 * TICK_RATE_HZ:
-        world.discs[-1] = (4.5, min(max(4.0 - 0.8 * (6.5 - driven.tick / TICK_RATE_HZ), 0.5), 7.5), 0.3)
-        driven.step()
-        nearest = min(nearest, world.clearance(driven.robot, driven.pose))
-    return nearest
+    clearance = 9.0
+    while d.tick < 10.5 * TICK_RATE_HZ:
+        world.discs[-1] = (4.5, min(max(4.0 - 0.8 * (6.5 - d.tick / TICK_RATE_HZ), 0.5), 7.5), 0.3)
+        d.step()
+        clearance = min(clearance, world.clearance(d.robot, d.pose))
+    return clearance
 
 
 def test_robot_without_prediction_collides() -> None:
-    assert least("nobody") < 0.0
+    assert min_clearance("none") < 0.0
 
 
 def test_collision_monitor_with_prediction_prevents_the_collision() -> None:
-    assert least("monitor") > 0.0
+    assert min_clearance("monitor") > 0.0
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_each_controller_with_prediction_prevents_the_collision(controller: str) -> None:
-    assert least("controller", controller) > 0.0
+    assert min_clearance("controller", controller) > 0.0
