@@ -19,7 +19,7 @@ def test_world_built_twice_is_bit_identical():
     assert pickle.dumps(build_world_and_map(world, 0.3)) == pickle.dumps(build_world_and_map(world, 0.3))
 
 
-def test_the_lidars_height_decides_what_is_on_the_map():
+def test_map_contains_only_solids_at_the_height_of_the_lidar():
     world = World("w", (Solid(Box((1.0, 1.0, 0.2)), Pose3(z=0.1)),))
     assert build_world_and_map(world, 0.1).map.cells.any()
     assert not np.any(build_world_and_map(world, 0.3).map.cells)

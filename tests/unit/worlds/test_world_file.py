@@ -68,8 +68,8 @@ def test_map_of_a_world_is_kept_and_gives_its_walls():
     cells = np.zeros((20, 20), np.int8)
     cells[5, 5:15] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 1.0, 0.0))
-    world = world_from_spec(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a doubt",))
-    assert world.notes == ("m.pgm: a doubt",)
+    world = world_from_spec(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a warning",))
+    assert world.notes == ("m.pgm: a warning",)
     assert [solid.name for solid in world.solids] == ["map"]
     assert world.grid is grid
     assert world.bounds == pytest.approx((1.0, 1.0, 3.0, 3.0))
@@ -77,10 +77,10 @@ def test_map_of_a_world_is_kept_and_gives_its_walls():
 
 def test_additions_to_an_imported_world_take_precedence():
     base = World("gz", (Solid(Box((1, 1, 1)), name="theirs"),), places={"a": Pose2(0, 0), "b": Pose2(1, 1)})
-    own = spec(
+    additions = spec(
         obstacles=[{"name": "ours", "box": [1.0, 1.0, 1.0], "pose": {"x": 3.0, "y": 0.0}}],
         places={"a": {"x": 5.0, "y": 5.0}},
     )
-    world = world_from_spec(own, "w", base=base)
+    world = world_from_spec(additions, "w", base=base)
     assert [solid.name for solid in world.solids] == ["theirs", "ours"]
     assert world.places == {"a": Pose2(5, 5), "b": Pose2(1, 1)}

@@ -11,7 +11,7 @@ from simscen.worlds.routes.clearance import MAX_LEVELS, clearance_field, section
 BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
 
 
-def scattered(seed):
+def random_boxes(seed):
     rng = np.random.default_rng(seed)
     solids, polygons = [], []
     for x, y, yaw in rng.uniform(-2.5, 2.5, (6, 3)):
@@ -24,25 +24,25 @@ def scattered(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
-    mesh, truth = scattered(seed)
+    mesh, reference = random_boxes(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
     points = np.random.default_rng(seed).uniform(-2.9, 2.9, (3000, 2))
-    exact = truth.distance(shapely.points(points))
-    deep = truth.buffer(-0.04).distance(shapely.points(points)) == 0
+    exact = reference.distance(shapely.points(points))
+    deep_inside = reference.buffer(-0.04).distance(shapely.points(points)) == 0
     outside = exact > 0.04
     assert np.abs(field.exact(points) - exact)[outside].max() < 0.0015
-    assert (field.exact(points)[deep] < 0).all()
+    assert (field.exact(points)[deep_inside] < 0).all()
     for distance in (0.1, 0.25, 0.6):
         assert np.array_equal(field.has_clearance(points, distance), field.exact(points) >= distance)
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("distance", [0.04, 0.25, 0.6])
-def test_free_cells_are_those_whose_middle_keeps_the_distance(seed, distance):
-    mesh, _ = scattered(seed)
+def test_free_cells_are_those_whose_center_has_the_clearance(seed, distance):
+    mesh, _ = random_boxes(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
-    middles = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
-    expected = (field.exact(middles) >= distance).reshape(field.grid.shape)
+    centers = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
+    expected = (field.exact(centers) >= distance).reshape(field.grid.shape)
     assert np.array_equal(field.free_cells(distance), expected)
 
 

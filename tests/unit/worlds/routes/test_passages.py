@@ -16,8 +16,8 @@ def wall(name, x, y, length, width, yaw=0.0):
 
 
 def leg(start, goal, *solids):
-    ways = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
-    return ways.leg(Pose2(*start), Pose2(*goal), "goal")
+    paths = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
+    return paths.leg(Pose2(*start), Pose2(*goal), "goal")
 
 
 DOOR = wall("left", 0, 10.5, 0.1, 20), wall("right", 0, -10.5, 0.1, 20)
@@ -36,17 +36,17 @@ def test_door_has_its_true_width_at_any_angle_of_the_path(start, goal):
 
 def test_passages_are_ordered_along_the_path_and_cross_it():
     corridor = wall("north", 0, 1, 8, 0.2), wall("south", 0, -1, 8, 0.2)
-    forth = leg((-3.5, 0), (3.5, 0.3), *corridor).passages
-    assert len(forth) > 10
-    assert all(passage.width == pytest.approx(1.8, abs=0.1) for passage in forth)
-    middles = [passage.middle[0] for passage in forth]
+    passages = leg((-3.5, 0), (3.5, 0.3), *corridor).passages
+    assert len(passages) > 10
+    assert all(passage.width == pytest.approx(1.8, abs=0.1) for passage in passages)
+    middles = [passage.middle[0] for passage in passages]
     assert middles == sorted(middles)
-    assert all(min(passage.ends)[1] * max(passage.ends)[1] < 0 for passage in forth)
+    assert all(min(passage.ends)[1] * max(passage.ends)[1] < 0 for passage in passages)
 
 
 def test_open_space_and_a_single_wall_have_no_passages():
     assert leg((-4, 0), (4, 0)).passages == ()
-    assert leg((-4, 0), (4, 0), wall("lonely", 0, 1, 8, 0.2)).passages == ()
+    assert leg((-4, 0), (4, 0), wall("single", 0, 1, 8, 0.2)).passages == ()
 
 
 def test_unreachable_goal_without_a_gap_has_no_passages():

@@ -51,7 +51,7 @@ def test_collision_geometry_is_used_if_present(load):
     assert not world.notes
 
 
-def test_scripts_loop_unless_they_say_otherwise_and_wait_before_each_round(load):
+def test_scripts_loop_by_default_and_wait_before_each_round(load):
     path = load(actor("<delay_start>2</delay_start>" + WALK)).bodies[0].path
     assert (path.mode, path.start) == ("loop", 0)
     assert path.times == (0, 2, 6, 7)
@@ -73,10 +73,10 @@ def test_trajectories_follow_each_other_by_id(load):
 def test_a_jump_between_trajectories_takes_no_time(load):
     path = load(actor(WALK + trajectory([(0, 9, 9, 1, 0), (3, 5, 6, 1, 0)], 1))).bodies[0].path
     assert path.times == (0, 4, 5, 5, 8)
-    assert largest_step(path, 1 / 240) < MAX_STEP_M, "a jump is no fast motion"
+    assert largest_step(path, 1 / 240) < MAX_STEP_M, "a jump is not a fast motion"
 
 
-def test_an_actor_waits_at_a_first_waypoint_that_is_late(load):
+def test_actor_waits_at_its_first_waypoint_until_its_time(load):
     path = load(actor(trajectory([(2, 1, 1, 1, 0), (4, 2, 1, 1, 0)]))).bodies[0].path
     assert path.times == (0, 2, 4)
     assert path.poses[0] == path.poses[1]

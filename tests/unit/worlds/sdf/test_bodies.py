@@ -38,7 +38,7 @@ def test_movable_joints_are_held_rigid_with_a_note(load):
     assert world.notes == ("shop.world: world[w]/model[cart]/joint[j]: a joint of type revolute is treated as fixed",)
 
 
-def test_links_without_a_joint_are_bodies_of_their_own(load):
+def test_links_without_a_joint_are_separate_bodies(load):
     bodies = load(model(link("a") + link("b", 4), rest="<pose>1 0 0 0 0 0</pose>")).bodies
     assert [(body.name, body.pose.x) for body in bodies] == [("cart::a", 1), ("cart::b", 5)]
 

@@ -15,13 +15,13 @@ BALL = "<sphere><radius>0.5</radius></sphere>"
 
 
 def write(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, extra="<static>1</static>"):
-    place = folder / name
-    place.mkdir(parents=True, exist_ok=True)
+    model_folder = folder / name
+    model_folder.mkdir(parents=True, exist_ok=True)
     for file in files:
-        (place / file).write_text(CRATE.format(version="1.6", shape=shape, extra=extra))
+        (model_folder / file).write_text(CRATE.format(version="1.6", shape=shape, extra=extra))
     if config is not None:
-        (place / "model.config").write_text(f"<model><name>{name}</name>{config}</model>")
-    return place
+        (model_folder / "model.config").write_text(f"<model><name>{name}</name>{config}</model>")
+    return model_folder
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_model_uris_are_looked_up_in_the_search_folders_in_order(load, models, t
 
 @pytest.mark.parametrize("uri", ["elsewhere/models/crate", "file://elsewhere/models/crate",
                                  "elsewhere/models/crate/model.sdf", "elsewhere/models/../models/crate"])  # fmt: skip
-def test_relative_paths_start_at_the_file_that_names_them(load, models, uri):
+def test_relative_paths_are_relative_to_the_including_file(load, models, uri):
     assert len(load(include(uri)).solids) == 1
 
 
@@ -54,18 +54,18 @@ def test_absolute_paths_inside_the_root_are_read(load, models):
 
 
 def test_an_include_overrides_name_pose_and_static(load, models):
-    over = "<name>left</name><pose>1 2 3 0 0 0</pose>"
-    (solid,) = load(include("model://crate", over), search=[models]).solids
+    overrides = "<name>left</name><pose>1 2 3 0 0 0</pose>"
+    (solid,) = load(include("model://crate", overrides), search=[models]).solids
     assert solid.name == "left::a::c"
     assert solid.pose.position == (1, 2, 3)
-    (body,) = load(include("model://crate", over + "<static>false</static>"), search=[models]).bodies
+    (body,) = load(include("model://crate", overrides + "<static>false</static>"), search=[models]).bodies
     assert body.name == "left"
 
 
 @pytest.mark.parametrize(
     ("name", "message"), [("", "has no name"), ("x" * 121, "longer than 120"), ("a\u202eb", "control")]
 )
-def test_the_new_name_is_checked_like_any_other(refuse, models, name, message):
+def test_new_name_of_an_include_is_validated(refuse, models, name, message):
     assert message in refuse(include("model://crate", f"<name>{name}</name>"), search=[models])[0].message
 
 

@@ -41,7 +41,7 @@ def test_sun_and_ground_plane_are_known_at_any_url(load, uri):
 
 
 @pytest.mark.parametrize(
-    ("place", "uri"),
+    ("layout", "uri"),
     [
         ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big Crate"),
         ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big%20Crate/2"),
@@ -52,8 +52,8 @@ def test_sun_and_ground_plane_are_known_at_any_url(load, uri):
         ("crate", "file://models/crate"),
     ],
 )
-def test_model_is_found_in_an_allowed_folder_in_any_common_layout(load, tmp_path, place, uri):
-    crate(tmp_path / "models" / place)
+def test_model_is_found_in_an_allowed_folder_in_any_common_layout(load, tmp_path, layout, uri):
+    crate(tmp_path / "models" / layout)
     assert len(load(include(uri), search=[tmp_path / "models"]).solids) == 1
 
 
@@ -74,7 +74,7 @@ def test_no_url_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
 
 
 @pytest.mark.parametrize(
-    ("there", "asked", "hint"),
+    ("existing", "requested", "hint"),
     [
         ("meshes/Map.dae", "model://hall/meshes/map.dae", "did you mean `hall/meshes/Map.dae`?"),
         ("Meshes/map.DAE", "model://hall/meshes/map.dae", "did you mean `hall/Meshes/map.DAE`?"),
@@ -82,11 +82,11 @@ def test_no_url_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
         ("meshes/other.dae", "model://hall/meshes/map.dae", "looked in models; allow its folder with --world-path"),
     ],
 )
-def test_files_next_to_a_missing_mesh_are_named(refuse, tmp_path, there, asked, hint):
-    mesh = tmp_path / "models" / "hall" / there
+def test_files_next_to_a_missing_mesh_are_named(refuse, tmp_path, existing, requested, hint):
+    mesh = tmp_path / "models" / "hall" / existing
     mesh.parent.mkdir(parents=True)
     mesh.write_bytes(b"")
-    shape = f"<collision name='c'><geometry><mesh><uri>{asked}</uri></mesh></geometry></collision>"
+    shape = f"<collision name='c'><geometry><mesh><uri>{requested}</uri></mesh></geometry></collision>"
     (problem,) = refuse(f"<model name='m'><link name='a'>{shape}</link></model>", search=[tmp_path / "models"])
     assert problem.hint == hint
 
@@ -130,14 +130,14 @@ def test_broken_model_config_without_a_model_sdf_is_an_error(refuse, tmp_path):
 
 @pytest.mark.parametrize("static", [0, 1])
 @pytest.mark.parametrize(
-    ("x", "told"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
+    ("x", "message"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
 )
-def test_distant_object_is_left_out_with_a_note(load, x, told, static):
+def test_distant_object_is_left_out_with_a_note(load, x, message, static):
     world = load("".join(box(f"m{k}", k, k) for k in range(5)) + box("far", x, static=static))
     assert sorted({solid.name[:2] for solid in world.solids}) == ["m0", "m1", "m2", "m3", "m4"]
     assert world.bodies == ()
     assert world.bounds == (-0.5, -0.5, 4.5, 4.5)
-    assert any(told in note for note in world.notes)
+    assert any(message in note for note in world.notes)
 
 
 def test_large_world_without_gaps_keeps_all_its_solids(load):

@@ -99,7 +99,7 @@ class TestPlanes:
         face = slab.pose.apply(np.array([[0, 0, slab.shape.size[2] / 2]]))[0]
         np.testing.assert_allclose(face, [0, 0, 3], atol=1e-12)
 
-    def test_a_floor_turned_upright_is_a_wall(self, load):
+    def test_rotated_plane_is_a_wall(self, load):
         assert len(load(shaped(plane(), f"<pose>0 0 0 {math.pi / 2} 0 0</pose>")).solids) == 1
 
     def test_a_normal_without_length_is_refused(self, refuse):
@@ -133,10 +133,10 @@ class TestPolylines:
         assert area(solids).symmetric_difference(shapely.Polygon(SQUARE, [HOLE])).area < 1e-9
 
     def test_outlines_side_by_side_are_all_filled(self, load):
-        far = [(x + 10, y) for x, y in HOLE]
-        assert area(load(shaped(outline(SQUARE) + outline(far))).solids).area == pytest.approx(17)
+        distant = [(x + 10, y) for x, y in HOLE]
+        assert area(load(shaped(outline(SQUARE) + outline(distant))).solids).area == pytest.approx(17)
 
-    def test_an_outline_that_crosses_itself_is_filled_on_both_sides(self, load):
+    def test_both_loops_of_a_self_intersecting_outline_are_filled(self, load):
         solids = load(shaped(outline([(0, 0), (2, 2), (2, 0), (0, 2)]))).solids
         assert area(solids).area == pytest.approx(2)
 
@@ -162,7 +162,7 @@ class TestPolylines:
     @example([[(0, 0), (-5, -1), (6, -4)], [(2, -6), (0, 1), (8, 8), (0, 0)], [(0, 0), (0, 1), (3, -4)]])
     def test_trapezoids_cover_the_even_odd_area_of_any_outlines_once(self, outlines):
         pieces = [shapely.Polygon(piece) for piece in trapezoids([np.array(o, float) for o in outlines])]
-        assert sum(piece.area for piece in pieces) == pytest.approx(float(odd_area(outlines)), abs=1e-6)
+        assert sum(piece.area for piece in pieces) == pytest.approx(float(even_odd_area(outlines)), abs=1e-6)
         assert all(piece.exterior.is_ccw for piece in pieces)
         borders = shapely.union_all([shapely.LinearRing(outline) for outline in outlines])
         for point in shapely.points(np.indices((34, 34)).reshape(2, -1).T * 0.5 - OFF_GRID):
@@ -172,33 +172,33 @@ class TestPolylines:
 
 
 def crossings(outline, x, y):
-    """How often the ray from a point along x crosses an outline."""
+    """Return the number of crossings of an outline and the ray along x from a point."""
     edges = zip(outline, [*outline[1:], outline[0]], strict=True)
     return sum((b > y) != (d > y) and x < a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges)
 
 
-def odd_area(outlines):
-    """The area that an odd number of outlines enclose, in exact fractions: slab by slab between all crossings."""
+def even_odd_area(outlines):
+    """Return the exact area that an odd number of outlines encloses, summed over the slabs between all crossings."""
     edges = [(a, b) for outline in outlines for a, b in zip(outline, [*outline[1:], outline[0]], strict=True)]
     edges = [((Fraction(a), Fraction(b)), (Fraction(c), Fraction(d))) for (a, b), (c, d) in edges if b != d]
     heights = {y for edge in edges for _, y in edge} | {
-        y for one in edges for other in edges for y in meeting(one, other)
+        y for one in edges for other in edges for y in crossing_heights(one, other)
     }
-    return sum((top - low) * odd_width(edges, (top + low) / 2) for low, top in pairwise(sorted(heights)))
+    return sum((top - low) * even_odd_width(edges, (top + low) / 2) for low, top in pairwise(sorted(heights)))
 
 
-def odd_width(edges, y):
-    """Of a level that no corner lies on; it is linear within a slab, so that of the middle is the mean."""
-    at = sorted(a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges if (b > y) != (d > y))
-    return sum(right - left for left, right in zip(at[::2], at[1::2], strict=True))
+def even_odd_width(edges, y):
+    """Return the enclosed width at y. It is linear within a slab, so its mean is the value in the middle."""
+    crossings_x = sorted(a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges if (b > y) != (d > y))
+    return sum(right - left for left, right in zip(crossings_x[::2], crossings_x[1::2], strict=True))
 
 
-def meeting(one, other):
-    """The height at which two edges cross, if they do."""
+def crossing_heights(one, other):
+    """Yield the y at which two edges cross, if they do."""
     (a, b), (c, d) = one
     (e, f), (g, h) = other
-    turn = (c - a) * (h - f) - (d - b) * (g - e)
-    if turn != 0 and 0 <= (share := ((e - a) * (h - f) - (f - b) * (g - e)) / turn) <= 1:
+    determinant = (c - a) * (h - f) - (d - b) * (g - e)
+    if determinant != 0 and 0 <= (share := ((e - a) * (h - f) - (f - b) * (g - e)) / determinant) <= 1:
         yield b + share * (d - b)
 
 
