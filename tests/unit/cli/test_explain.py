@@ -107,18 +107,18 @@ def test_keys_and_codes_are_explained(simscen, name: str, expected_text: str) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "meant"),
+    ("name", "suggestion"),
     [("amcl.update_min_b", "amcl.update_min_"), ("goal_ocupied", "GOAL_OCCUPIED"), ("lingr", "linger")],
 )
-def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, meant: str) -> None:
-    assert f"did you mean `{meant}" in simscen("explain", name).err
+def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, suggestion: str) -> None:
+    assert f"did you mean `{suggestion}" in simscen("explain", name).err
 
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch, is_quick: bool) -> None:
     """`make test` asks for every fifth key only."""
     everything = topic_lookup.all_topics()
     for module in (explain, topic_lookup):
-        monkeypatch.setattr(module, "all_topics", lambda: everything)  # to collect it costs most of the time
+        monkeypatch.setattr(module, "all_topics", lambda: everything)  # its collection takes most of the time
     for name in [*known_names(), *list(known_names(keys=True))[:: 5 if is_quick else 1]]:
         assert explanation(name), name
 

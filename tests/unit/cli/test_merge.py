@@ -24,7 +24,7 @@ pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
 
 
 def simscen(*arguments: object) -> int:
-    """Run a process of its own, because a session locks its folder until the process ends."""
+    """Run simscen in a separate process, because a session locks its folder until the process ends."""
     command = [sys.executable, "-m", "simscen", *map(str, arguments)]
     return subprocess.run(command, check=False, capture_output=True).returncode
 
