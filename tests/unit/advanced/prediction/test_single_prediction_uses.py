@@ -21,10 +21,8 @@ CONTROLLERS: dict[str, dict[str, Any]] = {
 def min_clearance(user: str, controller: str = "regulated_pure_pursuit") -> float:
     """Return the minimum clearance if `user` (controller, monitor or none) is the only user of the prediction."""
     world, grid = Flatland().room(7, 8), Flatland().room(7, 8).grid((-0.5, -0.5, 7.5, 8.5))
-    options = {"type": controller, **CONTROLLERS[controller]}
-    spec = StackSpec.model_validate(
-        {"profile": "advanced", "localizer": {"type": "ground_truth"}, "controller": options}
-    )
+    parts = {"localizer": {"type": "ground_truth"}, "controller": {"type": controller, **CONTROLLERS[controller]}}
+    spec = StackSpec.model_validate({"profile": "advanced", **parts})
     goal = Goal("beyond", Pose2(6.0, 4.0))
     d = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
     stack = d.stack.inner

@@ -54,11 +54,8 @@ def test_the_number_of_elements_is_limited(refuse, monkeypatch):
 def test_repeated_unknown_element_is_looked_up_once(tmp_path, monkeypatch):
     lookups = []
     real = difflib.get_close_matches
-    monkeypatch.setattr(
-        difflib,
-        "get_close_matches",
-        lambda word, *rest, **how: lookups.append(word) or real(word, *rest, **how),
-    )
+    counting = lambda word, *rest, **options: lookups.append(word) or real(word, *rest, **options)  # noqa: E731
+    monkeypatch.setattr(difflib, "get_close_matches", counting)
     (tmp_path / "x.world").write_text(
         f"<sdf version='1.6'><world name='w'>{MODEL}{'<never_heard_of/>' * 1000}</world></sdf>"
     )
