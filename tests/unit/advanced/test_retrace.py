@@ -34,21 +34,21 @@ def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
 
 def driven(*legs: tuple[Twist, float]) -> list[Pose2]:
     """Return the poses, 40 per second, of a drive that ends at the origin with each velocity for so many seconds."""
-    pose, way = Pose2(0.0, 0.0), [Pose2(0.0, 0.0)]
+    pose, path = Pose2(0.0, 0.0), [Pose2(0.0, 0.0)]
     for twist, seconds in legs:
         steps = poses_along(pose, twist, np.arange(1, round(40 * seconds) + 1) / 40)
-        way += [Pose2(*each) for each in steps.tolist()]
-        pose = way[-1]
-    home = way[-1].inverse()
-    return [home.compose(each) for each in way]
+        path += [Pose2(*each) for each in steps.tolist()]
+        pose = path[-1]
+    home = path[-1].inverse()
+    return [home.compose(each) for each in path]
 
 
 ENTRY = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0), (Twist(0.0, 0.0, -0.5), 0.4))
 """Straight, a bend to the right, and a small turn in place."""
 
 
-def behavior(robot: RobotModel, way: list[Pose2], **options: float) -> Retrace:
-    return Retrace(model.Retrace(**options), replace(setting(robot), trail=lambda: way))
+def behavior(robot: RobotModel, path: list[Pose2], **options: float) -> Retrace:
+    return Retrace(model.Retrace(**options), replace(setting(robot), trail=lambda: path))
 
 
 def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Limit = lambda one, _: one) -> list[Pose2]:
@@ -126,26 +126,26 @@ def test_retrace_has_the_error_codes_of_backup() -> None:
 
 
 def test_retrace_sends_only_commands_that_the_collision_monitor_allows() -> None:
-    way = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
+    path = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
     ranges = np.full(5, 9.0)
     ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, toward which the trail turns
     monitor = CollisionMonitor(MonitorSpec(), LONG, ("lidar",), TICK_RATE_HZ)
     monitor.on_scan(Scan("lidar", 0, ranges, math.atan2(0.217, 0.02) - 0.02, 0.01, 0.1, 10.0), Pose2(0.0, 0.0))
     view = view_of(LONG, Flatland())
     with pytest.raises(NavigationFailure, match="too long"):
-        run(behavior(LONG, way), view, allowed=monitor.allow)
-    limited = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: way, limit_command=monitor.allow))
+        run(behavior(LONG, path), view, allowed=monitor.allow)
+    limited = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: path, limit_command=monitor.allow))
     end = run(limited, view, allowed=monitor.allow)[-1]
     assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
 
 
 def test_retrace_continues_from_a_pose_next_to_the_trail() -> None:
     corridor = Flatland([(-4.0, 0.27, 3.0, 0.4), (-4.0, -0.4, 3.0, -0.27)])
-    way = driven((Twist(0.5, 0.0, 0.0), 6.0))
-    retrace, view = behavior(LONG, way), view_of(LONG, corridor)
-    back = run(retrace, view)
-    shifted = [Pose2(each.x, each.y + 0.16, each.yaw) for each in (back[-1], back[-1])]
-    way += [*back, *shifted]
+    path = driven((Twist(0.5, 0.0, 0.0), 6.0))
+    retrace, view = behavior(LONG, path), view_of(LONG, corridor)
+    retraced = run(retrace, view)
+    shifted = [Pose2(each.x, each.y + 0.16, each.yaw) for each in (retraced[-1], retraced[-1])]
+    path += [*retraced, *shifted]
     retrace.start(shifted[-1])
     command = retrace.step(shifted[-1], view_of(LONG, Flatland()), 0.0)
     assert command is not None and command.vx < 0.0
@@ -160,9 +160,9 @@ def test_trail_has_small_steps_without_oscillations() -> None:
 
 
 def test_round_robot_retraces() -> None:
-    way = driven((Twist(0.3, 0.0, 0.6), 2.0))
-    end = run(behavior(round_robot(), way), view_of(round_robot(), Flatland()))[-1]
-    assert min(end.distance(pose) for pose in way) < 0.03
+    path = driven((Twist(0.3, 0.0, 0.6), 2.0))
+    end = run(behavior(round_robot(), path), view_of(round_robot(), Flatland()))[-1]
+    assert min(end.distance(pose) for pose in path) < 0.03
     assert end.yaw == pytest.approx(-0.6, abs=0.1)
     assert math.hypot(end.x, end.y) == pytest.approx(0.30, abs=0.03)
 

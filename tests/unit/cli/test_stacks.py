@@ -190,8 +190,8 @@ def test_scenario_of_a_folder_that_the_stack_cannot_run_is_skipped(simscen, proj
     outcomes = [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]]
     assert sorted(outcomes) == ["passed", "skipped"]
     assert f'<skipped type="simscen.skip" message="{reason}' in (project / "out/junit.xml").read_text()
-    alone = simscen("run", ".", "--stack", "mine=/bin/true", "-k", "jump")
-    assert (alone.code, "0 passed, 1 skipped" in alone.out) == (5, True)
+    single = simscen("run", ".", "--stack", "mine=/bin/true", "-k", "jump")
+    assert (single.code, "0 passed, 1 skipped" in single.out) == (5, True)
 
 
 def test_named_scenario_that_the_stack_cannot_run_is_invalid(simscen, project: Path) -> None:

@@ -127,7 +127,7 @@ def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> None:
+def test_pairwise_values_have_no_confidence_interval_and_no_claim(tmp_path: Path) -> None:
     pairwise = (
         "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
         "robot.motor_torque: [0.8, 0.9, 1]}}\n"
@@ -146,7 +146,7 @@ def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
+def test_values_meet_the_conditions_and_their_share_is_reported(tmp_path: Path) -> None:
     text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
     done = study(tmp_path, text, "--out", "out")
     assert done.returncode == 0, done.stderr
@@ -161,7 +161,7 @@ def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
+def test_printed_command_repeats_a_failed_run(tmp_path: Path) -> None:
     study(tmp_path, SCENARIO + RANDOM.replace("count: 40", "count: 2000"), "--out", "out", "--runs", 8)
     runs = results(tmp_path)["runs"]
     failed = next(run for run in runs if run["outcome"] == "failed")

@@ -40,7 +40,7 @@ def test_empty_cross_section_touches_no_cells():
     assert not touched_cells(CrossSection(np.empty((0, 2, 2)), np.empty(0, np.int32)), (4, 4)).any()
 
 
-def test_ranges_are_listed_one_after_the_other():
+def test_ranges_are_expanded_in_order():
     indices, values = expand_ranges(np.array([3, 5, 0]), np.array([5, 5, 2]))
     assert indices.tolist() == [0, 0, 2, 2]
     assert values.tolist() == [3, 4, 0, 1]

@@ -63,7 +63,7 @@ def test_joints_may_name_frames_and_nested_models(load):
     assert body.mass == 2
 
 
-def test_two_copies_of_one_file_are_not_confused(load, tmp_path):
+def test_joint_attaches_only_the_named_one_of_two_copies_of_a_file(load, tmp_path):
     (tmp_path / "wheel.sdf").write_text(f"<sdf version='1.9'><model name='wheel'>{link('hub')}</model></sdf>")
     wheels = "".join(
         f"<include><uri>wheel.sdf</uri><name>{name}</name><pose>{x} 0 0 0 0 0</pose></include>"

@@ -74,13 +74,13 @@ def test_include_without_a_pose_keeps_that_of_the_model(load, tmp_path):
     assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
 
 
-def test_a_placement_frame_of_an_include_is_what_its_pose_places(load, tmp_path):
+def test_pose_of_an_include_applies_to_its_placement_frame(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static><frame name='corner'><pose>1 1 0 0 0 0</pose></frame>")
     world = load(include("m/crate", "<pose>0 0 0 0 0 0</pose><placement_frame>corner</placement_frame>"))
     assert world.solids[0].pose.position == (-1, -1, 0)
 
 
-def test_the_pose_of_an_include_may_be_relative_to_a_frame_beside_it(load, models):
+def test_pose_of_an_include_may_be_relative_to_a_frame_of_its_parent(load, models):
     frame = "<frame name='f'><pose>10 0 0 0 0 0</pose></frame>"
     world = load(frame + include("model://crate", "<pose relative_to='f'>1 0 0 0 0 0</pose>"), search=[models])
     assert world.solids[0].pose.position == (11, 0, 0)
@@ -250,7 +250,7 @@ class TestContainment:
     def test_folder_allowed_by_the_user_can_be_read(self, load, outside):
         assert len(load(include("model://crate"), search=[outside]).solids) == 1
 
-    def test_the_world_itself_must_be_inside(self, outside, tmp_path):
+    def test_world_file_outside_the_root_is_refused(self, outside, tmp_path):
         with pytest.raises(InvalidInput, match="outside the scenario root"):
             load_sdf(outside / "crate" / "model.sdf", root=tmp_path)
 

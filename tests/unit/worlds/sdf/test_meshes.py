@@ -122,7 +122,7 @@ class TestCollada:
         np.testing.assert_allclose(centered.vertices.min(axis=0), (-2, -1, 0))
         assert len(mesh(dae(both, nodes)).faces) == 2
 
-    def test_an_unknown_submesh_is_refused_with_those_there_are(self, broken):
+    def test_unknown_submesh_is_refused_with_the_existing_names(self, broken):
         problem = broken(dae(), "<submesh><name>door</name></submesh>")
         assert "no submesh 'door' in x.dae" in problem.message
         assert problem.hint == "it has part"
@@ -135,7 +135,7 @@ class TestCollada:
     def test_broken_files_are_refused(self, broken, content):
         assert broken(content).message.startswith("world[w]/model[m]/link[a]/collision[c]/geometry/mesh/uri: x.dae: ")
 
-    def test_a_part_that_cannot_be_read_is_not_left_out_silently(self, broken):
+    def test_unreadable_part_of_a_mesh_is_an_error(self, broken):
         both = geometry("g") + geometry("h", primitive=TRIANGLES.replace("triangles", "tristrips"))
         assert "<tristrips> is not read" in broken(dae(both, node("a") + node("b", "h"))).message
         assert "its geometry 'h' is missing" in broken(dae(nodes=node("a") + node("b", "h"))).message
@@ -198,7 +198,7 @@ OBJ = (
 
 
 class TestObj:
-    def test_all_objects_are_read_and_materials_are_not(self, mesh):
+    def test_all_objects_are_read_without_materials(self, mesh):
         shape = mesh(OBJ, name="x.obj")
         assert len(shape.faces) == 2
         assert shape.vertices[:, 0].max() == 6
