@@ -8,7 +8,7 @@ import os, signal, sys
 from simscen.cli.session.backends import interrupt_on_signals
 from simscen.run.process.supervisor import Interrupted
 
-now = iter({times})
+now = iter({signal_times})
 try:
     with interrupt_on_signals(lambda: next(now)):
         os.kill(os.getpid(), signal.SIGINT)

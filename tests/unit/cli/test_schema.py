@@ -99,7 +99,7 @@ def test_schema_has_no_nulls_and_no_large_defaults() -> None:
 def test_command_writes_the_committed_schemas(simscen, tmp_path: Path) -> None:
     assert simscen("schema", "--write", "written").code == 0
     for kind in MODELS:
-        written = (tmp_path / f"made/{kind}.schema.json").read_text()
+        written = (tmp_path / f"written/{kind}.schema.json").read_text()
         assert written == (ROOT / f"schemas/{kind}.schema.json").read_text()
     assert json.loads(simscen("schema", "world").out) == schema_of("world")
 
