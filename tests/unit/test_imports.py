@@ -1,27 +1,27 @@
-"""Modules import each other in one direction only."""
+"""Tests that simscen has no import cycles."""
 
 from collections.abc import Mapping
 
 import grimp
 
 
-def circles(imports: Mapping[str, set[str]]) -> list[str]:
-    """The modules that are left when those that import nothing, or that nothing imports, are taken away in turns."""
-    left = {module: set(imported) & imports.keys() for module, imported in imports.items()}
+def cycles(imports: Mapping[str, set[str]]) -> list[str]:
+    """Return the modules that remain when those without imports or importers are removed repeatedly."""
+    remaining = {module: set(imported) & imports.keys() for module, imported in imports.items()}
     while True:
-        imported = set().union(*left.values()) if left else set()
-        ends = {module for module, needed in left.items() if not needed or module not in imported}
-        if not ends:
-            return sorted(left)
-        left = {module: needed - ends for module, needed in left.items() if module not in ends}
+        imported = set().union(*remaining.values()) if remaining else set()
+        leaves = {module for module, needed in remaining.items() if not needed or module not in imported}
+        if not leaves:
+            return sorted(remaining)
+        remaining = {module: needed - leaves for module, needed in remaining.items() if module not in leaves}
 
 
-def test_a_circle_of_modules_is_seen():
-    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == ["b", "c"]
-    assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+def test_import_cycle_is_detected():
+    assert cycles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == ["b", "c"]
+    assert cycles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
-def test_no_modules_import_each_other_in_a_circle_not_even_inside_functions():
+def test_modules_have_no_import_cycle_even_inside_functions():
     graph = grimp.build_graph("simscen", cache_dir=None)
     assert len(graph.modules) > 100
-    assert circles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []
+    assert cycles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []

@@ -11,7 +11,7 @@ import simscen.plugin as public
 
 
 @pytest.mark.parametrize("name", public.__all__)
-def test_a_name_is_what_it_says(name: str) -> None:
+def test_public_name_equals_the_name_of_its_object(name: str) -> None:
     value = getattr(public, name)
     if getattr(value, "__module__", "").startswith("simscen.") and hasattr(value, "__name__"):
         if get_origin(value) is Annotated:
@@ -22,11 +22,11 @@ def test_a_name_is_what_it_says(name: str) -> None:
 
 def test_type_checkers_see_the_existing_names() -> None:
     source = inspect.getsource(public)
-    seen = source[source.index("if TYPE_CHECKING") : source.index("__all__")]
+    imports = source[source.index("if TYPE_CHECKING") : source.index("__all__")]
     for module, names in public._NAMES_BY_MODULE.items():
-        assert f"from {module} import " in seen
+        assert f"from {module} import " in imports
         for name in names:
-            assert f" {name}" in seen
+            assert f" {name}" in imports
     assert sorted(public._MODULE_OF) == sorted(public.__all__)
 
 
@@ -36,7 +36,7 @@ def test_missing_name_is_an_attribute_error() -> None:
 
 
 def test_a_specification_imports_no_engine() -> None:
-    told = "import sys; from simscen.plugin import PlannerSpec, PositiveLength, InProcessStack;"
+    imports = "import sys; from simscen.plugin import PlannerSpec, PositiveLength, InProcessStack;"
     heavy = "print(sorted({'scipy', 'ompl', 'pybullet', 'trimesh', 'filterpy'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", told + heavy], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", imports + heavy], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

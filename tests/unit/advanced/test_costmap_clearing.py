@@ -10,23 +10,23 @@ from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, drive
 
-FAR = Goal("far", Pose2(10.0, 3.0), timeout=150.0)
-ACROSS = (6.0, 0.05, 6.2, 5.95)
+FAR_GOAL = Goal("far", Pose2(10.0, 3.0), timeout=150.0)
+WALL = (6.0, 0.05, 6.2, 5.95)
 
 
-def in_a_hall(seconds: float, *, entirely: bool = False) -> Drive:
-    """A wall drops across a hall of 6 m while the robot is on its way; its lidar marks what is within 2.5 m."""
+def drive_toward_wall(seconds: float, *, entirely: bool = False) -> Drive:
+    """Drive in a hall of 6 m that a new wall divides after 2 s; the lidar marks obstacles within 2.5 m."""
     world = Flatland().room(12, 6)
     grid = world.grid((-0.5, -0.5, 12.5, 6.5))
     spec = StackSpec(localizer=GroundTruth(type="ground_truth"), recovery=Recovery(clear_entirely=entirely))
-    d = drive(world, Pose2(3.0, 3.0), FAR, grid=grid, spec=spec).run(2.0)
-    world.boxes.append(ACROSS)
+    d = drive(world, Pose2(3.0, 3.0), FAR_GOAL, grid=grid, spec=spec).run(2.0)
+    world.boxes.append(WALL)
     return d.run(seconds)
 
 
 @pytest.mark.slow
 def test_wall_across_a_hall_fails_with_no_valid_path() -> None:
-    d = in_a_hall(60)
+    d = drive_toward_wall(60)
     assert [event.data["error_name"] for event in d.events_of_kind("goal.failed")] == ["NO_VALID_PATH"]
     assert d.tick / 240 < 40
     assert d.min_clearance > 0.02
@@ -34,11 +34,11 @@ def test_wall_across_a_hall_fails_with_no_valid_path() -> None:
 
 @pytest.mark.slow
 def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
-    assert not in_a_hall(45, entirely=True).events_of_kind("goal.failed")
+    assert not drive_toward_wall(45, entirely=True).events_of_kind("goal.failed")
 
 
 def test_reopened_door_out_of_sight_is_tried_again() -> None:
-    """The costmap is cleared again within ten seconds of the first time, or a little later."""
+    """The costmap is cleared again about ten seconds after the first time."""
     mapped = Flatland().room(8, 8)
     mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 6.0), (3.9, 7.0, 4.0, 8.0)]  # two doors
     world = Flatland([*mapped.boxes, lower := (3.9, 1.0, 4.0, 2.0), (3.9, 6.0, 4.0, 7.0)])
@@ -51,15 +51,15 @@ def test_reopened_door_out_of_sight_is_tried_again() -> None:
 
 
 def test_whole_costmap_is_cleared_with_growing_intervals() -> None:
-    forgetting = ClearingBackoff()
-    assert [t for t in range(100) if forgetting.clears_entirely(float(t), 5.0)] == [0, 10, 30, 70]
-    forgetting.reset()
-    assert forgetting.clears_entirely(100.0, 5.0)
+    backoff = ClearingBackoff()
+    assert [t for t in range(100) if backoff.clears_entirely(float(t), 5.0)] == [0, 10, 30, 70]
+    backoff.reset()
+    assert backoff.clears_entirely(100.0, 5.0)
 
 
-@pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
-def test_progress_of_a_meter_allows_clearing_at_once(to_go: float, again: bool) -> None:
-    forgetting = ClearingBackoff()
-    assert forgetting.clears_entirely(0.0, 5.0)
-    assert forgetting.clears_entirely(1.0, to_go) == again
-    assert not forgetting.clears_entirely(2.0, to_go)
+@pytest.mark.parametrize(("to_go", "clears"), [(4.5, False), (3.9, True)])
+def test_progress_of_a_meter_allows_clearing_at_once(to_go: float, clears: bool) -> None:
+    backoff = ClearingBackoff()
+    assert backoff.clears_entirely(0.0, 5.0)
+    assert backoff.clears_entirely(1.0, to_go) == clears
+    assert not backoff.clears_entirely(2.0, to_go)

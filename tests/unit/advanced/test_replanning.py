@@ -17,12 +17,12 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 GOAL = Goal("g", Pose2(7.0, 3.0))
-HERE = Pose2(1.0, 3.0)
+START = Pose2(1.0, 3.0)
 WORLD = Flatland().room(8, 6)
 
 
 class Scripted:
-    """A planner and a controller that do as told: the straight way, by way of `bulge` meters, or a failure."""
+    """Planner and controller with a scripted result: a path with a lateral `bulge` in m, or a failure."""
 
     def __init__(self) -> None:
         self.seeds: list[int] = []
@@ -32,7 +32,7 @@ class Scripted:
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         self.seeds.append(seed)
         if self.broken:
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "told so")
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "scripted failure")
         x = np.linspace(start.x, goal.x, 121)
         y = start.y + self.bulge * np.sin(np.linspace(0, math.pi, 121))
         return Path(np.column_stack((x, y, np.zeros(121))))
@@ -48,7 +48,7 @@ class Scripted:
 
 
 class Bench:
-    """A keeper with its costmap, looked at every tenth of a second."""
+    """Plan manager with its costmap."""
 
     def __init__(self, **options: object) -> None:
         self.script = Scripted()
@@ -56,30 +56,30 @@ class Bench:
         self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, TICK_RATE_HZ))
         self.journal: list[Event] = []
         self.now = 0.0
-        self.keeper = AdvancedPlanManager(
+        self.manager = AdvancedPlanManager(
             PlannerSpec(**{"cautious": True, **options}), self.script, self.costmap, lambda k: 100 + k, 0.22
         )
 
     def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
-        """Reasons of the plans made in so many steps of the navigator."""
+        """Return the reasons of the plans made in `count` steps of the navigator."""
         before = len(self.journal)
         for _ in range(count):
-            self.journal += self.keeper.step(0, self.now, goal, HERE)
+            self.journal += self.manager.step(0, self.now, goal, START)
             self.now += 0.05
         return [event.data["reason"] for event in self.journal[before:]]
 
     def see(self, *discs: tuple[float, float, float]) -> None:
-        """A scan of the room with discs in it."""
+        """Update the costmap with a scan of the room with these discs."""
         step = 2 * math.pi / 360
         angles = -math.pi + step * np.arange(360)
-        ranges = Flatland(WORLD.boxes, list(discs)).cast((HERE.x, HERE.y), angles)
-        self.costmap.update(HERE, Scan("lidar", 0, ranges, -math.pi, step, 0.05, 12.0))
+        ranges = Flatland(WORLD.boxes, list(discs)).cast((START.x, START.y), angles)
+        self.costmap.update(START, Scan("lidar", 0, ranges, -math.pi, step, 0.05, 12.0))
 
 
 def test_a_plan_is_made_once_and_each_has_its_own_seed() -> None:
     bench = Bench()
     assert bench.steps(40) == ["goal"]
-    bench.keeper.drop("recovery")
+    bench.manager.drop("recovery")
     assert bench.steps(40) == ["recovery"]
     assert bench.script.seeds == [101, 102]
 
@@ -108,7 +108,7 @@ def test_removed_obstacle_leads_to_a_clearly_shorter_plan() -> None:
     bench.see((2.5, 3.0, 0.4))
     bench.steps(4)
     bench.see()
-    assert bench.steps(60) == []  # looked once, but the other was no shorter
+    assert bench.steps(60) == []  # one search, but its plan was no shorter
     bench.see((2.5, 3.0, 0.4))
     bench.steps(4)
     bench.script.bulge = 0.0
@@ -118,14 +118,14 @@ def test_removed_obstacle_leads_to_a_clearly_shorter_plan() -> None:
 
 def test_no_better_plan_is_searched_if_the_straight_line_is_not_clearly_shorter() -> None:
     """Otherwise the planner would be busy, and a blocked plan would have to wait."""
-    for bulge, looked in ((1.0, False), (2.5, True)):  # 6.4 m and 8.5 m instead of 6
+    for bulge, searches in ((1.0, False), (2.5, True)):  # paths of 6.4 m and 8.5 m instead of 6 m
         bench = Bench()
         bench.script.bulge = bulge
         bench.see((2.5, 3.0, 0.2))
         bench.steps(4)
         bench.see()
         assert bench.steps(60) == []
-        assert (len(bench.script.seeds) == 2) == looked
+        assert (len(bench.script.seeds) == 2) == searches
 
 
 def test_failed_search_for_a_better_plan_is_ignored() -> None:
@@ -137,7 +137,7 @@ def test_failed_search_for_a_better_plan_is_ignored() -> None:
     bench.see()
     assert bench.steps(60) == []
     assert len(bench.script.seeds) == 2
-    assert bench.keeper.plan is not None
+    assert bench.manager.plan is not None
 
 
 def test_replanning_at_a_rate_is_unconditional() -> None:
@@ -145,7 +145,7 @@ def test_replanning_at_a_rate_is_unconditional() -> None:
     assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
 
 
-def test_at_a_rate_a_nearly_finished_plan_is_replaced_only_if_blocked() -> None:
+def test_replanning_at_a_rate_near_the_goal_replaces_only_blocked_plans() -> None:
     """IsGoalNearby and ValidatePath of Nav2's default trees."""
     bench, near = Bench(replanning="rate", replanning_rate=2.0), Goal("near", Pose2(4.5, 3.0))
     assert bench.steps(40, near) == ["goal"]
@@ -167,17 +167,17 @@ def test_plans_keep_more_clearance_after_a_control_failure() -> None:
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         row, column = (
-            round((at - low) / costmap.resolution) for at, low in zip((3.0, 1.0), costmap.origin, strict=True)
+            round((center - low) / costmap.resolution) for center, low in zip((3.0, 1.0), costmap.origin, strict=True)
         )
         asked.append(float(bench.costmap.view.distance[row, column] - costmap.distance[row, column]))
         return straight(costmap, start, goal, seed)
 
     bench.script.plan = plan
     bench.steps(2)
-    bench.keeper.report_control_failure()
-    bench.keeper.drop("recovery")
+    bench.manager.report_control_failure()
+    bench.manager.drop("recovery")
     bench.steps(2)
-    bench.keeper.reset(bench.now)
+    bench.manager.reset(bench.now)
     bench.steps(2)
     assert asked == pytest.approx([0.0, 0.1, 0.15, 0.0])
 
@@ -186,50 +186,50 @@ def test_plans_keep_more_clearance_after_a_control_failure() -> None:
 def test_clearance_increases_if_the_path_is_hardly_longer(bulge: float, kept: bool) -> None:
     bench = Bench()
     bench.steps(2)
-    bench.keeper.report_control_failure()
-    bench.keeper.drop("recovery")
+    bench.manager.report_control_failure()
+    bench.manager.drop("recovery")
     plan, bulges = bench.script.plan, iter([0.0, bulge])
 
-    def roomier(*asked: object) -> Path:
+    def wider_plan(*asked: object) -> Path:
         bench.script.bulge = next(bulges)
         return plan(*asked)
 
-    bench.script.plan = roomier
+    bench.script.plan = wider_plan
     bench.steps(2)
-    assert (bench.keeper.plan.path.points[:, 1].max() > 3.2) == kept
+    assert (bench.manager.plan.path.points[:, 1].max() > 3.2) == kept
 
 
 def test_tight_path_is_retried_if_there_is_no_wider_one() -> None:
     bench = Bench()
     bench.steps(2)
-    bench.keeper.report_control_failure()
-    bench.keeper.drop("recovery")
-    straight, room = bench.script.plan, list[bool]()
+    bench.manager.report_control_failure()
+    bench.manager.drop("recovery")
+    straight, is_unchanged = bench.script.plan, list[bool]()
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        room.append(costmap.distance is bench.costmap.view.distance)
-        if not room[-1]:
+        is_unchanged.append(costmap.distance is bench.costmap.view.distance)
+        if not is_unchanged[-1]:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "too tight")
         return straight(costmap, start, goal, seed)
 
     bench.script.plan = plan
     assert bench.steps(2) == ["recovery"]
-    assert room == [False, False, True]
+    assert is_unchanged == [False, False, True]
 
 
-def across(y: float, vy: float) -> MovingObstacles:
-    """Someone at (2, y) who walks along y."""
-    at, velocity = np.array([[2.0, y]]), np.array([[0.0, vy]])
-    return MovingObstacles(at, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
+def obstacle_at(y: float, vy: float) -> MovingObstacles:
+    """Return an obstacle at (2, y) that moves along y."""
+    center, velocity = np.array([[2.0, y]]), np.array([[0.0, vy]])
+    return MovingObstacles(center, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
 
 
 def test_plan_that_meets_a_moving_obstacle_is_renewed_twice_a_second() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
-    bench.costmap.moving = across(5.0, -1.0)  # at (2, 3) in 2 s, as the robot is
+    bench.costmap.moving = obstacle_at(5.0, -1.0)  # meets the robot at (2, 3) in 2 s
     assert bench.steps(20) == ["moving", "moving"]
     bench.costmap.moving = NO_MOVING_OBSTACLES
-    assert bench.steps(40) == ["moving"]  # straight again
+    assert bench.steps(40) == ["moving"]  # back to the straight path
 
 
 def test_rejected_plan_around_a_moving_obstacle_causes_no_more_replanning() -> None:
@@ -237,22 +237,22 @@ def test_rejected_plan_around_a_moving_obstacle_causes_no_more_replanning() -> N
     bench.script.bulge = 2.5
     bench.see((2.5, 3.0, 0.4))
     bench.steps(4)
-    bench.costmap.moving = across(2.2, -0.2)  # off the plan, but where others might lead
+    bench.costmap.moving = obstacle_at(2.2, -0.2)  # not on the plan, but on alternative paths
     bench.see()
     assert bench.steps(60) == []
-    assert len(bench.script.seeds) == 2  # one look for a better one
+    assert len(bench.script.seeds) == 2  # one search for a better plan
 
 
 def test_departing_obstacle_does_not_cause_replanning() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
-    bench.costmap.moving = across(4.5, 1.0)
+    bench.costmap.moving = obstacle_at(4.5, 1.0)
     assert bench.steps(40) == []
 
 
 def test_plan_is_kept_without_a_path_around_a_moving_obstacle() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
-    bench.costmap.moving, bench.script.broken = across(5.0, -1.0), True
+    bench.costmap.moving, bench.script.broken = obstacle_at(5.0, -1.0), True
     assert bench.steps(20) == []
-    assert bench.keeper.plan is not None
+    assert bench.manager.plan is not None

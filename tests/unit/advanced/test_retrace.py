@@ -22,10 +22,10 @@ from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
-Allowed = Callable[[Twist, Pose2], Twist]
+Limit = Callable[[Twist, Pose2], Twist]
 LONG = box_robot(0.42, 0.42)
 POSTS = ((0.29, -0.03, 0.05), (-0.4, 0.17, 0.05))
-"""Discs (x, y, radius) between which a robot at the origin can neither turn nor back up straight as Nav2's does."""
+"""Discs (x, y, radius) between which a robot at the origin can neither spin nor back up straight as with Nav2."""
 
 
 def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
@@ -33,54 +33,54 @@ def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
 
 
 def driven(*legs: tuple[Twist, float]) -> list[Pose2]:
-    """The way of a robot, 40 poses a second, that ends at the origin: each velocity for so many seconds."""
-    pose, way = Pose2(0.0, 0.0), [Pose2(0.0, 0.0)]
+    """Return the poses, 40 per second, of a drive that ends at the origin with each velocity for so many seconds."""
+    pose, path = Pose2(0.0, 0.0), [Pose2(0.0, 0.0)]
     for twist, seconds in legs:
         steps = poses_along(pose, twist, np.arange(1, round(40 * seconds) + 1) / 40)
-        way += [Pose2(*each) for each in steps.tolist()]
-        pose = way[-1]
-    home = way[-1].inverse()
-    return [home.compose(each) for each in way]
+        path += [Pose2(*each) for each in steps.tolist()]
+        pose = path[-1]
+    home = path[-1].inverse()
+    return [home.compose(each) for each in path]
 
 
-IN = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0), (Twist(0.0, 0.0, -0.5), 0.4))
-"""Straight, round a bend to the right, and a little turn on the spot."""
+ENTRY = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0), (Twist(0.0, 0.0, -0.5), 0.4))
+"""Straight, a bend to the right, and a small turn in place."""
 
 
-def behavior(robot: RobotModel, way: list[Pose2], **said: float) -> Retrace:
-    return Retrace(model.Retrace(**said), replace(setting(robot), trail=lambda: way))
+def behavior(robot: RobotModel, path: list[Pose2], **options: float) -> Retrace:
+    return Retrace(model.Retrace(**options), replace(setting(robot), trail=lambda: path))
 
 
-def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Allowed = lambda one, _: one) -> list[Pose2]:
-    """Do what is `allowed` of what it says until it is done: the poses. Of each turn the base makes the part `slip`."""
+def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Limit = lambda one, _: one) -> list[Pose2]:
+    """Return the poses until the behavior ends; `allowed` limits its commands, and `slip` scales its turns."""
     poses = [Pose2(0.0, 0.0)]
     behavior.start(poses[0])
     for beat in range(400):
         command = behavior.step(poses[-1], view, 0.05 * beat)
         if command is None:
             return poses
-        done = allowed(command, poses[-1])
-        moved = Twist(done.vx, done.vy, slip * done.wz)
-        poses.append(Pose2(*poses_along(poses[-1], moved, np.array([0.05]))[0].tolist()))
-    raise AssertionError("it never ends")
+        executed = allowed(command, poses[-1])
+        motion = Twist(executed.vx, executed.vy, slip * executed.wz)
+        poses.append(Pose2(*poses_along(poses[-1], motion, np.array([0.05]))[0].tolist()))
+    raise AssertionError("the behavior does not end")
 
 
 @pytest.mark.parametrize("slip", [1.0, 0.7])
 def test_retrace_frees_a_robot_wedged_between_posts(slip: float) -> None:
     world = Flatland(discs=list(POSTS))
     view = view_of(LONG, world)
-    for stuck in (Spin(model.Spin(), setting(LONG)), BackUp(model.BackUp(backup_partial=False), setting(LONG))):
+    for nav2_behavior in (Spin(model.Spin(), setting(LONG)), BackUp(model.BackUp(backup_partial=False), setting(LONG))):
         with pytest.raises(NavigationFailure):
-            run(stuck, view)
-    poses = run(behavior(LONG, IN), view, slip)
+            run(nav2_behavior, view)
+    poses = run(behavior(LONG, ENTRY), view, slip)
     assert min(world.clearance(LONG, pose) for pose in poses) > 0.0
-    assert min(poses[-1].distance(came) for came in IN) < 0.1
+    assert min(poses[-1].distance(pose) for pose in ENTRY) < 0.1
     assert world.distance(np.array([poses[-1][:2]]))[0] > LONG.circumscribed_radius - view.resolution / 2
     assert abs(poses[-1].yaw) > 0.3
 
 
 def test_retrace_reverses_turns_in_place() -> None:
-    poses = run(behavior(LONG, IN), view_of(LONG, Flatland()))
+    poses = run(behavior(LONG, ENTRY), view_of(LONG, Flatland()))
     turned = next(pose for pose in poses if pose.yaw > 0.15)
     assert turned.distance(poses[0]) < 0.03
 
@@ -115,54 +115,54 @@ def test_obstacle_on_the_trail_ends_retrace() -> None:
 
 
 def test_retrace_has_the_error_codes_of_backup() -> None:
-    slow, view = behavior(LONG, IN), view_of(LONG, Flatland())
+    slow, view = behavior(LONG, ENTRY), view_of(LONG, Flatland())
     slow.start(Pose2(0.0, 0.0))
     with pytest.raises(NavigationFailure) as failed:
         slow.step(Pose2(0.0, 0.0), view, 10.1)
     assert failed.value.code == ErrorCode.BACKUP_TIMEOUT
     with pytest.raises(NavigationFailure) as failed:
-        run(behavior(replace(LONG, max_reverse=0.0), IN), view)
+        run(behavior(replace(LONG, max_reverse=0.0), ENTRY), view)
     assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
 
 
 def test_retrace_sends_only_commands_that_the_collision_monitor_allows() -> None:
-    way = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
+    path = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
     ranges = np.full(5, 9.0)
-    ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, towards which the way back turns
+    ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, toward which the trail turns
     monitor = CollisionMonitor(MonitorSpec(), LONG, ("lidar",), TICK_RATE_HZ)
     monitor.on_scan(Scan("lidar", 0, ranges, math.atan2(0.217, 0.02) - 0.02, 0.01, 0.1, 10.0), Pose2(0.0, 0.0))
     view = view_of(LONG, Flatland())
     with pytest.raises(NavigationFailure, match="too long"):
-        run(behavior(LONG, way), view, allowed=monitor.limit_command)
-    heedful = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: way, limit_command=monitor.limit_command))
-    end = run(heedful, view, allowed=monitor.limit_command)[-1]
+        run(behavior(LONG, path), view, allowed=monitor.limit_command)
+    limited = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: path, limit_command=monitor.limit_command))
+    end = run(limited, view, allowed=monitor.limit_command)[-1]
     assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
 
 
 def test_retrace_continues_from_a_pose_next_to_the_trail() -> None:
     corridor = Flatland([(-4.0, 0.27, 3.0, 0.4), (-4.0, -0.4, 3.0, -0.27)])
-    way = driven((Twist(0.5, 0.0, 0.0), 6.0))
-    twice, view = behavior(LONG, way), view_of(LONG, corridor)
-    back = run(twice, view)
-    beside = [Pose2(each.x, each.y + 0.16, each.yaw) for each in (back[-1], back[-1])]
-    way += [*back, *beside]
-    twice.start(beside[-1])
-    command = twice.step(beside[-1], view_of(LONG, Flatland()), 0.0)
+    path = driven((Twist(0.5, 0.0, 0.0), 6.0))
+    retrace, view = behavior(LONG, path), view_of(LONG, corridor)
+    retraced = run(retrace, view)
+    shifted = [Pose2(each.x, each.y + 0.16, each.yaw) for each in (retraced[-1], retraced[-1])]
+    path += [*retraced, *shifted]
+    retrace.start(shifted[-1])
+    command = retrace.step(shifted[-1], view_of(LONG, Flatland()), 0.0)
     assert command is not None and command.vx < 0.0
 
 
 def test_trail_has_small_steps_without_oscillations() -> None:
-    to_and_fro = driven((Twist(0.5, 0, 0), 2.0), (Twist(-0.2, 0, 0), 1.0), (STOP, 5.0), (Twist(0.2, 0, 0), 1.0))
-    trail = Trail(to_and_fro, to_and_fro[-1], 0.3, 2.0)
+    oscillation = driven((Twist(0.5, 0, 0), 2.0), (Twist(-0.2, 0, 0), 1.0), (STOP, 5.0), (Twist(0.2, 0, 0), 1.0))
+    trail = Trail(oscillation, oscillation[-1], 0.3, 2.0)
     assert trail.driven[-1] == pytest.approx(trail.poses[0, 0] - trail.poses[-1, 0], abs=0.01)
     assert np.diff(trail.poses[:, 0]).max() < 0.0
     assert np.diff(trail.along).max() < 0.1
 
 
-def test_a_round_robot_retraces_too() -> None:
-    way = driven((Twist(0.3, 0.0, 0.6), 2.0))
-    end = run(behavior(round_robot(), way), view_of(round_robot(), Flatland()))[-1]
-    assert min(end.distance(came) for came in way) < 0.03
+def test_round_robot_retraces() -> None:
+    path = driven((Twist(0.3, 0.0, 0.6), 2.0))
+    end = run(behavior(round_robot(), path), view_of(round_robot(), Flatland()))[-1]
+    assert min(end.distance(pose) for pose in path) < 0.03
     assert end.yaw == pytest.approx(-0.6, abs=0.1)
     assert math.hypot(end.x, end.y) == pytest.approx(0.30, abs=0.03)
 
@@ -170,7 +170,7 @@ def test_a_round_robot_retraces_too() -> None:
 def test_time_allowance_is_the_time_after_which_retrace_fails() -> None:
     view = view_of(LONG, Flatland())
     for allowance, seconds, fails in ((10.0, 10.05, True), (10.0, 9.9, False), (30.0, 20.0, False), (1.0, 9.9, False)):
-        retrace = behavior(LONG, IN, time_allowance=allowance, retrace_dist=1.0, backup_speed=0.15)
+        retrace = behavior(LONG, ENTRY, time_allowance=allowance, retrace_dist=1.0, backup_speed=0.15)
         retrace.start(Pose2(0.0, 0.0))
         if not fails:
             assert retrace.step(Pose2(0.0, 0.0), view, seconds) is not None

@@ -17,70 +17,71 @@ from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, drive
 
 BEND = 0.3
-"""1/m: how much more to the left the ground turns the robot than its wheels."""
+"""Additional curvature to the left in 1/m, caused by the ground."""
 ROOM = Flatland().room(14, 2.6)
 
 
-class Slipping:
-    """Between a robot and its stack: the ground bends what is driven, odometry tells what the wheels did."""
+class SlippingDrive:
+    """Stack wrapper in which the ground turns the robot to the left, and odometry reports the wheel motion."""
 
-    def __init__(self, drive: Drive, in_vain: float = 0.0) -> None:
-        self.drive, self.stack, self._in_vain = drive, drive.stack, in_vain
-        self._before, self._told = drive.pose, drive.pose
+    def __init__(self, drive: Drive, wheel_slip: float = 0.0) -> None:
+        self.drive, self.stack, self._wheel_slip = drive, drive.stack, wheel_slip
+        self._before, self._odometry = drive.pose, drive.pose
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """A beat."""
         step = self._before.between(self.drive.pose)
         self._before = self.drive.pose
-        self._told = self._told.compose(Pose2(step.x * (1 + self._in_vain), step.y, step.yaw - BEND * step.x))
+        self._odometry = self._odometry.compose(
+            Pose2(step.x * (1 + self._wheel_slip), step.y, step.yaw - BEND * step.x)
+        )
         imu = Imu("imu", tick, (0.0, 0.0, self.drive.twist.wz), (0.0, 0.0, 9.81))
-        told = tuple(replace(one, pose=self._told) if isinstance(one, Odometry) else one for one in readings)
-        decision = self.stack.decide(tick, (imu, *told))
+        sent = tuple(replace(one, pose=self._odometry) if isinstance(one, Odometry) else one for one in readings)
+        decision = self.stack.decide(tick, (imu, *sent))
         vx, vy, wz = decision.command
         return replace(decision, command=Twist(vx, vy, wz + BEND * vx))
 
 
-def slipping(**smoothed: bool) -> Drive:
-    """Straight through a room, for 11 m."""
+def drive_with_slip(**smoothed: bool) -> Drive:
+    """Drive straight through a room for 11 m."""
     spec = StackSpec(
         profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5), velocity_smoother=smoothed
     )
     d = drive(ROOM, Pose2(1.0, 1.3), Goal("g", Pose2(12.0, 1.3)), spec=spec, odometry=("odom",))
-    d.stack = Slipping(d)
+    d.stack = SlippingDrive(d)
     return d.run(15.0)
 
 
 def test_local_costmap_uses_the_filtered_heading() -> None:
-    d = slipping()
+    d = drive_with_slip()
     view = d.stack.stack.inner._costmaps.local_costmap.view
     cells = np.argwhere(view.costs == 254)
-    seen = (cells[:, ::-1] + 0.5) * view.resolution + view.origin
-    assert len(seen) > 20
-    assert np.abs(ROOM.distance(seen)).max() < 0.15
+    lethal_points = (cells[:, ::-1] + 0.5) * view.resolution + view.origin
+    assert len(lethal_points) > 20
+    assert np.abs(ROOM.distance(lethal_points)).max() < 0.15
 
 
 def test_uneven_slip_is_compensated() -> None:
-    assert beside(slipping()) < 0.06
-    assert beside(slipping(counter_turn_slip=False)) > 0.1
+    assert max_lateral_error(drive_with_slip()) < 0.06
+    assert max_lateral_error(drive_with_slip(counter_turn_slip=False)) > 0.1
 
 
-def beside(d: Drive) -> float:
-    """Meters, at most."""
+def max_lateral_error(d: Drive) -> float:
+    """Return the largest lateral error in m."""
     return max(abs(pose.y - 1.3) for pose in d.track if 4.0 < pose.x < 11.0)
 
 
-@pytest.mark.parametrize("matched, off", [(False, 0.7), (True, 0.1)])
-def test_scan_matching_corrects_the_distance_of_slipping_wheels(matched: bool, off: float) -> None:
-    """Wheels that count a tenth too much, for 8 m."""
+@pytest.mark.parametrize("matched, error", [(False, 0.7), (True, 0.1)])
+def test_scan_matching_corrects_the_distance_of_slipping_wheels(matched: bool, error: float) -> None:
+    """Odometry overestimates the distance of 8 m by 10 %."""
     spec = StackSpec(profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=matched))
     world = Flatland().room(14, 6)
     world.discs += [(2.0 + 2.0 * k, 1.5 if k % 2 else 4.5, 0.2) for k in range(6)]
     d = drive(world, Pose2(1.0, 3.0), Goal("g", Pose2(12.9, 3.0)), spec=spec, odometry=("odom",))
-    d.stack = Slipping(d, in_vain=0.1)
+    d.stack = SlippingDrive(d, wheel_slip=0.1)
     while d.pose.x < 9.0:
         d.step()
-    believed = d.stack.stack.inner._localizer.belief.pose
-    assert abs(believed.distance(d.pose) - off) < 0.15
+    estimate = d.stack.stack.inner._localizer.belief.pose
+    assert abs(estimate.distance(d.pose) - error) < 0.15
 
 
 def test_slip_compensation_is_limited_for_broken_sensors() -> None:

@@ -10,15 +10,15 @@ import pytest
 from simscen.cli.main import main
 
 
-class Ended(NamedTuple):
-    """How a command ended."""
+class CommandResult(NamedTuple):
+    """Exit code and output of a command."""
 
     code: int
     out: str
     err: str
 
 
-Call = Callable[..., Ended]
+Call = Callable[..., CommandResult]
 
 GOOD = """\
 simscen: 1
@@ -36,11 +36,11 @@ pass: [{goals_reached: {}}]
 
 @pytest.fixture
 def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Call:
-    """Runs `simscen ARGUMENTS` in a fresh folder with a valid scenario `good.scenario.yaml`."""
+    """Return a function that runs `simscen ARGUMENTS` in a folder with a valid scenario `good.scenario.yaml`."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.scenario.yaml").write_text(GOOD)
 
-    def call(*arguments: str) -> Ended:
+    def call(*arguments: str) -> CommandResult:
         monkeypatch.setattr(sys, "argv", ["simscen", *arguments])
         code = 0
         try:
@@ -48,6 +48,6 @@ def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
         except SystemExit as end:
             code = int(end.code or 0)
         out, err = capsys.readouterr()
-        return Ended(code, out, err)
+        return CommandResult(code, out, err)
 
     return call

@@ -13,7 +13,7 @@ ANGLES = -math.pi / 2 + math.pi / 180 * np.arange(181)
 
 
 def ranges_at(x: float, y: float, yaw: float, angles: np.ndarray = ANGLES) -> list[float]:
-    """Exact ranges by the slab method."""
+    """Return exact ranges, computed with the slab method."""
     with np.errstate(divide="ignore"):
         inverse = 1 / np.column_stack((np.cos(yaw + angles), np.sin(yaw + angles)))
     found = np.full(len(angles), 20.0)
@@ -25,7 +25,7 @@ def ranges_at(x: float, y: float, yaw: float, angles: np.ndarray = ANGLES) -> li
 
 
 def write_map(folder: Path) -> None:
-    """The room at 5 cm."""
+    """Write the map of the room with a resolution of 5 cm."""
     center = 0.025 + 0.05 * np.arange(128) - 0.2
     x, y = np.meshgrid(center, center[:88])
     solid = sum((x + 0.02 > b[0]) & (x - 0.02 < b[2]) & (y + 0.02 > b[1]) & (y - 0.02 < b[3]) for b in BOXES)
@@ -36,7 +36,7 @@ def write_map(folder: Path) -> None:
 
 
 def drive() -> list[tuple[float, tuple[float, float, float], tuple[float, float, float]]]:
-    """Time, true pose and odometry whose wheels slip by a tenth, past the crate at 0.3 m/s and 10 Hz."""
+    """Return rows of time, true pose, and odometry with 10 % slip, at 0.3 m/s past the crate and 10 Hz."""
     rows, x, y, yaw, odom = [], 1.0, 0.8, 0.0, [0.0, 0.0, 0.0]
     for k in range(150):
         rows.append((k / 10, (x, y, yaw), (odom[0], odom[1], odom[2])))
@@ -49,7 +49,7 @@ def drive() -> list[tuple[float, tuple[float, float, float], tuple[float, float,
 
 
 def write_csv(folder: Path, pose_rows: bool = True) -> None:
-    """Rows of odometry, scans and truth."""
+    """Write rows of odometry, scans, and true poses."""
     lines = ["# a drive"]
     for t, true, odom in drive():
         lines.append("odom," + ",".join(map(str, (t, *odom))))
@@ -60,7 +60,7 @@ def write_csv(folder: Path, pose_rows: bool = True) -> None:
 
 
 def write_carmen(folder: Path, kind: str) -> None:
-    """FLASER lines, or ROBOTLASER1 lines, with TRUEPOS."""
+    """Write FLASER or ROBOTLASER1 lines with TRUEPOS lines."""
     lines = ["# CARMEN Logfile"]
     for t, true, odom in drive():
         ranges, place = " ".join(map(str, ranges_at(*true))), " ".join(map(str, odom))

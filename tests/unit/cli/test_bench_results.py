@@ -103,10 +103,10 @@ def test_invalid_result_is_a_usage_error(tmp_path: Path, text: str, expected_tex
     assert expected_text in str(error.value)
 
 
-@pytest.mark.parametrize("there", [False, True])
-def test_unreadable_result_is_a_usage_error(tmp_path: Path, there: bool) -> None:
+@pytest.mark.parametrize("exists", [False, True])
+def test_unreadable_result_is_a_usage_error(tmp_path: Path, exists: bool) -> None:
     file = tmp_path / "result.json"
-    if there:
+    if exists:
         file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UsageError, match=r"cannot read .*result\.json: (not UTF-8 text|No such file or directory)"):
         read_result(file)

@@ -27,8 +27,8 @@ WORDS = [topic for topic in TOPICS if topic.group in ("trigger", "action", "faul
 SINGLE = [topic for topic in WORDS if topic.name not in ("when", "faults", "pass")]
 
 
-def plain(text: str) -> Any:
-    """As simscen reads it: PyYAML's own loader takes the key `off` for false."""
+def load_yaml(text: str) -> Any:
+    """Return the YAML as simscen reads it, because the loader of PyYAML reads the key `off` as false."""
     tree, problems = parse_yaml(text, "example")
     assert tree is not None
     assert not problems
@@ -53,7 +53,7 @@ def test_every_key_of_a_topic_has_a_description(topic: Topic) -> None:
 
 @pytest.mark.parametrize("topic", SINGLE, ids=_id)
 def test_every_topic_has_a_valid_example(topic: Topic) -> None:
-    example = plain(topic.example)
+    example = load_yaml(topic.example)
     models: dict[str, tuple[type[BaseModel], str | None]] = {
         "trigger": (trigger_registry.Trigger, "when"),
         "action": (AnyAction, "do"),
@@ -61,9 +61,9 @@ def test_every_topic_has_a_valid_example(topic: Topic) -> None:
         "criterion": (AnyCriterion, None),
     }
     model, key = models[topic.group]
-    written = example[key] if key else example
-    model.model_validate(written, by_alias=True, by_name=False)
-    assert topic.name in written
+    source = example[key] if key else example
+    model.model_validate(source, by_alias=True, by_name=False)
+    assert topic.name in source
 
 
 @pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_id)
@@ -96,8 +96,8 @@ def test_modifiers_are_listed_separately_from_choices() -> None:
 
 
 def test_every_key_of_the_language_has_a_description() -> None:
-    silent = [f"{topic.name}.{field.key}" for topic in topics() for field in topic.fields if not field.text]
-    assert silent == []
+    undocumented = [f"{topic.name}.{field.key}" for topic in topics() for field in topic.fields if not field.text]
+    assert undocumented == []
 
 
 def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> None:

@@ -35,7 +35,7 @@ def result(
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Callable[..., Path]:
-    """Writes an output folder with the journal of finished runs."""
+    """Return a function that writes an output folder with the journal of finished runs."""
 
     def write(name: str, results: Sequence[RunResult], definition: str = "same") -> Path:
         path = tmp_path / name
@@ -102,8 +102,8 @@ def test_metrics_have_a_direction_and_a_smallest_effect(
     assert compare(folder("a", first), folder("b", second)).exit_code == is_worse
 
 
-def test_correction_for_the_number_of_tests(folder: Callable[..., Path]) -> None:
-    """p = 0.031 is significant alone, also beside values that do not differ, but not as one of two tests."""
+def test_significance_is_corrected_for_the_number_of_tests(folder: Callable[..., Path]) -> None:
+    """p = 0.031 is significant as the only test, also with a metric that does not differ, but not as one of two."""
     equal, noise = (
         [result(PASS, seed, "b", time=10.0 + offset * (-1) ** seed) for seed in range(6)] for offset in (0, 1)
     )
@@ -113,7 +113,7 @@ def test_correction_for_the_number_of_tests(folder: Callable[..., Path]) -> None
     assert compare(folder("c", before + equal), folder("d", after + noise)).exit_code == 0
 
 
-def test_any_flip_can_be_the_gate(folder: Callable[..., Path]) -> None:
+def test_any_flip_can_set_the_exit_code(folder: Callable[..., Path]) -> None:
     before, after = folder("a", [result(PASS, 1), result(FAIL, 2)]), folder("b", [result(FAIL, 1), result(PASS, 2)])
     assert compare(before, after).exit_code == 0
     assert compare(before, after, "--fail-on", "flip").exit_code == 1
@@ -149,7 +149,7 @@ def test_sessions_without_a_common_run_are_refused(folder: Callable[..., Path]) 
     assert "no run has a counterpart" in str(refused.exception)
 
 
-def test_json_and_markdown(folder: Callable[..., Path]) -> None:
+def test_comparison_is_printed_as_json_and_markdown(folder: Callable[..., Path]) -> None:
     before, after = folder("a", [result(PASS, 1)]), folder("b", [result(FAIL, 1)])
     data = json.loads(compare(before, after, "--format", "json").output)
     assert data["worse"] is False
@@ -161,16 +161,16 @@ def test_json_and_markdown(folder: Callable[..., Path]) -> None:
 
 @pytest.mark.slow
 def test_equal_versions_are_called_worse_with_at_most_the_stated_probability() -> None:
-    """Runs of three scenarios that fail by chance, and two metrics with noise; judged as the exit code is."""
+    """Compare three scenarios that fail at random and two noisy metrics, with the rule of the exit code."""
     rng, alarms, trials, alpha = np.random.default_rng(7), 0, 300, 0.1
 
-    def drawn(scenario: str, seed: int) -> RunResult:
+    def random_result(scenario: str, seed: int) -> RunResult:
         outcome = PASS if rng.random() < 0.7 else FAIL
         return result(outcome, seed, scenario, time=rng.normal(10.0, 2.0), clearance=rng.normal(1.0, 0.2))
 
     for _ in range(trials):
         names = ("baseline", "candidate")
-        sessions = {name: [drawn(scenario, seed) for scenario in "abc" for seed in range(10)] for name in names}
+        sessions = {name: [random_result(scenario, seed) for scenario in "abc" for seed in range(10)] for name in names}
         significance = Significance(alpha, min_effect=0.0)
         (against,) = compare_sessions(sessions, dict.fromkeys(sessions, ""), significance).against
         alarms += any(change.is_worse for change in against.changes)
@@ -178,7 +178,7 @@ def test_equal_versions_are_called_worse_with_at_most_the_stated_probability() -
 
 
 def test_a_lower_pass_rate_over_all_scenarios_is_found(folder: Callable[..., Path]) -> None:
-    """One of two runs of each of ten scenarios fails now, which is not significant in any of them."""
+    """One of two runs of each of ten scenarios fails, which is not significant for a single scenario."""
     names = "abcdefghij"
     before = [result(PASS, seed, name) for name in names for seed in (1, 2)]
     after = [result(FAIL if seed == 1 else PASS, seed, name) for name in names for seed in (1, 2)]

@@ -10,8 +10,8 @@ import pytest
 COMMAND = [sys.executable, "-c", "from simscen.cli.start import start; start()"]
 
 
-def offered(*words: str) -> list[str]:
-    """What bash would show behind these words, the last of which may not be complete."""
+def completions(*words: str) -> list[str]:
+    """Return the completions of bash for these words, the last of which may be incomplete."""
     env = {**os.environ, "_SIMSCEN_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("simscen", *words)),
            "COMP_CWORD": str(len(words))}  # fmt: skip
     # The name of the program is the name of the variable, too.
@@ -38,14 +38,14 @@ def offered(*words: str) -> list[str]:
 )
 def test_completion_offers_commands_files_names_and_options(simscen, words: tuple[str, ...], among: list[str]) -> None:
     Path("deep").mkdir()
-    assert set(among) <= set(offered(*words))
+    assert set(among) <= set(completions(*words))
 
 
 def test_files_in_a_folder_are_completed_with_their_folder(simscen) -> None:
     Path("deep").mkdir()
     Path("good.scenario.yaml").rename("deep/one.scenario.yaml")
-    assert offered("list", "de") == ["deep/"]
-    assert offered("list", "deep/") == ["deep/one.scenario.yaml"]
+    assert completions("list", "de") == ["deep/"]
+    assert completions("list", "deep/") == ["deep/one.scenario.yaml"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])

@@ -17,7 +17,7 @@ from simscen.run.scenario_cache import DiskCache, cache_folder
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Without the checks that take long."""
+    """Skip the checks that take long."""
     monkeypatch.setattr(doctor, "check_run", lambda: "not now")
     monkeypatch.setattr(doctor, "check_speed", lambda: "not now, either")
 
@@ -56,8 +56,8 @@ def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -
 
 
 def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
-    def patrol(cpu: float, bare: float) -> run_speed.PatrolTimes:
-        return run_speed.PatrolTimes(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
+    def patrol(cpu: float, pybullet: float) -> run_speed.PatrolTimes:
+        return run_speed.PatrolTimes(60.0, cpu, {"physics": 1.0}, pybullet, (cpu,), (pybullet,), {"physics": (1.0,)})
 
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(2.0, 0.5))
     assert doctor.check_speed() == "30 times real time on one core, 4.0 times the cost of PyBullet alone"
@@ -67,16 +67,16 @@ def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "value", "expected_text"),
+    ("limit", "value", "expected_text"),
     [
         (resource.RLIMIT_AS, 200 << 20, "a run gets only 200 MiB of memory; raise `ulimit -v`"),
         (resource.RLIMIT_NOFILE, 20, "may open only 20 files; raise `ulimit -n`"),
         (resource.RLIMIT_FSIZE, 1 << 20, "a file may have only 1 MiB; raise `ulimit -f`"),
     ],
 )
-def test_tight_limits_fail_with_a_hint(monkeypatch, what, value, expected_text) -> None:
-    real = resource.getrlimit
-    monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
+def test_tight_limits_fail_with_a_hint(monkeypatch, limit, value, expected_text) -> None:
+    original = resource.getrlimit
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (value, value) if kind == limit else original(kind))
     with pytest.raises(installation.CheckFailed, match=re.escape(expected_text)):
         installation.check_resource_limits()
 

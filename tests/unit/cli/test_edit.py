@@ -49,7 +49,7 @@ def ask(url: str, name: str, **data: Any) -> Any:
         return json.load(answer)
 
 
-def test_it_serves_the_page_until_ctrl_c_and_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_editor_serves_the_page_until_ctrl_c_and_leaves_no_files(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     with editor(tmp_path, "a.scenario.yaml") as (process, url):
         with urllib.request.urlopen(url, timeout=30) as page:
@@ -63,7 +63,7 @@ def test_it_serves_the_page_until_ctrl_c_and_leaves_nothing_behind(tmp_path: Pat
         urllib.request.urlopen(url, timeout=5)
 
 
-def test_sigterm_ends_it_with_the_usual_exit_code(tmp_path: Path) -> None:
+def test_sigterm_ends_the_editor_with_exit_code_143(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     with editor(tmp_path, "a.scenario.yaml") as (process, _):
         process.terminate()
@@ -115,7 +115,7 @@ def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp
         (("w.world.yaml", "--stack", "reference"), "--stack has no effect on a world"),
     ],
 )
-def test_what_cannot_be_edited_is_an_error_with_exit_code_2(
+def test_files_that_cannot_be_edited_are_errors_with_exit_code_2(
     simscen: Any, tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
@@ -128,7 +128,7 @@ def test_what_cannot_be_edited_is_an_error_with_exit_code_2(
     assert message in ended.err and "Traceback" not in ended.err
 
 
-def test_a_file_that_is_no_text_is_refused(simscen: Any, tmp_path: Path) -> None:
+def test_binary_file_is_refused(simscen: Any, tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_bytes(b"\xff\xfe")
     ended = simscen("edit", "a.scenario.yaml", "--no-browser")
     assert ended.code == 2 and "not valid UTF-8" in ended.err

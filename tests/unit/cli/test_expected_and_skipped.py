@@ -27,7 +27,7 @@ variations:
 
 @pytest.fixture
 def project(simscen, tmp_path: Path) -> Path:
-    """A folder with a scenario one variation of which fails as expected."""
+    """Return a folder with a scenario that has a variation that fails as expected."""
     (tmp_path / "good.scenario.yaml").unlink()
     (tmp_path / "a.scenario.yaml").write_text(TEXT)
     return tmp_path

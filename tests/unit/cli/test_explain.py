@@ -28,7 +28,7 @@ def test_topic_is_explained_with_keys_units_defaults_and_example(simscen) -> Non
     assert "Example: collisions: {max: 0}" in out
 
 
-def test_bare_value_is_explained(simscen) -> None:
+def test_value_without_keys_is_explained(simscen) -> None:
     assert "Value: duration in s" in simscen("explain", "trigger.time").out
 
 
@@ -91,7 +91,7 @@ def test_signals_are_listed_with_units_and_explained(simscen) -> None:
         ("update_min_a", "amcl.update_min_a (key)"),
         ("stack.localizer.alpha1", "Rotation noise from rotation."),
         ("events.when", "Trigger of the event."),
-        ("sensors.lidar.mount.yaw", "counterclockwise from straight ahead"),
+        ("sensors.lidar.mount.yaw", "0: straight ahead, positive: to the left"),
         ("physics.tick_rate", "frequency in Hz"),
         ("GOAL_OCCUPIED", "Nav2's error code 206."),
         ("206", "GOAL_OCCUPIED (error code)"),
@@ -107,18 +107,18 @@ def test_keys_and_codes_are_explained(simscen, name: str, expected_text: str) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "meant"),
+    ("name", "suggestion"),
     [("amcl.update_min_b", "amcl.update_min_"), ("goal_ocupied", "GOAL_OCCUPIED"), ("lingr", "linger")],
 )
-def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, meant: str) -> None:
-    assert f"did you mean `{meant}" in simscen("explain", name).err
+def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, suggestion: str) -> None:
+    assert f"did you mean `{suggestion}" in simscen("explain", name).err
 
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch, is_quick: bool) -> None:
     """`make test` asks for every fifth key only."""
     everything = topic_lookup.all_topics()
     for module in (explain, topic_lookup):
-        monkeypatch.setattr(module, "all_topics", lambda: everything)  # to collect it costs most of the time
+        monkeypatch.setattr(module, "all_topics", lambda: everything)  # its collection takes most of the time
     for name in [*known_names(), *list(known_names(keys=True))[:: 5 if is_quick else 1]]:
         assert explanation(name), name
 

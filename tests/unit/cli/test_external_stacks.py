@@ -26,7 +26,7 @@ MINE = (
 
 @pytest.fixture
 def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a scenario that names a stack, one that does not, a program, and a home of its own."""
+    """Return a folder with scenarios with and without a named stack, a program, and its own home directory."""
     (tmp_path / "good.scenario.yaml").unlink()
     (tmp_path / "mine.scenario.yaml").write_text(MINE)
     (tmp_path / "plain.scenario.yaml").write_text(SHORT)
@@ -64,7 +64,7 @@ def test_undefined_stack_name_is_a_warning_in_validate(simscen, project: Path) -
 
 
 @pytest.mark.parametrize(
-    ("given", "expected_text"),
+    ("stack_option", "expected_text"),
     [
         ("mine=./nowhere", "--stack mine=./nowhere: no such file or directory: `./nowhere`"),
         ("mine=./notes.txt", "permission denied: `./notes.txt` is not executable"),
@@ -79,10 +79,10 @@ def test_undefined_stack_name_is_a_warning_in_validate(simscen, project: Path) -
     ],
 )
 @pytest.mark.parametrize("command", ["run", "validate"])
-def test_unusable_program_is_reported_before_any_run(simscen, project, command, given, expected_text) -> None:
+def test_unusable_program_is_reported_before_any_run(simscen, project, command, stack_option, expected_text) -> None:
     (project / "home").mkdir()
     (project / "notes.txt").write_text("none\n")
-    ended = simscen(command, ".", "--stack", given)
+    ended = simscen(command, ".", "--stack", stack_option)
     assert ended.code == 2
     assert expected_text in ended.err
 
@@ -117,8 +117,8 @@ def test_goal_tolerances_of_the_scenario_apply_to_every_stack(project: Path) -> 
     (project / "lax.stack.yaml").write_text(
         "simscen: 1\nstack: {goal_checker: {xy_goal_tolerance: 1, stateful: false}}\n"
     )
-    for given in ("ref=reference", "lax=lax.stack.yaml", "v2=./nav"):
-        stack = loaded("mine", given)[0].spec.stack
+    for stack_option in ("ref=reference", "lax=lax.stack.yaml", "v2=./nav"):
+        stack = loaded("mine", stack_option)[0].spec.stack
         assert stack.goal_checker.xy_goal_tolerance == 0.1
         assert stack.keepout == ["r"]
     assert loaded("mine", "lax=lax.stack.yaml")[0].spec.stack.goal_checker.stateful is False
@@ -140,7 +140,7 @@ def test_configuration_sets_limits_folder_and_variables(project: Path, monkeypat
 
 
 def test_stack_gets_the_environment_of_the_caller(simscen, project: Path, monkeypatch) -> None:
-    """Whatever simscen sets for itself."""
+    """Variables that simscen sets for itself have no effect."""
     monkeypatch.delenv("PYDANTIC_DISABLE_PLUGINS", raising=False)
     monkeypatch.setenv("SOME_SECRET", "x")
     simscen("list", ".")
@@ -150,8 +150,8 @@ def test_stack_gets_the_environment_of_the_caller(simscen, project: Path, monkey
 
 def test_configuration_is_in_xdg_config_home(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    for given in ("", "relative/is/ignored"):
-        monkeypatch.setenv("XDG_CONFIG_HOME", given)
+    for stack_option in ("", "relative/is/ignored"):
+        monkeypatch.setenv("XDG_CONFIG_HOME", stack_option)
         assert config_file() == tmp_path / ".config/simscen/config.yaml"
     monkeypatch.setenv("XDG_CONFIG_HOME", "/etc/x")
     assert config_file() == Path("/etc/x/simscen/config.yaml")
@@ -193,22 +193,22 @@ def test_missing_program_is_reported_at_its_line_of_the_configuration(simscen, p
 
 
 def test_digest_includes_arguments_variables_and_file_contents(project: Path, monkeypatch) -> None:
-    def of(*given: str) -> str:
-        return scenario_digests(loaded("mine", *given)[0]).run
+    def digest_with(*stack_option: str) -> str:
+        return scenario_digests(loaded("mine", *stack_option)[0]).run
 
-    before = of("mine=./nav --map map.yaml")
-    assert of("mine=./nav --map map.yaml") == before
+    before = digest_with("mine=./nav --map map.yaml")
+    assert digest_with("mine=./nav --map map.yaml") == before
     monkeypatch.setenv("TERM_SESSION", "another shell")
-    assert of("mine=./nav --map map.yaml") == before
-    assert of("mine=./nav --map other.yaml") != before
+    assert digest_with("mine=./nav --map map.yaml") == before
+    assert digest_with("mine=./nav --map other.yaml") != before
     (project / "map.yaml").write_text("x")
-    assert (with_map := of("mine=./nav --map map.yaml")) != before
+    assert (with_map := digest_with("mine=./nav --map map.yaml")) != before
     (project / "nav").write_text("#!/bin/sh\nexit 1\n")
-    assert of("mine=./nav --map map.yaml") != with_map
+    assert digest_with("mine=./nav --map map.yaml") != with_map
     configure(project, "stacks: {mine: {command: ./nav, env: {A: '1'}}}\n")
-    one = of()
+    one = digest_with()
     configure(project, "stacks: {mine: {command: ./nav, env: {A: '2'}}}\n")
-    assert of() != one
+    assert digest_with() != one
 
 
 @pytest.mark.parametrize("command", ["python3 pkg/main.py", "python3 -m pkg", "python3 -m pkg.main"])
@@ -232,7 +232,7 @@ def test_digest_includes_modules_next_to_a_python_script(project: Path, command:
 
 
 def test_simscen_is_found_without_an_activated_environment(project: Path, monkeypatch) -> None:
-    """Its adapter for ROS 2 is a command: `--stack mine='simscen ros2 …'`."""
+    """The ROS 2 adapter is such a command: `--stack mine='simscen ros2 …'`."""
     monkeypatch.setenv("PATH", "/nowhere")
     assert loaded("mine", "mine=simscen ros2")[0].external_command.argv == (
         str(Path(sys.executable).parent / "simscen"),

@@ -1,4 +1,4 @@
-"""`simscen judge` on logs of simscen, with their own criteria and with those of a file."""
+"""`simscen judge` on logs of simscen, with their recorded criteria and with those of a file."""
 
 import json
 import shutil
@@ -25,7 +25,7 @@ BAD = SCENARIO + "pass:\n  - speed: {max: 0.05 m/s}\n"
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output folder of a run that passed and one that failed."""
+    """Return the output folder of a passed and a failed run."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "good.scenario.yaml").write_text(GOOD)
     (folder / "bad.scenario.yaml").write_text(BAD)
@@ -40,7 +40,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def out(recorded: Path, tmp_path: Path) -> Path:
-    """A copy of it in the working folder."""
+    """Return a copy of the output folder in the working directory."""
     return Path(shutil.copytree(recorded, tmp_path / "out"))
 
 
@@ -56,7 +56,7 @@ def test_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
     assert "speed: " in by_log.out and "> 0.05 m/s" in by_log.out
 
 
-def test_a_defect_of_simscen_in_one_log_does_not_lose_the_verdicts_of_the_others(
+def test_internal_error_for_one_log_keeps_the_verdicts_of_the_others(
     simscen, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail_on_bad(key: RunKey, *rest: object) -> RunResult:

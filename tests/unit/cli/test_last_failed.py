@@ -24,7 +24,7 @@ def project(simscen, tmp_path: Path):
     return tmp_path
 
 
-def ran(folder: Path) -> list[tuple[str, int, str]]:
+def runs_of(folder: Path) -> list[tuple[str, int, str]]:
     document = json.loads((folder / "simscen-out/latest/results.json").read_text())
     return [(run["scenario"], run["seed"], run["outcome"]) for run in document["runs"]]
 
@@ -33,28 +33,28 @@ def ran(folder: Path) -> list[tuple[str, int, str]]:
 def test_only_failed_runs_are_repeated(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--last-failed")
     assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
-    assert len(ran(project)) == 3
+    assert len(runs_of(project)) == 3
     ended = simscen("run", ".", "--lf")
     assert (ended.code, ended.err) == (1, "simscen: 2 runs failed in the last session\n")
-    assert ran(project) == [("b", 1, "failed"), ("c", 1, "failed")]
+    assert runs_of(project) == [("b", 1, "failed"), ("c", 1, "failed")]
     (project / "b.scenario.yaml").write_text(ROOM)
     (project / "new.scenario.yaml").write_text(FAILING)
     (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
     ended = simscen("run", ".", "--lf")
     assert (ended.code, ended.err) == (0, "simscen: 2 runs failed in the last session: 1 selected, 1 not\n")
-    assert ran(project) == [("b", 1, "passed")]
+    assert runs_of(project) == [("b", 1, "passed")]
     ended = simscen("run", "a.scenario.yaml", "--lf")
     assert ended.err == "simscen: 1 run failed in the last session, but none is selected: all selected scenarios run\n"
-    assert ran(project) == [("a", 1, "passed")]
+    assert runs_of(project) == [("a", 1, "passed")]
 
 
 @pytest.mark.slow
 def test_failed_run_keeps_its_seed(simscen, project: Path) -> None:
     simscen("run", "b.scenario.yaml", "--repeat", "2", "--seed", "7")
     simscen("run", "b.scenario.yaml", "--lf")
-    assert ran(project) == [("b", 7, "failed"), ("b", 8, "failed")]
+    assert runs_of(project) == [("b", 7, "failed"), ("b", 8, "failed")]
     simscen("run", "b.scenario.yaml", "--lf", "--seed", "8")
-    assert ran(project) == [("b", 8, "failed")]
+    assert runs_of(project) == [("b", 8, "failed")]
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from recorded_drives import drive, ranges_at, write_carmen, write_csv, write_map
 
-GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
+OPTIONS = ("--map", "room.yaml", "--robot", "turtlebot")
 
 
 @pytest.mark.parametrize("kind", ["csv", "FLASER", "ROBOTLASER1"])
@@ -19,7 +19,7 @@ def test_drive_with_slipping_wheels_is_localized_in_every_format(simscen, tmp_pa
     write_map(tmp_path)
     write_csv(tmp_path) if kind == "csv" else write_carmen(tmp_path, kind)
     log = "drive.csv" if kind == "csv" else "drive.log"
-    ended = simscen("localize", log, *GIVEN, "--json", "--picture", "way.png")
+    ended = simscen("localize", log, *OPTIONS, "--json", "--picture", "path.png")
     assert ended.code == 0, ended.err
     found = json.loads(ended.out)
     assert found["scans"] == 150
@@ -27,31 +27,31 @@ def test_drive_with_slipping_wheels_is_localized_in_every_format(simscen, tmp_pa
     assert found["error"]["rmse"] < 0.1
     assert found["lost"] == []
     assert "ms of CPU time per scan" in ended.err
-    assert (tmp_path / "way.png").stat().st_size > 1000
-    assert simscen("localize", log, *GIVEN, "--json").out == ended.out
+    assert (tmp_path / "path.png").stat().st_size > 1000
+    assert simscen("localize", log, *OPTIONS, "--json").out == ended.out
 
 
 def test_drift_of_odometry_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path)
     Path("stack.yaml").write_text("stack: {localizer: {type: odometry}}\npass: [{goals_reached: {}}]\n")
-    ended = simscen("localize", "drive.csv", *GIVEN, "--scenario", "stack.yaml", "--lost", "0.2", "--json")
+    ended = simscen("localize", "drive.csv", *OPTIONS, "--scenario", "stack.yaml", "--lost", "0.2", "--json")
     assert ended.code == 0, ended.err
     found = json.loads(ended.out)
     times = np.array([t for t, *_ in drive()])
     true, odom = (np.array([row[k][:2] for row in drive()]) for k in (1, 2))
-    off = np.hypot(*(odom + np.array((1.0, 0.8)) - true).T)
+    errors = np.hypot(*(odom + np.array((1.0, 0.8)) - true).T)
     assert [row[0] for row in found["error_over_time"]] == pytest.approx(times)
-    assert [row[1] for row in found["error_over_time"]] == pytest.approx(off, abs=1e-9)
-    assert found["error"]["rmse"] == pytest.approx(np.sqrt(np.mean(off**2)))
-    assert found["lost"][0]["since"] == pytest.approx(times[off > 0.2][0])
+    assert [row[1] for row in found["error_over_time"]] == pytest.approx(errors, abs=1e-9)
+    assert found["error"]["rmse"] == pytest.approx(np.sqrt(np.mean(errors**2)))
+    assert found["lost"][0]["since"] == pytest.approx(times[errors > 0.2][0])
 
 
 def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path, pose_rows=False)
-    assert simscen("localize", "drive.csv", *GIVEN).code == 2
-    ended = simscen("localize", "drive.csv", *GIVEN, "--start", "1,0.8,0")
+    assert simscen("localize", "drive.csv", *OPTIONS).code == 2
+    ended = simscen("localize", "drive.csv", *OPTIONS, "--start", "1,0.8,0")
     assert ended.code == 0
     assert "no reference to compare with" in ended.out
 
@@ -70,14 +70,14 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
 def test_unusable_log_is_reported(simscen, tmp_path: Path, name: str, text: str, expected_text: str) -> None:
     write_map(tmp_path)
     Path(name).write_text(text)
-    ended = simscen("localize", name, *GIVEN)
+    ended = simscen("localize", name, *OPTIONS)
     assert ended.code == 2
     assert expected_text in ended.err
     assert "Traceback" not in ended.err
 
 
-def judged(out: Path) -> dict[str, float]:
-    """What the one verdict of a session says of the error of localization."""
+def verdict_error(out: Path) -> dict[str, float]:
+    """Return the localization errors of the only verdict of a session."""
     (run,) = json.loads((out / "results.json").read_text())["runs"]
     (verdict,) = run["verdicts"]
     return {
@@ -105,15 +105,15 @@ stack:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stack", ["", RECOVERY], ids=["no recovery", "recovery"])
-def test_log_of_a_run_gives_the_figures_of_its_verdict(simscen, tmp_path: Path, stack: str) -> None:
+def test_log_of_a_run_gives_the_errors_of_its_verdict(simscen, tmp_path: Path, stack: str) -> None:
     write_map(tmp_path)
     Path("room.scenario.yaml").write_text(SLIPPING + stack + PASS)
     assert simscen("run", "room.scenario.yaml", "--out", "out", "--seed", "3").code == 0
-    log, output = next(Path("out").rglob("run.mcap")), judged(tmp_path / "out")
-    ended = simscen("localize", str(log), *GIVEN, "--scenario", "room.scenario.yaml", "--seed", "3", "--json")
+    log, output = next(Path("out").rglob("run.mcap")), verdict_error(tmp_path / "out")
+    ended = simscen("localize", str(log), *OPTIONS, "--scenario", "room.scenario.yaml", "--seed", "3", "--json")
     assert ended.code == 0, ended.err
     found = json.loads(ended.out)
-    # A log has ranges in single precision: after a while the particles are others, and as good.
+    # A log has ranges in single precision, so that the particles differ after a while.
     for name, tolerance in (("max", 0.03), ("rmse", 0.01), ("final", 0.03)):
         assert found["error"][name] == pytest.approx(output[name], abs=tolerance)
     assert output["max"] < 0.5
@@ -126,11 +126,11 @@ SCAN_MATCHING = "stack: {localizer: {type: scan_matching_amcl}}\n"
 @pytest.mark.slow
 def test_kidnapped_robot_is_lost_with_plain_amcl_and_found_by_relocalization(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    lines = [f"{word},{t / 10},{value}" for t, word, value in kidnapped()]
+    lines = [f"{word},{t / 10},{value}" for t, word, value in kidnapped_drive()]
     Path("drive.csv").write_text("\n".join(lines) + "\n")
     for name, recovery in (("plain", ""), ("scan_matching", SCAN_MATCHING), ("recovery", RECOVERY)):
         Path(f"{name}.yaml").write_text(recovery + "pass: [{goals_reached: {}}]\n")
-        ended = simscen("localize", "drive.csv", *GIVEN, "--scenario", f"{name}.yaml", "--json")
+        ended = simscen("localize", "drive.csv", *OPTIONS, "--scenario", f"{name}.yaml", "--json")
         assert ended.code == 0, ended.err
         found = json.loads(ended.out)
         assert found["lost"][0]["since"] == pytest.approx(5.0, abs=0.11)
@@ -138,21 +138,21 @@ def test_kidnapped_robot_is_lost_with_plain_amcl_and_found_by_relocalization(sim
         assert (found["lost"][-1]["until"] is None) == (name == "plain")
 
 
-def kidnapped() -> list[tuple[int, str, str]]:
-    """The drive, but that after 5 s it is carried to near its end and goes on there, turning to and fro for 40 s."""
+def kidnapped_drive() -> list[tuple[int, str, str]]:
+    """Return the drive with a kidnapping after 5 s to near its end, and 40 s of turning left and right there."""
     rows, odom = [], [0.0, 0.0, 0.0]
-    place = (1.0, 0.8, 0.0)
+    pose = (1.0, 0.8, 0.0)
     for k in range(450):
-        ahead, turn = (0.03, 0.0) if k < 50 else (0.02 * (-1) ** (k // 40), 0.08 * math.cos(k / 15))
+        step, turn = (0.03, 0.0) if k < 50 else (0.02 * (-1) ** (k // 40), 0.08 * math.cos(k / 15))
         if k == 50:
-            place = (4.6, 3.2, -2.0)
-        numbers = (-math.pi / 2, math.pi / 180, 0.05, 15, *ranges_at(*place))
-        rows += [(k, "odom", ",".join(map(str, odom))), (k, "truth", ",".join(map(str, place)))]
+            pose = (4.6, 3.2, -2.0)
+        numbers = (-math.pi / 2, math.pi / 180, 0.05, 15, *ranges_at(*pose))
+        rows += [(k, "odom", ",".join(map(str, odom))), (k, "truth", ",".join(map(str, pose)))]
         rows.append((k, "scan", ",".join(map(str, numbers))))
-        x, y, yaw = place
-        place = (x + ahead * math.cos(yaw + turn / 2), y + ahead * math.sin(yaw + turn / 2), yaw + turn)
-        odom[0] += ahead * math.cos(odom[2] + turn / 2)
-        odom[1] += ahead * math.sin(odom[2] + turn / 2)
+        x, y, yaw = pose
+        pose = (x + step * math.cos(yaw + turn / 2), y + step * math.sin(yaw + turn / 2), yaw + turn)
+        odom[0] += step * math.cos(odom[2] + turn / 2)
+        odom[1] += step * math.sin(odom[2] + turn / 2)
         odom[2] += turn
     return rows
 
@@ -164,6 +164,6 @@ def test_output_of_localize_fits_the_terminal(
     monkeypatch.setenv("COLUMNS", str(width))
     write_map(tmp_path)
     write_csv(tmp_path)
-    ended = simscen("localize", "drive.csv", *GIVEN)
+    ended = simscen("localize", "drive.csv", *OPTIONS)
     assert max(map(len, ended.out.splitlines())) <= width
     assert "never lost (more than 1 m off)" in ended.out

@@ -21,12 +21,12 @@ from recorded_drives import drive, ranges_at, write_map
 
 from simscen.core.geometry import Pose2
 
-GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
-HUNG = math.pi
+OPTIONS = ("--map", "room.yaml", "--robot", "turtlebot")
+ROLL = math.pi
 
 
 def transform(child: str, parent: str, x: float, yaw: float, roll: float = 0.0) -> Any:
-    """tf2_msgs/TFMessage with one transform of fixed-axis roll, then yaw."""
+    """Return a tf2_msgs/TFMessage with one transform: fixed-axis roll, then yaw."""
     half, turned = roll / 2, yaw / 2
     rotation = T["geometry_msgs/msg/Quaternion"](
         x=math.sin(half) * math.cos(turned),
@@ -41,20 +41,20 @@ def transform(child: str, parent: str, x: float, yaw: float, roll: float = 0.0) 
     return T["tf2_msgs/msg/TFMessage"](transforms=[one])
 
 
-def said(
+def drive_log(
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0),
     base: str = "base_link",
     stamp: Callable[[int], int] = lambda time: time,
     frame: str = "laser",
     every: int = 1,
 ) -> list[Said]:
-    """The drive as messages: /odom, /scan by a lidar at `mount` (x, yaw, roll) on the base, and /gt of the truth."""
+    """Return the drive as messages: /odom, /scan of a lidar at `mount` (x, yaw, roll), and the true poses /gt."""
     forward, turned, roll = mount
     found = [Said("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
     for t, (x, y, yaw), odom in drive()[::every]:
         time = BEGIN + round(t * SECOND)
         found.append(Said("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
-        found.append(Said("/gt", time + LATENCY, posed(stamp(time), (x, y, yaw))))
+        found.append(Said("/gt", time + LATENCY, stamped(stamp(time), (x, y, yaw))))
         at = (x + forward * math.cos(yaw), y + forward * math.sin(yaw), yaw + turned)
         ranges = ranges_at(*at)
         found.append(Said("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
@@ -62,22 +62,19 @@ def said(
 
 
 def odometry(time: int, at: tuple[float, float, float], base: str) -> Any:
-    """nav_msgs/Odometry."""
     where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*at), covariance=np.zeros(36))
     zero = T["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
-    fast = T["geometry_msgs/msg/TwistWithCovariance"](
+    twist = T["geometry_msgs/msg/TwistWithCovariance"](
         twist=T["geometry_msgs/msg/Twist"](linear=zero, angular=zero), covariance=np.zeros(36)
     )
-    return T["nav_msgs/msg/Odometry"](header=header(time, "odom"), child_frame_id=base, pose=where, twist=fast)
+    return T["nav_msgs/msg/Odometry"](header=header(time, "odom"), child_frame_id=base, pose=where, twist=twist)
 
 
-def posed(time: int, at: tuple[float, float, float], frame: str = "map") -> Any:
-    """geometry_msgs/PoseStamped."""
+def stamped(time: int, at: tuple[float, float, float], frame: str = "map") -> Any:
     return T["geometry_msgs/msg/PoseStamped"](header=header(time, frame), pose=pose(*at))
 
 
 def scan(time: int, ranges: Iterable[float], frame: str, first: float = -math.pi / 2) -> Any:
-    """sensor_msgs/LaserScan."""
     return T["sensor_msgs/msg/LaserScan"](
         header=header(time, frame), angle_min=first, angle_max=math.pi / 2, angle_increment=math.pi / 180,
         time_increment=0.0, scan_time=0.1, range_min=0.05, range_max=15.0,
@@ -85,24 +82,24 @@ def scan(time: int, ranges: Iterable[float], frame: str, first: float = -math.pi
     )  # fmt: skip
 
 
-AT_ONCE = """
+WITHOUT_SETTLING = """
 stack: {localizer: {type: scan_matching_amcl, settling_distance: 0}}
 pass: [{localization_error: {rmse: 10 cm}}]
 """
-"""Scans count in full from the first one: what is asked is where the lidar is, not how careful AMCL begins."""
+"""All scans have full weight from the start, so that the mount of the lidar determines the error."""
 
 
 def localized(simscen, *arguments: str) -> dict[str, Any]:
-    """The JSON of a log that goes through."""
-    ended = simscen("localize", *arguments, *GIVEN, "--reference", "/gt", "--json")
+    """Return the JSON output for a valid log, and stderr."""
+    ended = simscen("localize", *arguments, *OPTIONS, "--reference", "/gt", "--json")
     assert ended.code == 0, ended.err
     found: dict[str, Any] = json.loads(ended.out)
     return found | {"err": ended.err}
 
 
-def test_all_kinds_of_ros_logs_give_the_same_figures(simscen, tmp_path: Path) -> None:
+def test_all_kinds_of_ros_logs_give_the_same_errors(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    messages = said()
+    messages = drive_log()
     write_mcap(tmp_path / "drive.mcap", messages)
     write_bag(tmp_path / "sqlite", messages)
     write_bag(tmp_path / "mcap", messages, StoragePlugin.MCAP)
@@ -115,7 +112,7 @@ def test_all_kinds_of_ros_logs_give_the_same_figures(simscen, tmp_path: Path) ->
 
 
 def link(child: str, parent: str, time: int, at: Pose2) -> Any:
-    """tf2_msgs/TFMessage with one transform of the plane."""
+    """Return a tf2_msgs/TFMessage with one planar transform."""
     where = T["geometry_msgs/msg/Transform"](
         translation=T["geometry_msgs/msg/Vector3"](x=at.x, y=at.y, z=0.0), rotation=pose(*at).orientation
     )
@@ -123,75 +120,77 @@ def link(child: str, parent: str, time: int, at: Pose2) -> Any:
     return T["tf2_msgs/msg/TFMessage"](transforms=[one])
 
 
-def told_by_tf() -> Iterable[Said]:
-    """The same drive by a robot that has neither /odom nor /gt: map → odom → base_link."""
-    for message in said():
+def tf_drive_log() -> Iterable[Said]:
+    """Yield the drive with tf (map → odom → base_link) instead of /odom and /gt."""
+    for message in drive_log():
         if message.topic in ("/tf_static", "/scan"):
             yield message
-    for t, there, odom in drive():
+    for t, true_pose, odom in drive():
         time, at = BEGIN + round(t * SECOND), Pose2(*odom)
-        yield Said("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*there).compose(at.inverse())))
+        yield Said("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*true_pose).compose(at.inverse())))
         yield Said("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
 
 
 def test_odometry_and_reference_can_be_tf_frames(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    write_bag(tmp_path / "topics", said())
-    write_bag(tmp_path / "tf", sorted(told_by_tf(), key=lambda one: one.time))
+    write_bag(tmp_path / "topics", drive_log())
+    write_bag(tmp_path / "tf", sorted(tf_drive_log(), key=lambda one: one.time))
     by_topics = localized(simscen, "topics")
-    ended = simscen("localize", "tf", *GIVEN, "--odom", "odom:base_link", "--reference", "map:base_link", "--json")
+    ended = simscen("localize", "tf", *OPTIONS, "--odom", "odom:base_link", "--reference", "map:base_link", "--json")
     by_tf = json.loads(ended.out)
     assert by_tf["scans"] == by_topics["scans"]
     assert by_tf["error"] == pytest.approx(by_topics["error"], abs=1e-6)
-    ended = simscen("localize", "tf", *GIVEN, "--odom", "odom:base", "--reference", "map:base_link")
+    ended = simscen("localize", "tf", *OPTIONS, "--odom", "odom:base", "--reference", "map:base_link")
     assert ended.code == 2
     assert "tf does not connect odom with base; frames: base_link, laser, map, odom" in ended.err
 
 
 def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> None:
-    """The pose can also be published later: odometry leads back to the start."""
+    """The pose can also be published later."""
     write_map(tmp_path)
-    without = [message for message in said() if message.topic != "/gt"]
-    t, there, _ = drive()[60]
+    messages = [message for message in drive_log() if message.topic != "/gt"]
+    t, true_pose, _ = drive()[60]
     time = BEGIN + round(t * SECOND)
-    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*there), covariance=np.zeros(36))
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*true_pose), covariance=np.zeros(36))
     output = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
-    write_bag(tmp_path / "output", [*without, Said("/initialpose", time + LATENCY, output)])
-    write_bag(tmp_path / "untold", without)
-    ended = simscen("localize", "output", *GIVEN, "--json")
+    write_bag(tmp_path / "output", [*messages, Said("/initialpose", time + LATENCY, output)])
+    write_bag(tmp_path / "without", messages)
+    ended = simscen("localize", "output", *OPTIONS, "--json")
     x, y, _ = drive()[-1][1]
     assert json.loads(ended.out)["end"][:2] == pytest.approx([x, y], abs=0.15)
-    assert simscen("localize", "untold", *GIVEN).code == 2
+    assert simscen("localize", "without", *OPTIONS).code == 2
 
 
 @pytest.mark.parametrize(
     ("mount", "base"),
-    [((0.25, 0.0, 0.0), "base_link"), ((0.1, 2.0, 0.0), "chassis"), ((-0.2, 0.5, HUNG), "robot1/base_footprint")],
-    ids=["in front", "turned, on a base of another name", "upside down"],
+    [((0.25, 0.0, 0.0), "base_link"), ((0.1, 2.0, 0.0), "chassis"), ((-0.2, 0.5, ROLL), "robot1/base_footprint")],
+    ids=["in front", "rotated, with another base frame", "upside down"],
 )
 def test_lidar_mount_is_read_from_tf_static(
     simscen, tmp_path: Path, mount: tuple[float, float, float], base: str
 ) -> None:
     write_map(tmp_path)
-    write_bag(tmp_path / "bag", said(mount, base))
-    (tmp_path / "at_once.yaml").write_text(AT_ONCE)
-    found = localized(simscen, "bag", "--scenario", "at_once.yaml")
+    write_bag(tmp_path / "bag", drive_log(mount, base))
+    (tmp_path / "stack.yaml").write_text(WITHOUT_SETTLING)
+    found = localized(simscen, "bag", "--scenario", "stack.yaml")
     assert found["error"]["max"] < 0.2
     assert "note:" not in found["err"]
 
 
 Layout = tuple[float, float, int]
-"""The first angle, the increment, and how many beams there are."""
+"""First angle, increment, and number of beams."""
 DEGREE, SIDE = math.pi / 180, math.pi / 2
 
 
-def rescanned(layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges) -> list[Said]:
-    """The drive with another lidar, which sees the room anew from each place."""
+def log_with_layout(
+    layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges
+) -> list[Said]:
+    """Return the drive with the scans of a lidar with another beam layout."""
     first, step, count = layout
-    angles, found, places = first + step * np.arange(count), [], iter(drive())
-    for one in said():
+    angles, found, poses = first + step * np.arange(count), [], iter(drive())
+    for one in drive_log():
         if one.topic == "/scan":
-            ranges = change(np.array(ranges_at(*next(places)[1], angles)))
+            ranges = change(np.array(ranges_at(*next(poses)[1], angles)))
             message = scan(one.message.header.stamp.sec * SECOND + one.message.header.stamp.nanosec, ranges, "laser")
             message = replace(message, angle_min=first, angle_increment=step, angle_max=angles[-1])
             found.append(replace(one, message=message))
@@ -200,8 +199,8 @@ def rescanned(layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = 
     return found
 
 
-def with_nonsense(ranges: np.ndarray) -> np.ndarray:
-    """A quarter of the beams without an answer, in each way in which drivers tell it."""
+def with_invalid(ranges: np.ndarray) -> np.ndarray:
+    """Return the ranges with a quarter of the beams invalid, in each form that drivers use."""
     ranges[::4] = np.resize([0.0, math.nan, math.inf, -1.0, 1e30], len(ranges[::4]))
     return ranges
 
@@ -211,18 +210,18 @@ def with_nonsense(ranges: np.ndarray) -> np.ndarray:
     [
         ((-SIDE, DEGREE / 2, 361), lambda ranges: ranges),
         ((SIDE, -DEGREE / 2, 361), lambda ranges: ranges),
-        ((SIDE, -DEGREE, 181), with_nonsense),
-        ((0.0, DEGREE, 360), with_nonsense),
+        ((SIDE, -DEGREE, 181), with_invalid),
+        ((0.0, DEGREE, 360), with_invalid),
     ],
-    ids=["361 beams", "361 beams clockwise", "clockwise, a quarter without an answer", "all around from ahead"],
+    ids=["361 beams", "361 beams clockwise", "clockwise, a quarter invalid", "360 degrees from the front"],
 )
 def test_all_beam_layouts_are_read(
     simscen, tmp_path: Path, layout: Layout, change: Callable[[np.ndarray], np.ndarray]
 ) -> None:
     write_map(tmp_path)
-    write_mcap(tmp_path / "drive.mcap", rescanned(layout, change))
-    (tmp_path / "at_once.yaml").write_text(AT_ONCE)
-    found = localized(simscen, "drive.mcap", "--scenario", "at_once.yaml")
+    write_mcap(tmp_path / "drive.mcap", log_with_layout(layout, change))
+    (tmp_path / "stack.yaml").write_text(WITHOUT_SETTLING)
+    found = localized(simscen, "drive.mcap", "--scenario", "stack.yaml")
     assert found["error"]["max"] < 0.2
     assert found["error"]["median"] < 0.06  # odometry alone: 0.21 m
     assert "note:" not in found["err"]
@@ -230,14 +229,14 @@ def test_all_beam_layouts_are_read(
 
 def test_empty_scans_are_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    blind = rescanned((-SIDE, DEGREE, 181), lambda ranges: np.zeros(len(ranges)))
+    blind = log_with_layout((-SIDE, DEGREE, 181), lambda ranges: np.zeros(len(ranges)))
     write_mcap(tmp_path / "drive.mcap", blind)
     assert "150 of 150 scans have no range" in localized(simscen, "drive.mcap")["err"]
 
 
 def test_lidar_without_mount_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    write_mcap(tmp_path / "drive.mcap", said(frame="velodyne"))
+    write_mcap(tmp_path / "drive.mcap", drive_log(frame="velodyne"))
     found = localized(simscen, "drive.mcap")
     assert "/tf_static does not connect 'velodyne' and 'base_link'" in found["err"]
     assert found["error"]["max"] < 0.2
@@ -245,7 +244,7 @@ def test_lidar_without_mount_is_reported(simscen, tmp_path: Path) -> None:
 
 def test_missing_stamps_are_replaced_by_log_times(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    write_mcap(tmp_path / "drive.mcap", said(stamp=lambda _: 0))
+    write_mcap(tmp_path / "drive.mcap", drive_log(stamp=lambda _: 0))
     found = localized(simscen, "drive.mcap")
     assert "all stamps are zero" in found["err"]
     assert found["error"]["max"] < 0.2
@@ -257,7 +256,7 @@ def test_reference_in_another_frame_is_reported(simscen, tmp_path: Path) -> None
         replace(one, message=replace(one.message, header=header(one.time - LATENCY, "mocap")))
         if one.topic == "/gt"
         else one
-        for one in said(every=3)
+        for one in drive_log(every=3)
     ]
     write_mcap(tmp_path / "drive.mcap", changed)
     assert "/gt is in the frame 'mocap'" in localized(simscen, "drive.mcap")["err"]
@@ -265,7 +264,7 @@ def test_reference_in_another_frame_is_reported(simscen, tmp_path: Path) -> None
 
 def test_invalid_poses_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    broken = said()
+    broken = drive_log()
     for k, x in ((60, math.nan), (90, math.inf), (120, 1e300)):
         for one in (broken[3 * k + 1], broken[3 * k + 2]):
             inner = one.message.pose.pose if one.topic == "/odom" else one.message.pose
@@ -281,17 +280,17 @@ def test_scans_with_another_clock_are_rejected(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     other = [
         replace(one, message=scan(5 * SECOND, one.message.ranges, "laser")) if one.topic == "/scan" else one
-        for one in said(every=10)
+        for one in drive_log(every=10)
     ]
     write_mcap(tmp_path / "drive.mcap", other)
-    ended = simscen("localize", "drive.mcap", *GIVEN, "--start", "1,0.8,0")
+    ended = simscen("localize", "drive.mcap", *OPTIONS, "--start", "1,0.8,0")
     assert ended.code == 2
     assert "no scan was measured while there was odometry" in ended.err
 
 
 def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    looped = said()
+    looped = drive_log()
     write_mcap(tmp_path / "drive.mcap", [*looped, *looped[1:31]])
     assert "10 of 160 odometry readings are not newer" in localized(simscen, "drive.mcap")["err"]
 
@@ -304,17 +303,17 @@ def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
             "has invalid angles or range limits",
         ),
         (lambda one: replace(one, message=replace(one.message, angle_increment=0.0)), "its angle_increment is 0"),
-        (lambda one: replace(one, message=posed(one.time, (0, 0, 0))), "/scan is a geometry_msgs/msg/PoseStamped"),
+        (lambda one: replace(one, message=stamped(one.time, (0, 0, 0))), "/scan is a geometry_msgs/msg/PoseStamped"),
         (lambda one: replace(one, topic="/front/scan"), "it has no scans"),
     ],
-    ids=["angles that are not numbers", "angles that are all the same", "another type", "another topic"],
+    ids=["NaN angles", "equal angles", "another type", "another topic"],
 )
 def test_missing_scans_are_reported_with_the_existing_topics(
     simscen, tmp_path: Path, change: Callable[[Said], Said], expected_text: str
 ) -> None:
     write_map(tmp_path)
-    write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in said(every=15)])
-    ended = simscen("localize", "drive.mcap", *GIVEN, "--reference", "/gt")
+    write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in drive_log(every=15)])
+    ended = simscen("localize", "drive.mcap", *OPTIONS, "--reference", "/gt")
     assert ended.code == 2
     assert expected_text in ended.err
     assert "Traceback" not in ended.err
@@ -337,7 +336,7 @@ def test_missing_scans_are_reported_with_the_existing_topics(
 def test_invalid_csv_log_is_rejected(simscen, tmp_path: Path, text: str) -> None:
     write_map(tmp_path)
     Path("bad.csv").write_text(text)
-    ended = simscen("localize", "bad.csv", *GIVEN, "--start", "1,1,0")
+    ended = simscen("localize", "bad.csv", *OPTIONS, "--start", "1,1,0")
     assert ended.code == 2
     assert "bad.csv" in ended.err
     assert "Traceback" not in ended.err
@@ -345,15 +344,15 @@ def test_invalid_csv_log_is_rejected(simscen, tmp_path: Path, text: str) -> None
 
 def test_every_truncated_log_gives_figures_or_an_error(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
-    whole = write_mcap(tmp_path / "drive.mcap", said(every=15)).read_bytes()
+    whole = write_mcap(tmp_path / "drive.mcap", drive_log(every=15)).read_bytes()
     for share in (0.0, 0.02, 0.3, 0.6, 0.95, 0.999):
         Path("cut.mcap").write_bytes(whole[: int(share * len(whole))])
-        ended = simscen("localize", "cut.mcap", *GIVEN, "--start", "1,0.8,0")
+        ended = simscen("localize", "cut.mcap", *OPTIONS, "--start", "1,0.8,0")
         assert ended.code in (0, 2), (share, ended.err)
         assert "Traceback" not in ended.err
 
 
 def test_messages_match_their_definitions() -> None:
-    """So that what is tested here is what a recorder writes."""
-    for one in said(every=50):
+    """The tested messages must be those that a recorder writes."""
+    for one in drive_log(every=50):
         assert STORE.deserialize_cdr(STORE.serialize_cdr(one.message, one.message.__msgtype__), one.message.__msgtype__)

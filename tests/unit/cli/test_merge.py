@@ -24,7 +24,7 @@ pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
 
 
 def simscen(*arguments: object) -> int:
-    """Run a process of its own, because a session locks its folder until the process ends."""
+    """Run simscen in a separate process, because a session locks its folder until the process ends."""
     command = [sys.executable, "-m", "simscen", *map(str, arguments)]
     return subprocess.run(command, check=False, capture_output=True).returncode
 
@@ -133,11 +133,11 @@ def test_without_times_each_shard_has_every_nth_scenario() -> None:
         ({"JOB_COMPLETION_INDEX": "4", "JOB_COMPLETIONS": "5"}, (5, 5)),
     ],
 )
-def test_the_number_of_a_parallel_job_is_found(environ: dict[str, str], expected: tuple[int, int]) -> None:
+def test_shard_auto_reads_the_number_of_the_parallel_job(environ: dict[str, str], expected: tuple[int, int]) -> None:
     assert shard_of("auto", environ) == expected
 
 
 @pytest.mark.parametrize("environ", [{}, {"CI_NODE_INDEX": "2"}, {"CI_NODE_INDEX": "x", "CI_NODE_TOTAL": "3"}])
-def test_auto_outside_of_a_parallel_job_is_an_error(environ: dict[str, str]) -> None:
+def test_shard_auto_outside_of_a_parallel_job_is_an_error(environ: dict[str, str]) -> None:
     with pytest.raises(UsageError, match=PARALLEL_JOBS[0].index_variable):
         shard_of("auto", environ)

@@ -17,9 +17,9 @@ def hall(folder: Path) -> Experiment:
 def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     stack = tmp_path / "slow.stack.yaml"
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
-    alike = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
-    others = with_stack(stack, alike, tmp_path / "made", tmp_path)
-    jobs, owners = _plan_jobs(others, tmp_path / "out")
+    experiments = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
+    changed = with_stack(stack, experiments, tmp_path / "made", tmp_path)
+    jobs, owners = _plan_jobs(changed, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4
 

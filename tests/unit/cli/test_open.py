@@ -22,7 +22,7 @@ pass: [{goals_reached: {}}]
 
 @pytest.fixture
 def pages(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The pages that were opened, as they were then."""
+    """Return the content of the pages at the time at which each was opened."""
     opened: list[str] = []
 
     def open_(uri: str) -> bool:

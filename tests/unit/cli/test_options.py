@@ -20,8 +20,8 @@ def calls():
     return [(words, function) for name in COMMANDS for words, function in functions_of_command(name)]
 
 
-def typers_own(words):
-    """The command that typer makes of it."""
+def typer_command(words):
+    """Return the typer command with this name."""
     command = typer.main.get_command(app)
     for word in words.split():
         command = command.get_command(None, word)
@@ -30,8 +30,8 @@ def typers_own(words):
 
 @pytest.mark.parametrize(("words", "function"), calls(), ids=lambda value: value if isinstance(value, str) else "")
 def test_commands_page_lists_the_options_of_typer(words, function) -> None:
-    taken = [parameter for parameter in typers_own(words).params if parameter.name != "help"]
-    names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in taken]
+    parameters = [parameter for parameter in typer_command(words).params if parameter.name != "help"]
+    names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in parameters]
     output = [parameter.spelling for parameter in parameters_of(function)]
     arguments = re.compile(r"^\[?[A-Z_]+\]?…?$")
     assert [name for name in names if name.startswith("-")] == [name for name in output if name.startswith("-")]

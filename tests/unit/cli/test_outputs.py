@@ -1,4 +1,4 @@
-"""Output files never overwrite inputs or other files than plain files."""
+"""Output files overwrite only regular files and never inputs."""
 
 import errno
 import os
@@ -10,15 +10,15 @@ from simscen.cli.session.output_files import Reports
 from simscen.core.records.run_result import RunKey
 from simscen.run.sessions.output_folder import create_output_folder, run_folder, write_atomically
 
-NOT_PLAIN = ("device", "fifo", "link", "dangling", "folder")
+NOT_REGULAR = ("device", "fifo", "link", "dangling", "folder")
 
 
 @pytest.fixture
-def odd(tmp_path: Path):
-    """A path that is not a regular file, by name."""
+def special_file(tmp_path: Path):
+    """Return a function that creates a path of this kind that is not a regular file."""
 
-    def odd(kind: str) -> Path:
-        path = tmp_path / f"odd-{kind}.png"
+    def special_file(kind: str) -> Path:
+        path = tmp_path / f"special-{kind}.png"
         match kind:
             case "device":
                 return Path("/dev/null")
@@ -33,7 +33,7 @@ def odd(tmp_path: Path):
                 path.mkdir()
         return path
 
-    return odd
+    return special_file
 
 
 @pytest.mark.parametrize("name", ["...scenario.yaml", "..scenario.yaml", ".scenario.yaml"])
@@ -52,7 +52,7 @@ def test_run_folders_do_not_collide_with_reports(scenario: str) -> None:
     assert run_folder(Path("out"), RunKey(scenario, 3)) == Path("out/runs") / scenario / "seed-3"
 
 
-@pytest.mark.parametrize("kind", NOT_PLAIN)
+@pytest.mark.parametrize("kind", NOT_REGULAR)
 @pytest.mark.parametrize(
     "command",
     [
@@ -62,11 +62,11 @@ def test_run_folders_do_not_collide_with_reports(scenario: str) -> None:
         ("world", "convert", "room.world.yaml"),
     ],
 )
-def test_only_plain_files_are_overwritten(simscen, tmp_path: Path, odd, kind, command) -> None:
+def test_only_regular_files_are_overwritten(simscen, tmp_path: Path, special_file, kind, command) -> None:
     (tmp_path / "room.world.yaml").write_text(
         "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
     )
-    path = odd(kind)
+    path = special_file(kind)
     before = path.lstat()
     ended = simscen(*command, str(path))
     assert ended.code == 2
@@ -139,10 +139,10 @@ def test_user_file_named_latest_is_kept(tmp_path: Path, monkeypatch) -> None:
     assert set(Path("simscen-out").iterdir()) == {folder, Path("simscen-out/latest")}
 
 
-def test_only_plain_files_are_replaced(odd) -> None:
-    for kind in NOT_PLAIN:
+def test_only_regular_files_are_replaced_atomically(special_file) -> None:
+    for kind in NOT_REGULAR:
         with pytest.raises(OSError, match=r"not a regular file|symbolic link|directory"):
-            write_atomically(odd(kind), b"")
+            write_atomically(special_file(kind), b"")
 
 
 def test_unwritten_report_is_not_named(tmp_path: Path, monkeypatch) -> None:

@@ -24,7 +24,7 @@ GOOD, BAD = (SCENARIO.replace("CRITERION", text) for text in ("goals_reached: {}
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output folder of a session with a run that passes and one that fails."""
+    """Return the output folder of a session with a passed and a failed run."""
     home = tmp_path_factory.mktemp("home")
     (home / "good.scenario.yaml").write_text(GOOD)
     (home / "bad.scenario.yaml").write_text(BAD)

@@ -29,7 +29,7 @@ pass: [{collisions: {max: 0}}, {goals_reached: {}}]
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output folder of a run that failed."""
+    """Return the output folder of a failed run."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "short.scenario.yaml").write_text(SCENARIO)
     with pytest.MonkeyPatch.context() as patch:
@@ -38,13 +38,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
         with pytest.raises(SystemExit) as end:
             main()
     assert end.value.code == 1
-    (folder / "short.scenario.yaml").unlink()  # a report names a file as seen from where it is made, if it is there
+    (folder / "short.scenario.yaml").unlink()  # reports print relative paths of existing files
     return folder / "out"
 
 
 @pytest.fixture
 def out(recorded: Path, tmp_path: Path) -> Path:
-    """A copy of it in the working folder."""
+    """Return a copy of the output folder in the working directory."""
     return Path(shutil.copytree(recorded, tmp_path / "out"))
 
 
@@ -117,11 +117,11 @@ def test_folder_without_session_is_an_error(simscen, tmp_path: Path) -> None:
 
 def test_run_is_drawn_from_its_log(simscen, out: Path, tmp_path: Path) -> None:
     log = out / "runs/short/seed-1/run.mcap"
-    shutil.move(log, tmp_path / "alone.mcap")
+    shutil.move(log, tmp_path / "partial.mcap")
     shutil.rmtree(out)
-    ended = simscen("plot", "alone.mcap", "--out", "alone.png")
-    assert ended == (0, "alone.png\n", "")
-    with Image.open(tmp_path / "alone.png") as picture:
+    ended = simscen("plot", "partial.mcap", "--out", "partial.png")
+    assert ended == (0, "partial.png\n", "")
+    with Image.open(tmp_path / "partial.png") as picture:
         assert picture.format == "PNG"
         assert picture.width > 600
 

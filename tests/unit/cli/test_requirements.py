@@ -16,7 +16,7 @@ PYPROJECT = (Path(__file__).parents[3] / "pyproject.toml").read_text()
 
 @pytest.fixture
 def installed(monkeypatch):
-    """Packages by version, as if they were installed and simscen needed `needs`."""
+    """Return a function that fakes installed package versions and the requirements `needs` of simscen."""
 
     def installed(needs, **versions):
         def version(name):

@@ -20,7 +20,7 @@ pass: [{{collisions: {{max: 0}}}}]
 
 
 def run(folder, *options):
-    """Run in a process of its own, because a session locks its folder until the process ends."""
+    """Run simscen in a separate process, because a session locks its folder until the process ends."""
     command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1", *options]
     return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
 

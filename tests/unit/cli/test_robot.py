@@ -52,7 +52,7 @@ def robot_yaml(drive):
 
 @pytest.fixture
 def check(tmp_path, monkeypatch, capsys):
-    """Check a robot in a folder with some files: exit code, what is printed, and stderr."""
+    """Return a function that writes files, checks a robot, and returns exit code, stdout, and stderr."""
     monkeypatch.chdir(tmp_path)
 
     def check(robot, *options, **files):
@@ -108,7 +108,7 @@ def test_consistent_robot_has_no_warnings(figures):
 
 @pytest.mark.parametrize("with_spec", [False, True])
 def test_reversed_car_is_rejected_at_its_line(check, with_spec):
-    """It had a negative wheel base."""
+    """Regression: it had a negative wheelbase."""
     knuckles = "".join(KNUCKLE.format(name=f"k_{side}", x=-0.3, y=y) for side, y in (("left", 0.2), ("right", -0.2)))
     front = "".join(
         WHEEL.format(name=f"front_{side}", parent=f"k_{side}", r=0.05, x=0, y=0, z=0.05) for side in ("left", "right")
@@ -155,7 +155,7 @@ def test_wrong_wheel_separation_is_a_warning_of_the_scenario(simscen):
     ],
 )
 def test_validate_builds_urdf_robots(simscen, old, new, code, expected_text):
-    """It called robots valid that no scenario could use."""
+    """Regression: robots that no scenario can use were valid."""
     Path("cart.robot.yaml").write_text(robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(old, new))
     Path("cart.urdf").write_text(urdf(wheels()))
     ended = simscen("validate", "cart.robot.yaml")
@@ -188,26 +188,26 @@ SKID = "{{type: skid_steer, wheel_radius: 0.16, wheel_separation: 0.56, wheel_ba
 
 @pytest.mark.slow
 def test_suggested_turning_scale_passes_the_check(figures):
-    """Wheels that skid turn a heavy base as if they stood further apart."""
+    """Skidding wheels turn a heavy base as with a larger wheel separation."""
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
     files = {"cart_urdf": urdf(four, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
     name = "turn: odometry, from true angle"
 
-    def turned(scale):
+    def measured_turn(scale):
         found = figures("cart.robot.yaml", **files, cart_robot_yaml=robot_yaml(SKID.format(scale)))
         return next(check for check in found["checks"] if check["name"] == name)
 
-    wrong = turned(1.44)
+    wrong = measured_turn(1.44)
     assert not wrong["held"]
     assert wrong["advice"].startswith("turning_scale 1.44: ")
-    right = turned(wrong["advice"].split(": ")[1].split()[0])
+    right = measured_turn(wrong["advice"].split(": ")[1].split()[0])
     assert right["value"] < 0.5
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("axles", [(-0.15, 0.15), (-0.25, 0.25), (-0.3, 0.3), (-0.25, 0, 0.25), (-0.3, -0.1, 0.1, 0.3)])
 def test_inferred_skid_steer_robot_turns_as_commanded(figures, axles):
-    """Without the factor, robots with four wheels turned up to 31 % too little, with six up to twice as far."""
+    """Regression: robots with four wheels turned up to 31 % too little, and those with six up to twice as far."""
     parts = [wheels(x=x, r=0.1, half=0.25, name=f"axle_{index}_") for index, x in enumerate(axles)]
     found = figures("cart.urdf", cart_urdf=urdf(*parts, size="0.6 0.4 0.2", mass=20, z=0.2, i=0.8))
     turn = next(check for check in found["checks"] if check["name"] == "turn: turned, from commanded")
@@ -249,8 +249,8 @@ def test_two_mecanum_wheels_are_rejected(check):
 
 
 def test_robot_check_is_reproducible(check, tmp_path):
-    once, again = (check("turtlebot", "--json", "--picture", f"{name}.png")[1] for name in ("a", "b"))
-    assert once == again
+    first, second = (check("turtlebot", "--json", "--picture", f"{name}.png")[1] for name in ("a", "b"))
+    assert first == second
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 

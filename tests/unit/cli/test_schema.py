@@ -27,8 +27,8 @@ def test_generated_files_are_up_to_date() -> None:
     assert outdated_files() == [], "run `make docs`"
 
 
-def _plain(text: str) -> Any:
-    """As simscen and editors read it: PyYAML's own loader takes the key `off` for false."""
+def _load_yaml(text: str) -> Any:
+    """Return the YAML as simscen and editors read it, because the loader of PyYAML reads the key `off` as false."""
     tree, _ = parse_yaml(text, "f")
     return tree and tree.plain
 
@@ -42,7 +42,7 @@ def test_schemas_are_valid(kind: str) -> None:
 def test_shipped_files_match_their_schema(kind: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of(kind))
     for file in SHIPPED[kind]:
-        errors = [error.message for error in validator.iter_errors(_plain(file.read_text()))]
+        errors = [error.message for error in validator.iter_errors(_load_yaml(file.read_text()))]
         assert not errors, file
 
 
@@ -50,11 +50,11 @@ def test_shipped_files_match_their_schema(kind: str) -> None:
 @pytest.mark.parametrize("name", FORM)
 def test_invalid_files_do_not_match_their_schema(name: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of("scenario"))
-    assert not validator.is_valid(_plain((DIAGNOSTICS / f"{name}.scenario.yaml").read_text()))
+    assert not validator.is_valid(_load_yaml((DIAGNOSTICS / f"{name}.scenario.yaml").read_text()))
 
 
 def _errors(text: str) -> list[str]:
-    errors = jsonschema.Draft7Validator(schema_of("scenario")).iter_errors(_plain(text))
+    errors = jsonschema.Draft7Validator(schema_of("scenario")).iter_errors(_load_yaml(text))
     return [f"{'.'.join(map(str, error.absolute_path))}: {error.message}" for error in errors]
 
 
@@ -77,7 +77,7 @@ def test_one_mistake_gives_one_error_at_its_location(text: str, expected_text: s
 
 
 def test_every_key_has_a_hover_text() -> None:
-    """Hover texts: what a scenario is made of is described; the parameters of the stack carry Nav2's names."""
+    """All parts of a scenario have a hover text; parameters of the stack have the names of Nav2."""
     definitions = schema_of("scenario")["$defs"]
     for name in ("GoalEntry", "EventEntry", "FaultEntry", "Spawn", "StoppedWithin", "Wall"):
         for key, schema in definitions[name]["properties"].items():
@@ -97,15 +97,15 @@ def test_schema_has_no_nulls_and_no_large_defaults() -> None:
 
 
 def test_command_writes_the_committed_schemas(simscen, tmp_path: Path) -> None:
-    assert simscen("schema", "--write", "made").code == 0
+    assert simscen("schema", "--write", "written").code == 0
     for kind in MODELS:
-        made = (tmp_path / f"made/{kind}.schema.json").read_text()
-        assert made == (ROOT / f"schemas/{kind}.schema.json").read_text()
+        written = (tmp_path / f"written/{kind}.schema.json").read_text()
+        assert written == (ROOT / f"schemas/{kind}.schema.json").read_text()
     assert json.loads(simscen("schema", "world").out) == schema_of("world")
 
 
 def test_check_jsonschema_agrees() -> None:
-    """The tool that pre-commit hooks use, on a good and a bad file."""
+    """Run the tool of the pre-commit hooks on a valid and an invalid file."""
     schema = str(ROOT / "schemas/scenario.schema.json")
     for file, valid in ((SHIPPED["scenario"][0], True), (DIAGNOSTICS / "five_mistakes.scenario.yaml", False)):
         command = [sys.executable, "-m", "check_jsonschema", "--schemafile", schema, str(file)]

@@ -1,6 +1,6 @@
 """`simscen shrink` and `simscen falsify` on scenarios whose cause of failure is known.
 
-The robot stands still, and the clearance to crate-3 is too small. Nothing else matters.
+The robot is stationary, and its clearance to crate-3 is too small. All other parts are irrelevant.
 """
 
 import json
@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 SCENARIO = """\
-# Many things that do not matter, and one that does.
+# Many irrelevant parts, and one cause of failure.
 simscen: 1
 description: A robot between crates.
 world:
@@ -40,12 +40,12 @@ pass:
 
 
 def simscen(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run a process of its own, because a session locks its folder until the process ends."""
+    """Run simscen in a separate process, because a session locks its folder until the process ends."""
     command = [sys.executable, "-m", "simscen", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
 
 
-def content(file: Path) -> Any:
+def load_yaml(file: Path) -> Any:
     return yaml.safe_load(file.read_text())
 
 
@@ -54,20 +54,20 @@ def runs_of(folder: Path) -> list[Any]:
     return found
 
 
-def measured(run: Any) -> list[Any]:
+def verdicts_of(run: Any) -> list[Any]:
     return [[verdict["id"], verdict["status"], verdict["findings"]] for verdict in run["verdicts"]]
 
 
-def test_only_what_causes_the_failure_is_left(tmp_path: Path) -> None:
+def test_shrink_keeps_only_the_cause_of_the_failure(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     done = simscen(tmp_path, "shrink", "a.scenario.yaml", "-j", 2)
     assert done.returncode == 0, done.stderr
     file = tmp_path / "a.minimal.scenario.yaml"
-    left = content(file)
-    assert [item["name"] for item in left["world"]["obstacles"]] == ["crate-3"]
-    assert set(left) == {"simscen", "world", "robot", "time_limit", "pass", "seed"}
-    assert left["pass"] == [{"clearance": {"min": "1 m"}}]
-    assert set(left["robot"]) == {"pose"}
+    shrunk = load_yaml(file)
+    assert [item["name"] for item in shrunk["world"]["obstacles"]] == ["crate-3"]
+    assert set(shrunk) == {"simscen", "world", "robot", "time_limit", "pass", "seed"}
+    assert shrunk["pass"] == [{"clearance": {"min": "1 m"}}]
+    assert set(shrunk["robot"]) == {"pose"}
     assert "# There must be space to turn." in file.read_text()
     for text in ("world.obstacles[0] (crate-1)", "events", "faults", "stack", "robot.motor_torque"):
         assert f"  {text}\n" in done.stdout, done.stdout
@@ -84,29 +84,29 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) 
     folder = Path("out", run["artifacts"]["mcap"]).parent
     done = simscen(tmp_path, "shrink", folder, "--keep-world", "--runs", 8)
     assert done.returncode == 1, done.stderr
-    left = content(tmp_path / "a.minimal.scenario.yaml")
-    assert left["robot"]["pose"]["x"] == 6
-    assert "variations" not in left
+    shrunk = load_yaml(tmp_path / "a.minimal.scenario.yaml")
+    assert shrunk["robot"]["pose"]["x"] == 6
+    assert "variations" not in shrunk
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         (["a.scenario.yaml", "--criterion", "collisions"], "the run did not fail in collisions, but in clearance"),
         (["good.scenario.yaml"], "the run did not fail: passed"),
     ],
 )
-def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], told: str) -> None:
+def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], message: str) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     (tmp_path / "good.scenario.yaml").write_text(SCENARIO.replace("min: 1 m", "min: 10 cm"))
     done = simscen(tmp_path, "shrink", *options)
     assert done.returncode == 2
-    assert told in done.stderr
+    assert message in done.stderr
     assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         (["nothing.scenario.yaml"], "no such file"),
         (["a.scenario.yaml", "--out", "a.scenario.yaml"], "exists already"),
@@ -116,12 +116,12 @@ def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], told: 
     ],
 )
 def test_unusable_options_of_shrink_are_an_error(
-    simscen: Callable[..., Any], tmp_path: Path, options: list[str], told: str
+    simscen: Callable[..., Any], tmp_path: Path, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     done = simscen("shrink", *options)
     assert done.code == 2
-    assert told in done.err
+    assert message in done.err
 
 
 @pytest.mark.slow
@@ -131,8 +131,8 @@ def test_a_spent_budget_still_writes_a_smaller_scenario(tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert "see --runs" in done.stdout
     assert simscen(tmp_path, "run", "a.minimal.scenario.yaml").returncode == 1
-    alone = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
-    assert alone.returncode == 1
+    second = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
+    assert second.returncode == 1
     assert (tmp_path / "one.scenario.yaml").read_bytes() == (tmp_path / "a.minimal.scenario.yaml").read_bytes()
 
 
@@ -153,19 +153,19 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, met
     done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
     assert done.returncode == 1, done.stderr
     file = tmp_path / "a.failure-1.scenario.yaml"
-    assert 5.6 < content(file)["robot"]["pose"]["x"] < 6.0  # crate-3 begins at 6.93, and the robot's radius is 0.22
-    assert "variations" not in content(file)
-    assert simscen(tmp_path, "run", file.name, "--out", "again").returncode == 1
-    (again,) = runs_of(tmp_path / "again")
-    assert measured(again) in [measured(run) for run in runs_of(tmp_path / "out")]
+    assert 5.6 < load_yaml(file)["robot"]["pose"]["x"] < 6.0  # crate-3 starts at 6.93 m; radius 0.22 m
+    assert "variations" not in load_yaml(file)
+    assert simscen(tmp_path, "run", file.name, "--out", "rerun").returncode == 1
+    (rerun,) = runs_of(tmp_path / "rerun")
+    assert verdicts_of(rerun) in [verdicts_of(run) for run in runs_of(tmp_path / "out")]
     assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.stdout
-    if method == "tpe":  # the one that learns from the order of the results
+    if method == "tpe":  # the method that depends on the order of the results
         simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
 
 
 @pytest.mark.slow
-def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_path: Path) -> None:
+def test_random_search_without_a_failure_bounds_the_failure_rate(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
     done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
     assert done.returncode == 0, done.stderr
@@ -175,7 +175,7 @@ def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("ranges", "options", "told"),
+    ("ranges", "options", "message"),
     [
         ("", [], "has no `variations` to search"),
         ("variations: {grid: {seed: [1, 2]}}\n", [], "only the ranges of `sampled` can be searched"),
@@ -186,9 +186,9 @@ def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_pat
     ],
 )
 def test_unsearchable_scenario_is_an_error(
-    simscen: Callable[..., Any], tmp_path: Path, ranges: str, options: list[str], told: str
+    simscen: Callable[..., Any], tmp_path: Path, ranges: str, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + ranges)
     done = simscen("falsify", "a.scenario.yaml", *options)
     assert done.code == 2
-    assert told in done.err
+    assert message in done.err

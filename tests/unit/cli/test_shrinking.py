@@ -9,7 +9,7 @@ from simscen.cli.session.shrinking import minimize
 
 
 @given(st.sets(st.integers(0, 30)), st.integers(1, 31))
-def test_exactly_the_needed_parts_are_left(needed: set[int], count: int) -> None:
+def test_exactly_the_needed_parts_are_kept(needed: set[int], count: int) -> None:
     needed = {part for part in needed if part < count}
     tried: list[frozenset[int]] = []
 

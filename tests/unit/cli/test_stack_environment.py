@@ -18,7 +18,7 @@ goals: [{pose: {x: 5, y: 3}}]
 time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """
-TELLS = "#!/bin/sh\nenv > seen.txt\npwd > where.txt\nulimit -v > memory.txt\nexit 7\n"
+REPORTS_ENVIRONMENT = "#!/bin/sh\nenv > seen.txt\npwd > where.txt\nulimit -v > memory.txt\nexit 7\n"
 DRIVES = """\
 import os, sys
 sys.path.insert(0, os.environ["SIMSCEN_PEER_PATH"])
@@ -32,7 +32,7 @@ for step in simscen_peer.Peer("mine"):
 
 @pytest.fixture
 def run(simscen, tmp_path: Path):
-    """Runs the scenario with a command; gives how it ended and the folder of the run."""
+    """Return a function that runs the scenario with a stack command and returns its result and run folder."""
     (tmp_path / "good.scenario.yaml").unlink()
     (tmp_path / "mine.scenario.yaml").write_text(SCENARIO)
 
@@ -50,7 +50,7 @@ def program(folder: Path, text: str, name: str = "nav") -> Path:
 
 
 def test_stack_gets_environment_and_folder_of_the_user(run, tmp_path: Path, monkeypatch) -> None:
-    program(tmp_path, TELLS)
+    program(tmp_path, REPORTS_ENVIRONMENT)
     given = {"ROS_DOMAIN_ID": "42", "LD_LIBRARY_PATH": "/opt/x", "PYTHONPATH": "/opt/y", "LINES_": "with\nlines"}
     for name, value in given.items():
         monkeypatch.setenv(name, value)
@@ -66,7 +66,7 @@ def test_stack_gets_environment_and_folder_of_the_user(run, tmp_path: Path, monk
 
 
 def test_stack_has_the_memory_limit_of_the_user(run, tmp_path: Path) -> None:
-    program(tmp_path, TELLS)
+    program(tmp_path, REPORTS_ENVIRONMENT)
     run("./nav")
     own = subprocess.run(["sh", "-c", "ulimit -H -v"], capture_output=True, text=True, check=True).stdout
     assert (tmp_path / "memory.txt").read_text() == own
@@ -94,9 +94,9 @@ def test_output_contains_no_environment_variables(run, tmp_path: Path, monkeypat
     files = [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
     assert len(files) >= 8
     assert [file for file in files if b"s3cr3t" in file.read_bytes()] == []
-    said = json.loads((tmp_path / "out/run.json").read_text())["stacks"]
-    assert said["mine"]["command"] == [sys.executable, "nav.py"]
-    assert said["mine"]["cwd"] == str(tmp_path)
+    output = json.loads((tmp_path / "out/run.json").read_text())["stacks"]
+    assert output["mine"]["command"] == [sys.executable, "nav.py"]
+    assert output["mine"]["cwd"] == str(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_output_contains_no_environment_variables(run, tmp_path: Path, monkeypat
     ],
 )
 def test_missing_interpreter_is_reported_before_any_run(run, tmp_path, first, expected_text) -> None:
-    """The kernel would say "no such file or directory" of the script, which is there."""
+    """The error of the kernel, "no such file or directory", would be for the script, which exists."""
     program(tmp_path, f"{first}\nexit 0\n")
     ended = run("./nav")
     assert ended.code == 2
@@ -116,7 +116,7 @@ def test_missing_interpreter_is_reported_before_any_run(run, tmp_path, first, ex
 
 
 def test_crash_of_a_stack_is_an_error_with_its_output(run, simscen, tmp_path: Path) -> None:
-    """Each of its own run only."""
+    """Each error contains the output of its run only."""
     programs = {
         "text": ("hello\n", "cannot be started: Exec format error: neither a program for this machine nor a script"),
         "env": ("#!/usr/bin/env no-such-python\n", "no-such-python"),

@@ -45,7 +45,7 @@ BOTH = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
 
 @pytest.fixture
 def project(simscen, tmp_path: Path) -> Path:
-    """A folder with two scenarios of a second, and a stack file."""
+    """Return a folder with two scenarios of one second and a stack file."""
     (tmp_path / "good.scenario.yaml").unlink()
     for name in ("a", "b"):
         (tmp_path / f"{name}.scenario.yaml").write_text(SHORT)
@@ -54,7 +54,7 @@ def project(simscen, tmp_path: Path) -> Path:
 
 
 def runs(folder: Path) -> list[str]:
-    """The folders of runs that hold a log."""
+    """Return the run folders that contain a log."""
     return sorted(str(log.parent.relative_to(folder / "runs")) for log in folder.rglob("run.mcap"))
 
 
@@ -115,7 +115,7 @@ def test_repeat_command_includes_the_stack(simscen, project: Path) -> None:
 
 @pytest.mark.slow
 def test_repeated_run_equals_the_run_with_several_stacks(simscen, project: Path) -> None:
-    """The command that repeats it gives one stack, which needs no label."""
+    """The repeat command has one stack, which needs no label."""
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
     ended = simscen("run", "a.scenario.yaml", "--stack", "dwb=dwb.stack.yaml", "--check-against", "out")
     assert ended.code == 0, ended.out
@@ -160,7 +160,7 @@ def test_determinism_is_checked_for_each_stack(simscen, project: Path) -> None:
 @pytest.mark.slow
 def test_resume_repeats_runs_of_a_changed_stack_file_only(simscen, project: Path) -> None:
     def call(*options: str) -> None:
-        """In a process of its own, since one holds the folder until it ends."""
+        """Run simscen in a separate process, because a session locks its folder until the process ends."""
         subprocess.run([*COMMAND, "run", "a.scenario.yaml", *BOTH, *options], check=True, capture_output=True)
 
     call("--out", "out")
@@ -190,8 +190,8 @@ def test_scenario_of_a_folder_that_the_stack_cannot_run_is_skipped(simscen, proj
     outcomes = [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]]
     assert sorted(outcomes) == ["passed", "skipped"]
     assert f'<skipped type="simscen.skip" message="{reason}' in (project / "out/junit.xml").read_text()
-    alone = simscen("run", ".", "--stack", "mine=/bin/true", "-k", "jump")
-    assert (alone.code, "0 passed, 1 skipped" in alone.out) == (5, True)
+    single = simscen("run", ".", "--stack", "mine=/bin/true", "-k", "jump")
+    assert (single.code, "0 passed, 1 skipped" in single.out) == (5, True)
 
 
 def test_named_scenario_that_the_stack_cannot_run_is_invalid(simscen, project: Path) -> None:

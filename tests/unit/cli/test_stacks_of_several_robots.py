@@ -38,7 +38,7 @@ robots:
 
 @pytest.fixture
 def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with two scenarios, a program, and a configuration that says what `other` runs."""
+    """Return a folder with two scenarios, a program, and a configuration of the stack `other`."""
     (tmp_path / "good.scenario.yaml").unlink()
     for name, text in (("mixed", MIXED), ("all", ALL)):
         (tmp_path / f"{name}.scenario.yaml").write_text(text)
@@ -55,7 +55,7 @@ def loaded(name: str, *stacks: str):
 
 
 def runs(scenario) -> dict[str, str]:
-    """What drives each robot: the words of a command, or the type of stack in the engine."""
+    """Return the stack of each robot: the words of its command, or the type of the in-process stack."""
     return {
         name: " ".join(view.external_command.argv) if view.external_command else type(view.spec.stack).__name__
         for name, view in scenario.robots.items()

@@ -1,6 +1,6 @@
 """`simscen study`: claims and parameters of a scenario whose margin is known in closed form.
 
-The robot stands `x` from the wall behind it, and the criterion needs 1 m of clearance.
+The robot is `x` from the wall behind it, and the criterion needs 1 m of clearance.
 """
 
 import json
@@ -33,7 +33,7 @@ variations:
 
 
 def study(folder: Path, text: str, *options: object) -> subprocess.CompletedProcess[str]:
-    """Run a study of this scenario in a process of its own, because a session locks its folder."""
+    """Run a study of this scenario in a separate process, because a session locks its folder."""
     (folder / "s.study.yaml").write_text(text)
     command = [sys.executable, "-m", "simscen", "study", "s.study.yaml", *map(str, options)]
     return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
@@ -49,7 +49,7 @@ def case(folder: Path) -> ET.Element:
     return found
 
 
-def test_a_study_finds_what_lowers_the_margin(tmp_path: Path) -> None:
+def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> None:
     done = study(tmp_path, SCENARIO + RANDOM, "--out", "out")
     assert done.returncode == 1, done.stderr
     found = results(tmp_path)["study"]
@@ -105,11 +105,11 @@ def test_a_claim_has_its_own_exit_code_and_testcase(
     done = study(tmp_path, text, "--out", "out")
     assert done.returncode == code, done.stderr
     assert results(tmp_path)["study"]["claim"]["status"] == status
-    told = case(tmp_path)
-    assert told.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
-    assert [child.tag for child in told] == [element]
+    message = case(tmp_path)
+    assert message.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
+    assert [child.tag for child in message] == [element]
     if element == "error":
-        assert told[0].get("type") == "simscen.undecided"
+        assert message[0].get("type") == "simscen.undecided"
     assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.stdout
 
 
@@ -127,7 +127,7 @@ def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> None:
+def test_pairwise_values_have_no_confidence_interval_and_no_claim(tmp_path: Path) -> None:
     pairwise = (
         "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
         "robot.motor_torque: [0.8, 0.9, 1]}}\n"
@@ -146,7 +146,7 @@ def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
+def test_values_meet_the_conditions_and_their_share_is_reported(tmp_path: Path) -> None:
     text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
     done = study(tmp_path, text, "--out", "out")
     assert done.returncode == 0, done.stderr
@@ -161,7 +161,7 @@ def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
+def test_printed_command_repeats_a_failed_run(tmp_path: Path) -> None:
     study(tmp_path, SCENARIO + RANDOM.replace("count: 40", "count: 2000"), "--out", "out", "--runs", 8)
     runs = results(tmp_path)["runs"]
     failed = next(run for run in runs if run["outcome"] == "failed")
@@ -172,7 +172,7 @@ def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "options", "told"),
+    ("more", "options", "message"),
     [
         ("", [], "the number of runs is missing"),
         ("variations: {grid: {seed: [1, 2]}}\n", ["--runs", 3], "--runs is for random seeds"),
@@ -184,15 +184,15 @@ def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
     ],
 )
 def test_invalid_studies_are_refused(
-    simscen: Callable[..., Any], tmp_path: Path, more: str, options: list[object], told: str
+    simscen: Callable[..., Any], tmp_path: Path, more: str, options: list[object], message: str
 ) -> None:
     (tmp_path / "s.study.yaml").write_text(SCENARIO + more)
     done = simscen("study", "s.study.yaml", *map(str, options))
     assert done.code in (2, 5)
-    assert told in done.err
+    assert message in done.err
 
 
-def test_logs_of_runs_that_pass_are_deleted_if_wanted(tmp_path: Path) -> None:
+def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
     study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 12, "--keep-logs", "failed")
     runs = results(tmp_path)["runs"]
     assert {run["outcome"] for run in runs} == {"passed", "failed"}

@@ -151,7 +151,7 @@ places: {up: {x: 1, y: 2}, shelf: {x: 6, y: 2}}
     ("ramps", "inside"),
     [("ramps: [{name: ramp, start: [3.5, 2], end: [2, 2], width: 2, height: 12 cm}]", ["shelf"]),
      ("ramps: []", ["up", "shelf"])],
-    ids=["a ramp leads up", "nothing does"],
+    ids=["with ramp", "without ramp"],
 )  # fmt: skip
 def test_place_can_be_on_a_platform_behind_a_ramp(simscen, tmp_path: Path, ramps: str, inside: list[str]) -> None:
     (tmp_path / "dock.world.yaml").write_text(DOCK.replace("RAMP", ramps))

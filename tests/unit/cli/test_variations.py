@@ -27,14 +27,14 @@ NAMES = ["x=1", "x=2", "x=50cm"]
 
 @pytest.fixture
 def project(simscen, tmp_path: Path) -> Path:
-    """A folder with a scenario of a second that has three variations."""
+    """Return a folder with a scenario of one second that has three variations."""
     (tmp_path / "good.scenario.yaml").unlink()
     (tmp_path / "a.scenario.yaml").write_text(SHORT)
     return tmp_path
 
 
 def results(folder: Path) -> list[dict[str, object]]:
-    """The runs of results.json."""
+    """Return the runs of results.json."""
     found: list[dict[str, object]] = json.loads((folder / "results.json").read_text())["runs"]
     return found
 

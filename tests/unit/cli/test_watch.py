@@ -12,7 +12,7 @@ from simscen.core.errors import Exit, Problem
 
 @pytest.fixture
 def files(tmp_path: Path):
-    """Two scenarios in a folder, and a watch that has heard of their sessions: b did not pass."""
+    """Return a folder with two scenarios, of which b failed."""
     for name in ("a", "b"):
         (tmp_path / f"{name}.scenario.yaml").write_text("")
     return tmp_path

@@ -31,7 +31,7 @@ TEST = """
 import pytest
 
 
-def test_it_passes(simscen):
+def test_passes(simscen):
     run = simscen("scenarios/good.scenario.yaml", seed=7)
     assert run.passed
     assert run.result.metrics["collisions"] == 0
@@ -40,14 +40,14 @@ def test_it_passes(simscen):
     assert simscen.variations("scenarios/speeds.scenario.yaml") != [""]
 
 
-def test_it_does_not(simscen):
+def test_fails(simscen):
     assert simscen("scenarios/bad.scenario.yaml").passed
 """
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A project with scenarios of every kind, and a test of its own."""
+    """Return a project with scenarios of every outcome and a Python test."""
     for name, text in FILES.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -67,40 +67,36 @@ def run(project: Path):
     return call
 
 
-def collected(told: str) -> list[str]:
-    return [line for line in told.splitlines() if "::" in line]
+def collected(output: str) -> list[str]:
+    return [line for line in output.splitlines() if "::" in line]
 
 
 def test_without_configuration_nothing_is_collected(run, project: Path) -> None:
-    code, told = run("--collect-only", "-q")
-    assert (code, collected(told)) == (0, ["test_own.py::test_own"])
+    code, output = run("--collect-only", "-q")
+    assert (code, collected(output)) == (0, ["test_own.py::test_own"])
     assert not (project / "simscen-out").exists()
 
 
 @pytest.mark.slow
-def test_where_the_configuration_names_folders_scenarios_are_collected_there_and_nowhere_else(
-    run, project: Path
-) -> None:
+def test_scenarios_are_collected_only_in_the_configured_folders(run, project: Path) -> None:
     (project / "pytest.ini").write_text("[pytest]\nsimscen_paths = scenarios\nsimscen_seed = 9\n")
     (project / "other").mkdir()
     (project / "other/elsewhere.scenario.yaml").write_text(ROOM)
     (project / "named.scenario.yaml").write_text(ROOM)
-    asked = ("scenarios", "other", "test_own.py", "named.scenario.yaml")
-    code, told = run("--collect-only", "-q", "-k", "good or elsewhere or named or test_own", *asked)
-    assert code == 0, told
-    assert sorted(collected(told)) == [
+    paths = ("scenarios", "other", "test_own.py", "named.scenario.yaml")
+    code, output = run("--collect-only", "-q", "-k", "good or elsewhere or named or test_own", *paths)
+    assert code == 0, output
+    assert sorted(collected(output)) == [
         "named.scenario.yaml::named", "scenarios/good.scenario.yaml::good", "test_own.py::test_own"
     ]  # fmt: skip
 
 
-def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_with_line_and_hint(
-    run, project: Path
-) -> None:
+def test_runs_are_items_with_name_and_tags_and_invalid_files_are_errors_with_line_and_hint(run, project: Path) -> None:
     (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
-    code, told = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
-    assert code == 2, told
-    assert "wrong.scenario.yaml:5:1: error[SC012]" in told and "Traceback" not in told
-    names = [line.partition("::")[2] for line in collected(told)]
+    code, output = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
+    assert code == 2, output
+    assert "wrong.scenario.yaml:5:1: error[SC012]" in output and "Traceback" not in output
+    names = [line.partition("::")[2] for line in collected(output)]
     assert names == [
         "good (seed 1)", "good (seed 2)", "held (seed 1)", "held (seed 2)", "later (seed 1)", "later (seed 2)",
         "speeds[time_limit=0.1s] (seed 1)", "speeds[time_limit=0.1s] (seed 2)",
@@ -109,18 +105,18 @@ def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_w
 
 
 @pytest.mark.slow
-def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail(run, project: Path) -> None:
-    code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--junitxml=junit.xml", "--simscen-out=logs")
-    assert code == 1, told
-    assert re.search(r"2 failed, 3 passed, 1 skipped, 1 xfailed", told)
-    assert "Traceback" not in told
-    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", told, re.MULTILINE)
-    assert re.search(r"^scenario  scenarios/bad.scenario.yaml:7$", told, re.MULTILINE)
-    assert re.search(r"^again     simscen run scenarios/bad.scenario.yaml --seed 1$", told, re.MULTILINE)
-    picture = re.search(r"^picture   (logs/\S+-pytest/runs/scenarios/bad/seed-1/map.png)$", told, re.MULTILINE)
+def test_items_pass_fail_skip_and_xfail_with_the_messages_of_simscen(run, project: Path) -> None:
+    code, output = run("--simscen", "-p", "no:xdist", "scenarios", "--junitxml=junit.xml", "--simscen-out=logs")
+    assert code == 1, output
+    assert re.search(r"2 failed, 3 passed, 1 skipped, 1 xfailed", output)
+    assert "Traceback" not in output
+    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", output, re.MULTILINE)
+    assert re.search(r"^scenario  scenarios/bad.scenario.yaml:7$", output, re.MULTILINE)
+    assert re.search(r"^again     simscen run scenarios/bad.scenario.yaml --seed 1$", output, re.MULTILINE)
+    picture = re.search(r"^picture   (logs/\S+-pytest/runs/scenarios/bad/seed-1/map.png)$", output, re.MULTILINE)
     assert picture and (project / picture[1]).is_file()
-    assert re.search(r"^FAILED scenarios/bad.scenario.yaml::bad - clearance: 0", told, re.MULTILINE)
-    assert "FAILED scenarios/held.scenario.yaml::held" in told  # strict, as for `simscen run`
+    assert re.search(r"^FAILED scenarios/bad.scenario.yaml::bad - clearance: 0", output, re.MULTILINE)
+    assert "FAILED scenarios/held.scenario.yaml::held" in output  # strict, as for `simscen run`
     cases = {case.get("name"): case for case in ElementTree.parse(project / "junit.xml").iter("testcase")}
     failure = cases["bad"].find("failure")
     assert failure is not None and str(failure.get("message")).startswith("clearance: 0.")
@@ -129,33 +125,33 @@ def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail
 
 
 @pytest.mark.slow
-def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: Path) -> None:
-    code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
-    assert code == 1, told
-    assert "1 failed, 1 passed" in told
-    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", told, re.MULTILINE)
+def test_xdist_workers_share_one_output_folder_and_last_failed_is_known(run, project: Path) -> None:
+    code, output = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
+    assert code == 1, output
+    assert "1 failed, 1 passed" in output
+    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", output, re.MULTILINE)
     assert len(list((project / "simscen-out").iterdir())) == 1
-    _, told = run("--simscen", "-p", "no:xdist", "scenarios", "--lf", "--collect-only", "-q")
-    assert collected(told) == ["scenarios/bad.scenario.yaml::bad"]
+    _, output = run("--simscen", "-p", "no:xdist", "scenarios", "--lf", "--collect-only", "-q")
+    assert collected(output) == ["scenarios/bad.scenario.yaml::bad"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("ini", "arguments", "why"),
+    ("ini", "arguments", "message"),
     [
         ("", ("--simscen-stack", "nothing"), "cannot read --stack nothing"),
         pytest.param("simscen_seed = seven", (), "simscen_seed: 'seven' is not a whole", marks=pytest.mark.slow),
     ],
 )
-def test_invalid_stack_and_seed_are_usage_errors(run, project: Path, ini: str, arguments, why: str) -> None:
+def test_invalid_stack_and_seed_are_usage_errors(run, project: Path, ini: str, arguments, message: str) -> None:
     (project / "pytest.ini").write_text(f"[pytest]\nsimscen_paths = scenarios\n{ini}\n")
-    code, told = run("-p", "no:xdist", "scenarios/good.scenario.yaml", *arguments)
-    assert code == 2 and why in told and "Traceback" not in told
+    code, output = run("-p", "no:xdist", "scenarios/good.scenario.yaml", *arguments)
+    assert code == 2 and message in output and "Traceback" not in output
 
 
-def test_the_fixture_runs_a_scenario_in_a_test_and_says_why_it_did_not_pass(run, project: Path) -> None:
+def test_fixture_runs_a_scenario_in_a_test_and_reports_why_it_failed(run, project: Path) -> None:
     (project / "test_own.py").write_text(TEST)
-    code, told = run("-p", "no:xdist", "test_own.py")
-    assert code == 1, told
-    assert "1 failed, 1 passed" in told
-    assert re.search(r"<Run of scenarios/bad, seed 1: failed; clearance 0\.\d\d m \(≥ 2.00 m\)>.passed", told)
+    code, output = run("-p", "no:xdist", "test_own.py")
+    assert code == 1, output
+    assert "1 failed, 1 passed" in output
+    assert re.search(r"<Run of scenarios/bad, seed 1: failed; clearance 0\.\d\d m \(≥ 2.00 m\)>.passed", output)

@@ -40,7 +40,7 @@ class Unannotated:
 @pytest.fixture
 def run(tmp_path: Path):
     (tmp_path / "own.py").write_text(OWN)
-    (tmp_path / "test_theirs.py").write_text("def test_theirs():\n    pass\n")
+    (tmp_path / "test_project.py").write_text("def test_project():\n    pass\n")
 
     def call(*arguments: str, probe: str = "pass") -> tuple[int, str]:
         code = f"import sys, pytest; sys.path.insert(0, '.'); code = pytest.main(sys.argv[1:]); {probe}; sys.exit(code)"
@@ -52,38 +52,38 @@ def run(tmp_path: Path):
     return call
 
 
-def test_every_promise_of_a_component_is_an_item_and_nothing_else_is_run(run) -> None:
-    code, told = run("-v", "-p", "no:xdist", "--simscen-contract", 'own:Checker={"part": 0.9}')
-    assert code == 0, told
-    assert "a reset forgets the goal before" in told
-    assert "6 passed" in told
-    assert "test_theirs" not in told
+def test_contract_run_collects_only_the_promises_of_the_component(run) -> None:
+    code, output = run("-v", "-p", "no:xdist", "--simscen-contract", 'own:Checker={"part": 0.9}')
+    assert code == 0, output
+    assert "a reset forgets the goal before" in output
+    assert "6 passed" in output
+    assert "test_project" not in output
 
 
 @pytest.mark.slow
-def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
-    code, told = run("-p", "no:xdist", "--simscen-contract", 'own:Spec={"part": 3.0}', "test_theirs.py")
-    assert code == 1, told
-    assert "says that a robot at (2.26, -1.0, 0.5) has reached (2.0, -1.0, 0.5)" in told
-    assert "promised: Given a robot outside a tolerance of the goal" in told
-    assert "Traceback" not in told
-    assert "1 failed, 6 passed" in told  # with their own test, as a path was given
+def test_broken_promise_reports_observed_and_promised_behavior(run) -> None:
+    code, output = run("-p", "no:xdist", "--simscen-contract", 'own:Spec={"part": 3.0}', "test_project.py")
+    assert code == 1, output
+    assert "says that a robot at (2.26, -1.0, 0.5) has reached (2.0, -1.0, 0.5)" in output
+    assert "promised: Given a robot outside a tolerance of the goal" in output
+    assert "Traceback" not in output
+    assert "1 failed, 6 passed" in output  # includes the test of the given path
 
 
 @pytest.mark.slow
-def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
-    code, told = run("-n1", "--simscen-contract", "simple", "-k", "reset")
-    assert code == 0, told
-    assert "1 passed" in told
+def test_contract_accepts_the_name_of_a_shipped_type_and_xdist_workers(run) -> None:
+    code, output = run("-n1", "--simscen-contract", "simple", "-k", "reset")
+    assert code == 0, output
+    assert "1 passed" in output
 
 
 def test_mistake_is_readable_with_xdist_workers(run) -> None:
-    code, told = run("-n1", "--simscen-contract", "headless")
-    assert code == 4, told
-    assert told.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
+    code, output = run("-n1", "--simscen-contract", "headless")
+    assert code == 4, output
+    assert output.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
-REFUSED = {
+INVALID_TARGETS = {
     "own:Checker": "part: Field required",
     "own:Checker={part: 1}": "is not valid JSON",
     "own:Unannotated": "its first argument is not annotated with a specification",
@@ -91,44 +91,44 @@ REFUSED = {
     "nowhere:Nothing": "No module named 'nowhere'",
     "headless": "no installed package adds anything of that name",
 }
-EACH = """
+RUN_EACH_TARGET = """
 import contextlib, io, json, sys
 import pytest
 sys.path.insert(0, ".")
 plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
-told = {}
+outputs = {}
 for target in sys.argv[1:]:
     with io.StringIO() as text, contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
         code = pytest.main([*plugin, "--simscen-contract", target])
-        told[target] = (int(code), text.getvalue())
-print(json.dumps(told))
+        outputs[target] = (int(code), text.getvalue())
+print(json.dumps(outputs))
 """
 
 
 @pytest.fixture(scope="module")
-def refused(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
-    """Exit code and words for each target, from one process that asks pytest for one after the other."""
-    folder = tmp_path_factory.mktemp("refused")
+def target_results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
+    """Return exit code and output for each target, from one process that runs pytest for all of them."""
+    folder = tmp_path_factory.mktemp("target_results")
     (folder / "own.py").write_text(OWN)
-    command = [sys.executable, "-c", EACH, *REFUSED]
+    command = [sys.executable, "-c", RUN_EACH_TARGET, *INVALID_TARGETS]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-    told: dict[str, tuple[int, str]] = json.loads(done.stdout)
-    return told
+    outputs: dict[str, tuple[int, str]] = json.loads(done.stdout)
+    return outputs
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("target", REFUSED)
-def test_untestable_target_is_a_readable_error(refused, target: str) -> None:
-    code, told = refused[target]
+@pytest.mark.parametrize("target", INVALID_TARGETS)
+def test_untestable_target_is_a_readable_error(target_results, target: str) -> None:
+    code, output = target_results[target]
     assert code == 4
-    assert REFUSED[target] in told
-    assert "Traceback" not in told
+    assert INVALID_TARGETS[target] in output
+    assert "Traceback" not in output
 
 
-def test_a_pytest_that_asks_for_no_contract_imports_nothing_of_simscen_but_the_plug_in(run) -> None:
+def test_pytest_without_a_contract_imports_only_the_plug_in_of_simscen(run) -> None:
     probe = "print('loaded', *sorted(m for m in sys.modules if m.startswith('simscen') or m in ('numpy', 'pydantic')))"
-    code, told = run("-q", "-p", "no:xdist", probe=probe)
-    assert code == 0, told
-    loaded = told.splitlines()[-1].split()[1:]
+    code, output = run("-q", "-p", "no:xdist", probe=probe)
+    assert code == 0, output
+    loaded = output.splitlines()[-1].split()[1:]
     light = ["core", "core.version", "pytesting", "pytesting.plugin", "testing", "testing.plugin"]
     assert loaded == ["simscen", *(f"simscen.{name}" for name in light)]

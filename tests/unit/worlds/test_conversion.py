@@ -26,8 +26,8 @@ NEAR = st.floats(-20, 20)
 
 
 def converted(*solids, bodies=(), height=0.2):
-    done = convert_world(World("w", solids, bodies), height)
-    return world_from_spec(done.merged_into(EMPTY), "w"), done.changes
+    conversion = convert_world(World("w", solids, bodies), height)
+    return world_from_spec(conversion.merged_into(EMPTY), "w"), conversion.changes
 
 
 def assert_same_corners(solids, others, tolerance=1e-5):
@@ -37,7 +37,7 @@ def assert_same_corners(solids, others, tolerance=1e-5):
     assert distances[linear_sum_assignment(distances)].max() <= tolerance
 
 
-def covered(solids, height):
+def section_of(solids, height):
     rings = [
         Polygon(ring)
         for solid in solids
@@ -48,11 +48,11 @@ def covered(solids, height):
 
 @settings(max_examples=40, deadline=None)
 @given(st.tuples(*[st.floats(0.05, 3)] * 3), NEAR, NEAR, st.sampled_from(range(6)), st.floats(-math.pi, math.pi))
-def test_a_box_on_any_of_its_sides_is_the_same_box(size, x, y, side, yaw):
+def test_box_on_any_of_its_sides_is_converted_exactly(size, x, y, side, yaw):
     roll, pitch = [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, 3)][side]
     turned = Pose3.from_rpy(0, 0, 0, roll * math.pi / 2, pitch * math.pi / 2, yaw)
-    low = merge_solids([Solid(Box(size), turned)]).vertices[:, 2].min()
-    solid = Solid(Box(size), turned._replace(x=x, y=y, z=0.01 - float(low)), "crate")
+    bottom = merge_solids([Solid(Box(size), turned)]).vertices[:, 2].min()
+    solid = Solid(Box(size), turned._replace(x=x, y=y, z=0.01 - float(bottom)), "crate")
     world, changes = converted(solid)
     assert changes == []
     assert isinstance(world.solids[0].shape, Box)
@@ -93,7 +93,7 @@ def test_tilted_or_round_solids_become_prisms_with_a_note(shape, pose, kind):
     solid = Solid(shape, pose, "thing")
     world, changes = converted(solid, height=0.25)
     assert changes == [f"thing: {kind}; replaced by an upright prism over its cross section at 0.25 m"]
-    before, after = covered([solid], 0.25), covered(world.solids, 0.25)
+    before, after = section_of([solid], 0.25), section_of(world.solids, 0.25)
     assert before.symmetric_difference(after).area < 1e-4
 
 
@@ -131,10 +131,10 @@ def test_bodies_keep_mass_and_motion():
 def test_unsupported_motions_and_shapes_are_reported():
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0))
-    off = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
-    hasty = Body("beside", off, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
+    offset_disc = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
+    moving = Body("beside", offset_disc, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
     table = Body("table", (*disc, Solid(Box((1, 1, 0.1)), Pose3(z=1.0))), Pose3(x=5.0), 3.0)
-    world, changes = converted(bodies=(hasty, table))
+    world, changes = converted(bodies=(moving, table))
     assert changes == [
         "beside: it moves, but its shape is not at its origin; it is made static",
         "table: it could be pushed and has 2 shapes, but an object can have only one; it is made static",
@@ -148,7 +148,7 @@ def test_motion_with_changing_speed_becomes_keyframes(mode):
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0.5, 1.0))
     path = MotionPath((0.0, 1.0, 9.0), poses, mode, ease="spline", phase=0.5)
-    world, changes = converted(bodies=(Body("hasty", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
+    world, changes = converted(bodies=(Body("moving", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
     assert changes == []
     assert world.bodies[0].path == path
 
@@ -157,12 +157,12 @@ def test_additions_of_the_file_come_last():
     spec = WorldSpec.model_validate(
         {"simscen": 1, "sdf": "x.sdf", "obstacles": [{"name": "mine", "box": [1, 1, 1], "pose": {"x": 0, "y": 0}}]}
     )
-    done = convert_world(World("w", (Solid(Box((1, 1, 1)), Pose3(z=0.5), "theirs"),)), 0.2).merged_into(spec)
-    assert done.sdf is None
-    assert [obstacle.name for obstacle in done.obstacles] == ["theirs", "mine"]
+    conversion = convert_world(World("w", (Solid(Box((1, 1, 1)), Pose3(z=0.5), "theirs"),)), 0.2).merged_into(spec)
+    assert conversion.sdf is None
+    assert [obstacle.name for obstacle in conversion.obstacles] == ["theirs", "mine"]
 
 
-def test_a_slippery_plate_stays_slippery():
+def test_friction_of_a_plate_is_kept():
     world, changes = converted(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
     assert (world.solids[0].friction, changes) == (0.3, [])
 

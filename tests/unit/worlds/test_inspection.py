@@ -21,16 +21,16 @@ ROOM = World(
 
 
 def test_world_summary_has_numbers():
-    told = inspect_world(build_world_and_map(ROOM, 0.3))
-    assert [item.name for item in told.solids] == ["wall", "wall", "post"]
-    assert told.shapes == (("box", 2), ("cylinder", 1))
-    assert told.solids[2].extent == pytest.approx((0.5, -0.5, 0.0, 1.5, 0.5, 2.0))
-    assert told.solids[0].mass is None
-    (cart,) = told.bodies
+    summary = inspect_world(build_world_and_map(ROOM, 0.3))
+    assert [item.name for item in summary.solids] == ["wall", "wall", "post"]
+    assert summary.shapes == (("box", 2), ("cylinder", 1))
+    assert summary.solids[2].extent == pytest.approx((0.5, -0.5, 0.0, 1.5, 0.5, 2.0))
+    assert summary.solids[0].mass is None
+    (cart,) = summary.bodies
     assert (cart.shape, cart.mass, cart.triangles) == ("box", 12.0, 12)
     assert cart.extent == pytest.approx((-1.5, -0.25, 0.0, -0.5, 0.25, 0.5))
-    assert told.triangles == sum(item.triangles for item in told.solids) + 12
-    assert (told.places, told.regions, told.notes) == (("dock",), ("lane",), ("a note",))
+    assert summary.triangles == sum(item.triangles for item in summary.solids) + 12
+    assert (summary.places, summary.regions, summary.notes) == (("dock",), ("lane",), ("a note",))
 
 
 def test_the_shares_of_the_map_add_up():
@@ -41,5 +41,5 @@ def test_the_shares_of_the_map_add_up():
 
 
 def test_an_empty_world_can_be_inspected():
-    told = inspect_world(build_world_and_map(World("nothing", ()), 0.3))
-    assert (told.solids, told.bodies, told.triangles) == ((), (), 0)
+    summary = inspect_world(build_world_and_map(World("nothing", ()), 0.3))
+    assert (summary.solids, summary.bodies, summary.triangles) == ((), (), 0)

@@ -19,7 +19,7 @@ from simscen.worlds.routes.shortest_paths import legs_between
 from simscen.worlds.sdf import load_sdf
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the third-party worlds are missing: see CONTRIBUTING.md")
 LIDAR = 0.18
 
 
@@ -31,19 +31,19 @@ def shipped_map(path):
 def free_poses(grid, count, seed):
     from scipy import ndimage
 
-    roomy = ndimage.distance_transform_edt(grid.cells == FREE) * grid.resolution > 0.2
-    cells = np.argwhere(roomy)
+    has_clearance = ndimage.distance_transform_edt(grid.cells == FREE) * grid.resolution > 0.2
+    cells = np.argwhere(has_clearance)
     return grid.center_of(cells[np.random.default_rng(seed).choice(len(cells), count, replace=False)])
 
 
-def beams_from(places, count):
+def beams_from(points, count):
     angles = np.arange(count) * (2 * math.pi / count)
     directions = np.column_stack((np.cos(angles), np.sin(angles)))
-    return np.repeat(places, count, axis=0), np.tile(directions, (len(places), 1))
+    return np.repeat(points, count, axis=0), np.tile(directions, (len(points), 1))
 
 
 def ranges_on_map(grid, starts, directions, reach=12.0):
-    """AMCL's map_calc_range: Bresenham from the middle of a cell to that of the first occupied one."""
+    """Return the ranges to the first occupied cell by Bresenham steps, as in map_calc_range of AMCL."""
     first = grid.cell_of(starts)
     step = directions[:, ::-1] / np.abs(directions).max(axis=1)[:, None]
     cells = np.round(first[:, None] + np.arange(reach / grid.resolution)[:, None] * step[:, None]).astype(int)
@@ -54,29 +54,29 @@ def ranges_on_map(grid, starts, directions, reach=12.0):
 
 @needs_data
 def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
-    home = DATA / "nav2_tb3_sandbox"
-    world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
-    grid = shipped_map(home / "tb3_sandbox.yaml")
-    places = free_poses(grid, 60, seed=1)
-    starts, directions = beams_from(places, 90)
+    folder = DATA / "nav2_tb3_sandbox"
+    world = load_sdf(folder / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[folder / "models"], lenient=True)
+    grid = shipped_map(folder / "tb3_sandbox.yaml")
+    points = free_poses(grid, 60, seed=1)
+    starts, directions = beams_from(points, 90)
     origins = np.column_stack((starts, np.full(len(starts), LIDAR)))
     level = np.column_stack((directions, np.zeros(len(directions))))
-    ours = RayScene(merge_solids(world.solids)).cast(origins, level)
-    assert (np.abs(ours - ranges_on_map(grid, starts, directions)) < 0.15).mean() >= 0.92
+    ranges = RayScene(merge_solids(world.solids)).cast(origins, level)
+    assert (np.abs(ranges - ranges_on_map(grid, starts, directions)) < 0.15).mean() >= 0.92
 
 
 @needs_data
-def test_our_map_of_tb3_sandbox_agrees_with_the_shipped_one_where_a_robot_can_be():
-    home = DATA / "nav2_tb3_sandbox"
-    world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
+def test_map_of_tb3_sandbox_agrees_with_the_shipped_map_where_a_robot_can_be():
+    folder = DATA / "nav2_tb3_sandbox"
+    world = load_sdf(folder / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[folder / "models"], lenient=True)
     built = build_world_and_map(world, LIDAR)
-    theirs = shipped_map(home / "tb3_sandbox.yaml")
-    places = free_poses(theirs, 500, seed=2)
-    assert (built.map.values_at(places) == FREE).mean() > 0.98
+    shipped = shipped_map(folder / "tb3_sandbox.yaml")
+    points = free_poses(shipped, 500, seed=2)
+    assert (built.map.values_at(points) == FREE).mean() > 0.98
 
 
 @needs_data
-def test_every_barn_world_admits_a_disc_of_37_cm_and_its_shortest_way_is_no_longer_than_the_reference():
+def test_every_barn_world_admits_a_disc_of_37_cm_with_a_shortest_path_up_to_the_reference_length():
     rows = [line.split(",") for line in (DATA / "barn_sample" / "scenarios.csv").read_text().split()[1:]]
     for number, reference in ((row[0], float(row[9])) for row in rows):
         world = load_sdf(DATA / "barn_sample" / f"world_{number}.world", root=DATA, lenient=True)

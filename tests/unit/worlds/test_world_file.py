@@ -15,7 +15,7 @@ def spec(**parts):
     return WorldSpec.model_validate({"simscen": 1, **parts})
 
 
-def test_walls_obstacles_and_objects_arrive_where_they_were_written():
+def test_walls_obstacles_and_objects_have_the_poses_of_the_file():
     world = world_from_spec(
         spec(
             walls=[{"points": [[0.0, 0.0], [5.0, 0.0]]}, {"name": "shelf", "points": [[0.0, 2.0], [5.0, 2.0]]}],
@@ -55,7 +55,7 @@ def test_a_door_hangs_on_its_first_post_and_opens_by_a_quarter_turn():
     assert ajar.pose.plane == pytest.approx((1.0, 3.0, math.pi))
 
 
-def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
+def test_moving_object_keeps_its_speed_and_start_time():
     move = {"through": [[4.0, 1.0], [4.0, 3.0]], "speed": 0.5, "repeat": "back_and_forth", "start": "2 s"}
     objects = [{"name": "cart", "box": [0.5, 0.5, 0.5], "pose": {"x": 2.0, "y": 1.0}, "move": move}]
     path = world_from_spec(spec(objects=objects), "w").bodies[0].path
@@ -64,12 +64,12 @@ def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
     assert path.poses[-1] == pytest.approx((4.0, 3.0, math.pi / 2))
 
 
-def test_a_map_becomes_walls_and_stays_the_map():
+def test_map_of_a_world_is_kept_and_gives_its_walls():
     cells = np.zeros((20, 20), np.int8)
     cells[5, 5:15] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 1.0, 0.0))
-    world = world_from_spec(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a doubt",))
-    assert world.notes == ("m.pgm: a doubt",)
+    world = world_from_spec(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a warning",))
+    assert world.notes == ("m.pgm: a warning",)
     assert [solid.name for solid in world.solids] == ["map"]
     assert world.grid is grid
     assert world.bounds == pytest.approx((1.0, 1.0, 3.0, 3.0))
@@ -77,10 +77,10 @@ def test_a_map_becomes_walls_and_stays_the_map():
 
 def test_additions_to_an_imported_world_take_precedence():
     base = World("gz", (Solid(Box((1, 1, 1)), name="theirs"),), places={"a": Pose2(0, 0), "b": Pose2(1, 1)})
-    own = spec(
+    additions = spec(
         obstacles=[{"name": "ours", "box": [1.0, 1.0, 1.0], "pose": {"x": 3.0, "y": 0.0}}],
         places={"a": {"x": 5.0, "y": 5.0}},
     )
-    world = world_from_spec(own, "w", base=base)
+    world = world_from_spec(additions, "w", base=base)
     assert [solid.name for solid in world.solids] == ["theirs", "ours"]
     assert world.places == {"a": Pose2(5, 5), "b": Pose2(1, 1)}

@@ -13,103 +13,103 @@ STEP = Pose2(0.25, 0.0, 0.05)
 MATCHED = np.diag(np.square((0.005, 0.004, 0.0017)))
 """(m, m, rad)²: the covariance of a step between two scans that see enough."""
 ERROR = np.array([0.05, 0.02, 0.01])
-"""m, m, rad: standard deviations of errors that last for some corrections."""
-TOO_SURE = np.diag(np.square((0.01, 0.01, 0.005)))
-AS_MAPPED = ScanResiduals(0.98, 0.1)
+"""m, m, rad: standard deviations of errors that are correlated over several corrections."""
+OVERCONFIDENT = np.diag(np.square((0.01, 0.01, 0.005)))
+GOOD_FIT = ScanResiduals(0.98, 0.1)
 
 
-def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: ScanResiduals = AS_MAPPED) -> list[float]:
-    """NEES of particles alone and of what is told, at the end and 9 m before; `lasting`: the correlation of one error
-    (ahead, aside, in heading) with the next."""
+def drive(seed: int, rho: float, error: Array, particles: Array, residuals: ScanResiduals = GOOD_FIT) -> list[float]:
+    """Return the NEES of particles and estimate, 9 m before the end and at the end.
+
+    `rho` is the correlation of consecutive errors.
+    """
     nees = []
-    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[WINDOW_SIZE - 1 :: WINDOW_SIZE]:
+    for wrong, covariance in list(corrections(seed, rho, error, particles, residuals))[WINDOW_SIZE - 1 :: WINDOW_SIZE]:
         nees += [float(wrong @ np.linalg.solve(one, wrong)) for one in (particles, covariance)]
     return nees
 
 
 def corrections(
-    seed: int, lasting: float, error: Array, particles: Array, misfit: ScanResiduals = AS_MAPPED
+    seed: int, rho: float, error: Array, particles: Array, residuals: ScanResiduals = GOOD_FIT
 ) -> Iterator[tuple[Array, Array]]:
-    """Errors (3,) and covariances (3, 3) of a drive."""
-    rng, scatter = np.random.default_rng(seed), CovarianceEstimator()
+    """Yield the errors (3,) and covariances (3, 3) of a drive."""
+    rng, estimator = np.random.default_rng(seed), CovarianceEstimator()
     truth, off = Pose2(3.0, -2.0, 1.0), error * rng.standard_normal(3)
     start = truth
     for _ in range(2 * WINDOW_SIZE):
         truth = truth.compose(STEP)
-        off = lasting * off + np.sqrt(1 - lasting**2) * error * rng.standard_normal(3)
+        off = rho * off + np.sqrt(1 - rho**2) * error * rng.standard_normal(3)
         c, s = np.cos(truth.yaw), np.sin(truth.yaw)
         wrong = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1))) @ off
         x, y, yaw = (np.array(truth) + wrong).tolist()
-        scatter.propagate_poses(start.between(truth), MATCHED)
-        yield wrong, scatter.estimate(Pose2(x, y, yaw), particles, misfit)
+        estimator.propagate_poses(start.between(truth), MATCHED)
+        yield wrong, estimator.estimate(Pose2(x, y, yaw), particles, residuals)
 
 
-@pytest.mark.parametrize("lasting", [0.85, 0.94])
-def test_estimated_covariance_matches_the_error_despite_overconfident_particles(
-    lasting: float,
-) -> None:
+@pytest.mark.parametrize("rho", [0.85, 0.94])
+def test_estimated_covariance_matches_the_error_despite_overconfident_particles(rho: float) -> None:
     """The expected NEES is 3. Errors of AMCL that are 25 cm apart have a correlation of 0.94."""
-    alone, inflated = (
-        np.array([drive(seed, lasting, ERROR, TOO_SURE) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
+    particles_only, inflated = (
+        np.array([drive(seed, rho, ERROR, OVERCONFIDENT) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
     )
     assert 1.0 < inflated < 4.5
-    assert alone > 15
+    assert particles_only > 15
 
 
 def test_common_errors_of_all_poses_are_detected_by_beam_residuals() -> None:
-    """The meaning of beam residuals is learned where poses scatter, and applies where all poses have the same error."""
+    """The scale of beam residuals is learned while poses scatter, and applies when all poses have the same error."""
 
-    def doubt(misfit: ScanResiduals) -> float:
-        rng, scatter, base, covariance = (
+    def doubt(residuals: ScanResiduals) -> float:
+        rng, estimator, base, covariance = (
             np.random.default_rng(1),
             CovarianceEstimator(),
             Pose2(0.0, 0.0, 0.0),
-            TOO_SURE,
+            OVERCONFIDENT,
         )
         for k in range(2 * WINDOW_SIZE):
             base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < WINDOW_SIZE
             x = base.x + (0.05 * float(rng.standard_normal()) if learning else 0.1)
-            scatter.propagate_poses(base, MATCHED)
-            covariance = scatter.estimate(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
+            estimator.propagate_poses(base, MATCHED)
+            covariance = estimator.estimate(Pose2(x, 0.0, 0.0), OVERCONFIDENT, GOOD_FIT if learning else residuals)
         return float(np.sqrt(covariance[0, 0]))
 
-    assert doubt(ScanResiduals(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
+    assert doubt(ScanResiduals(0.98, 1.0)) > 2.0 * doubt(GOOD_FIT)
 
 
 def test_fewer_explained_beams_have_less_weight() -> None:
     (_, most), (_, half) = (
-        list(corrections(1, 0.9, ERROR, TOO_SURE, ScanResiduals(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
+        list(corrections(1, 0.9, ERROR, OVERCONFIDENT, ScanResiduals(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
     )
     assert np.sqrt(np.diag(half)) == pytest.approx(2 * np.sqrt(np.diag(most)))
 
 
 def test_pose_scatter_overrides_wide_particles() -> None:
-    *_, (_, covariance) = corrections(1, 0.7, ERROR / 10, TOO_SURE * 25)
-    assert 0 < np.trace(covariance) < np.trace(TOO_SURE * 25) / 2
+    *_, (_, covariance) = corrections(1, 0.7, ERROR / 10, OVERCONFIDENT * 25)
+    assert 0 < np.trace(covariance) < np.trace(OVERCONFIDENT * 25) / 2
 
 
 def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
     """In a corridor without features, only the wheels measure the distance, and the map corrects it."""
-    blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
-    for doubt in (MATCHED, blind):
-        rng, scatter, base, covariance = (
+    featureless, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
+    for doubt in (MATCHED, featureless):
+        rng, estimator, base, covariance = (
             np.random.default_rng(2),
             CovarianceEstimator(),
             Pose2(0.0, 0.0, 0.0),
-            TOO_SURE,
+            OVERCONFIDENT,
         )
         for k in range(2 * WINDOW_SIZE):
             base = base.compose(Pose2(0.25 + 0.05 * float(rng.standard_normal()), 0.0, 0.0))
-            scatter.propagate_poses(base, doubt)
-            covariance = scatter.estimate(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
+            estimator.propagate_poses(base, doubt)
+            covariance = estimator.estimate(Pose2(0.25 * k, 0.0, 0.0), OVERCONFIDENT, GOOD_FIT)
         stds.append(float(np.sqrt(covariance[0, 0])))
     assert stds[1] < stds[0] / 3
 
 
-def test_the_first_correction_has_a_covariance_too() -> None:
-    scatter = CovarianceEstimator()
-    scatter.propagate_poses(Pose2(0.0, 0.0, 0.0), None)
-    covariance = scatter.estimate(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
+def test_first_correction_has_a_covariance() -> None:
+    estimator = CovarianceEstimator()
+    estimator.propagate_poses(Pose2(0.0, 0.0, 0.0), None)
+    covariance = estimator.estimate(Pose2(1.0, 2.0, 3.0), OVERCONFIDENT, None)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
 
 
@@ -119,10 +119,10 @@ def test_covariance_does_not_depend_on_the_scan_frame(turn: float) -> None:
     frame, found = Pose2(5.0, -3.0, turn), []
     doubt = np.array(((4e-4, 1e-5, 0.0), (1e-5, 5e-5, 2e-6), (0.0, 2e-6, 9e-6)))
     for from_frame in (Pose2(0.0, 0.0, 0.0), frame):
-        scatter, covariance = CovarianceEstimator(), TOO_SURE
+        estimator, covariance = CovarianceEstimator(), OVERCONFIDENT
         for k, pose in enumerate(poses):
-            scatter.propagate_poses(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
-            covariance = scatter.estimate(pose, TOO_SURE, AS_MAPPED)
+            estimator.propagate_poses(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
+            covariance = estimator.estimate(pose, OVERCONFIDENT, GOOD_FIT)
         found.append(covariance)
     assert np.allclose(*found)
 
@@ -133,7 +133,7 @@ def test_covariance_grows_with_the_observed_odometry_error() -> None:
         slipping.learn_odometry_error(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))
         holding.learn_odometry_error(Pose2(0.25, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))
     step = Pose2(0.25, 0.0, 0.0)
-    wrong, right = (scatter.propagate(np.zeros((3, 3)), 0.4, step) for scatter in (slipping, holding))
+    wrong, right = (estimator.propagate(np.zeros((3, 3)), 0.4, step) for estimator in (slipping, holding))
     assert np.sqrt(np.diag(wrong)) == pytest.approx((0.035, 0.035, 0.02), rel=0.1)
     assert (np.sqrt(np.diag(right)) < (0.008, 0.008, 0.008)).all()
     swung = holding.propagate(np.diag([0.0, 0.0, 0.01]), 0.0, step)

@@ -8,41 +8,41 @@ from simscen.advanced.localizers.scan_memory import MEMORY_LENGTH_M, ScanMemory,
 from simscen.core.geometry import Pose2
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
-PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
+POSES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
 
 
-def scanned(pose: Pose2) -> View:
+def view_from(pose: Pose2) -> View:
     ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
     ends = endpoints_of(scan(ranges), 0.0, 100.0)
-    return View(ends, np.concatenate([ends * share for share in PASSED_SHARES]))
+    return View(ends, np.concatenate([ends * passed_share for passed_share in PASSED_SHARES]))
 
 
-@pytest.mark.parametrize("pose", PLACES)
+@pytest.mark.parametrize("pose", POSES)
 def test_best_match_is_the_true_pose(pose: Pose2) -> None:
-    poses, fits = GlobalSearch(grid()).search(scanned(pose))
-    off = pose.between(Pose2(*poses[0].tolist()))
-    assert np.hypot(off.x, off.y) < 0.1
-    assert abs(off.yaw) < 0.03
+    poses, fits = GlobalSearch(grid()).search(view_from(pose))
+    error = pose.between(Pose2(*poses[0].tolist()))
+    assert np.hypot(error.x, error.y) < 0.1
+    assert abs(error.yaw) < 0.03
     assert fits[0] > fits[1] + 0.05
     assert len(poses) <= MAX_RESULTS
     assert (np.diff(fits) <= 0).all()
 
 
-@pytest.mark.parametrize("pose", PLACES)
+@pytest.mark.parametrize("pose", POSES)
 def test_search_near_a_wrong_estimate_finds_the_pose(pose: Pose2) -> None:
     estimate = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
-    poses, fits = GlobalSearch(grid()).search_near(scanned(pose), estimate)
-    off = pose.between(Pose2(*poses[0].tolist()))
-    assert np.hypot(off.x, off.y) < 0.1
-    assert abs(off.yaw) < 0.03
-    assert fits[0] > GlobalSearch(grid()).score(estimate[np.newaxis], scanned(pose))[0] + 0.05
+    poses, fits = GlobalSearch(grid()).search_near(view_from(pose), estimate)
+    error = pose.between(Pose2(*poses[0].tolist()))
+    assert np.hypot(error.x, error.y) < 0.1
+    assert abs(error.yaw) < 0.03
+    assert fits[0] > GlobalSearch(grid()).score(estimate[np.newaxis], view_from(pose))[0] + 0.05
 
 
-def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
-    view = scanned(PLACES[0])
-    first, again = (GlobalSearch(grid()).search(view) for _ in range(2))
-    assert np.array_equal(first[0], again[0])
-    assert np.array_equal(first[1], again[1])
+def test_equal_scans_give_bit_identical_poses() -> None:
+    view = view_from(POSES[0])
+    first, second = (GlobalSearch(grid()).search(view) for _ in range(2))
+    assert np.array_equal(first[0], second[0])
+    assert np.array_equal(first[1], second[1])
 
 
 def test_empty_scans_find_no_pose() -> None:
@@ -59,12 +59,12 @@ def test_nearby_matches_are_merged() -> None:
 
 
 def test_scan_memory_contains_the_last_meters() -> None:
-    memory, view = ScanMemory(), scanned(PLACES[0])
+    memory, view = ScanMemory(), view_from(POSES[0])
     for meter in np.arange(0.0, 20.0, 0.5):
         memory.add(scan(np.full(8, 2.0)), Pose2(float(meter), 0.0, 0.0), 0.0, 100.0)
     assert memory.length <= MEMORY_LENGTH_M
-    view_from = memory.view_from(Pose2(19.5, 0.0, 0.0))
-    assert view_from.ends.real.min() == pytest.approx(-2.0 - memory.length)
+    recent_view = memory.view_from(Pose2(19.5, 0.0, 0.0))
+    assert recent_view.ends.real.min() == pytest.approx(-2.0 - memory.length)
     assert len(view.passed) == 3 * len(view.ends)
     memory.forget(1)
     assert memory.length == 0

@@ -12,12 +12,12 @@ from simscen.stack.localizers.particles import Particles
 from simscen.stack.localizers.sensor_models import obstacle_field
 
 NEAR = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
-"""A narrow group in the middle of the map."""
+"""Concentrated particles in the middle of the map."""
 SPREAD = np.array([[-2.0, 0.0, 0.0], [2.0, 0.0, 0.1], [0.0, 0.5, -0.1]])
 
 
 def trust() -> MapTrust:
-    """A hall of 20 x 4 m with walls above and below; nothing is known of what is on either side of it."""
+    """Return the map trust of a hall of 20 x 4 m with walls at y = ±2 m; both ends are open to unknown space."""
     cells = np.full((120, 800), UNKNOWN, dtype=np.int8)
     cells[20:100, 200:600] = FREE
     cells[[20, 99], 200:600] = OCCUPIED
@@ -26,43 +26,43 @@ def trust() -> MapTrust:
 
 
 def beams_to(ends: Plane) -> Beams:
-    """Of a lidar at the base's origin."""
+    """Return the beams of a lidar at the origin of the base."""
     return Beams(np.abs(ends), ends / np.abs(ends), 0j, 30.0)
 
 
-def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[float, list[bool] | None]:
-    """What so many beams are worth, and which of them count."""
+def scan_weight(poses: Array, on_walls: int, in_free_space: int, off_map: int) -> tuple[float, list[bool] | None]:
+    """Return the weight of a scan with these numbers of beams, and which of its beams are compared."""
     walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
-    ends = np.concatenate((walls, np.full(in_the_open, 2.0 + 0.0j), np.full(beyond, 14.0 + 0.0j)))
+    ends = np.concatenate((walls, np.full(in_free_space, 2.0 + 0.0j), np.full(off_map, 14.0 + 0.0j)))
     exponent, _, counting = trust().weight(Particles.with_equal_weights(poses), beams_to(ends))
     return exponent, None if counting is None else counting.tolist()
 
 
-def test_a_scan_that_fits_counts_in_full_with_all_its_beams() -> None:
-    assert asked(NEAR, 20, 0, 0) == (1.0, None)
+def test_scan_that_fits_the_map_has_full_weight() -> None:
+    assert scan_weight(NEAR, 20, 0, 0) == (1.0, None)
 
 
-@pytest.mark.parametrize(("on_walls", "in_the_open", "worth"), [(17, 3, 1.0), (12, 8, 3 / 7), (8, 12, 0.0)])
-def test_a_scan_of_which_few_beams_fit_counts_for_less(on_walls: int, in_the_open: int, worth: float) -> None:
-    assert asked(NEAR, on_walls, in_the_open, 0)[0] == pytest.approx(worth, abs=1e-9)
+@pytest.mark.parametrize(("on_walls", "in_free_space", "weight"), [(17, 3, 1.0), (12, 8, 3 / 7), (8, 12, 0.0)])
+def test_scan_with_few_fitting_beams_has_less_weight(on_walls: int, in_free_space: int, weight: float) -> None:
+    assert scan_weight(NEAR, on_walls, in_free_space, 0)[0] == pytest.approx(weight, abs=1e-9)
 
 
 @pytest.mark.parametrize("poses", [NEAR, SPREAD])
-def test_a_scan_that_hardly_touches_the_map_counts_for_nothing_even_if_that_fits(poses: Array) -> None:
+def test_scan_with_few_beams_on_the_map_has_no_weight(poses: Array) -> None:
     """Regression: the scan had its full weight, and moved particles from unknown rooms back into the map."""
-    assert asked(poses, 2, 0, 30)[0] == 0.0
+    assert scan_weight(poses, 2, 0, 30)[0] == 0.0
 
 
 def test_partly_mapped_scan_has_partial_weight() -> None:
-    exponent, _ = asked(NEAR, 10, 0, 10)
+    exponent, _ = scan_weight(NEAR, 10, 0, 10)
     assert exponent == pytest.approx(4 / 7, abs=1e-9)
 
 
 def test_beams_that_leave_the_map_are_not_compared() -> None:
-    assert asked(NEAR, 2, 1, 1)[1] == [True, True, True, False]
+    assert scan_weight(NEAR, 2, 1, 1)[1] == [True, True, True, False]
 
 
-def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> None:
+def test_beams_without_a_hit_are_kept_if_others_are_excluded() -> None:
     beams = Beams(np.array([1.0, 9.0, 2.0, 3.0]), np.ones(4, dtype=np.complex128), 0j, 9.0)
     kept = beams.keeping_hits(np.array([True, False, True]))
     assert kept.ranges.tolist() == [1.0, 9.0, 3.0]
@@ -74,19 +74,19 @@ def test_map_trust_uses_a_sample_of_many_particles(count: int) -> None:
     """With and without known beam ends for all particles."""
     rng = np.random.default_rng(3)
     poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
-    beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
-    worth, alone = (
+    beams, sampled_poses = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
+    weight, sampled = (
         trust().weight(Particles.with_equal_weights(poses), beams),
-        trust().weight(Particles.with_equal_weights(asked_ones), beams),
+        trust().weight(Particles.with_equal_weights(sampled_poses), beams),
     )
-    assert 0.0 < worth.fitting_share < 1.0
-    assert (worth.exponent, worth.fitting_share) == (alone.exponent, alone.fitting_share)
+    assert 0.0 < weight.fitting_share < 1.0
+    assert (weight.exponent, weight.fitting_share) == (sampled.exponent, sampled.fitting_share)
 
 
 def test_beam_ends_are_computed_for_the_requested_poses() -> None:
     grid = OccupancyGrid(np.full((80, 80), FREE, dtype=np.int8), 0.1, Pose2(-4.0, -4.0, 0.0))
     field, beams = obstacle_field(grid, 2.0), beams_to(np.array([1.0 + 1.0j, -2.0 + 0.3j]))
-    here, there = np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]])
-    for poses, first in ((here, (50, 50)), (there, (55, 50)), (here, (50, 50)), (there, (55, 50))):
+    origin, shifted = np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]])
+    for poses, first in ((origin, (50, 50)), (shifted, (55, 50)), (origin, (50, 50)), (shifted, (55, 50))):
         column, row = first
         assert beams.cells(field, poses)[0, 0] == (row + 1) * 82 + column + 1

@@ -10,44 +10,44 @@ from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.sensor_models import obstacle_field
 
 WALL = 4.05
-"""m: the x of the middles of a wall's cells."""
+"""x in m of the centers of the wall's cells."""
 SIGMA = 0.1
 
 
-def misfit(*ends: float, beyond: bool = False) -> ScanResiduals | None:
-    """Of beams along x from the map's corner, which end at so many m."""
+def residuals(*ends: float, unmapped: bool = False) -> ScanResiduals | None:
+    """Return the residuals of beams along x that end at these distances in m from the corner of the map."""
     cells = np.full((40, 60), FREE, dtype=np.int8)
     cells[:, 40] = OCCUPIED
     field = obstacle_field(OccupancyGrid(cells, 0.1, Pose2(0.0, 0.0, 0.0)), 2.0)
-    says = np.full(field.table.shape, beyond)
+    is_unmapped = np.full(field.table.shape, unmapped)
     ranges = np.array(ends)
     beams = Beams(ranges, np.ones(len(ends), dtype=np.complex128), 0j, 10.0)
-    return MapResiduals(field, says, 0.5, 0.5, SIGMA).residuals(beams, Pose2(0.0, 2.0, 0.0))
+    return MapResiduals(field, is_unmapped, 0.5, 0.5, SIGMA).residuals(beams, Pose2(0.0, 2.0, 0.0))
 
 
-def explained(away: float) -> float:
-    """The probability that a beam hit the wall, by Bayes."""
-    hit = 0.5 * np.exp(-((away / SIGMA) ** 2) / 2)
+def explained(distance: float) -> float:
+    """Return the posterior probability that a beam with this distance from the wall hit it."""
+    hit = 0.5 * np.exp(-((distance / SIGMA) ** 2) / 2)
     return float(hit / (hit + 0.5 / 10.0))
 
 
-def test_beams_that_end_at_the_wall_are_off_by_nothing() -> None:
-    assert misfit(WALL, WALL) == pytest.approx((explained(0.0), 0.0))
+def test_beams_that_end_at_the_wall_have_no_residual() -> None:
+    assert residuals(WALL, WALL) == pytest.approx((explained(0.0), 0.0))
 
 
-@pytest.mark.parametrize("away", [0.1, 0.2])
-def test_beams_count_for_what_they_are_off_by_as_far_as_the_map_explains_them(away: float) -> None:
-    share = explained(away)
-    assert misfit(WALL - away) == pytest.approx((share, (share * away / SIGMA) ** 2), rel=1e-3)
+@pytest.mark.parametrize("distance", [0.1, 0.2])
+def test_residual_is_weighted_by_the_probability_that_the_beam_hit_the_wall(distance: float) -> None:
+    share = explained(distance)
+    assert residuals(WALL - distance) == pytest.approx((share, (share * distance / SIGMA) ** 2), rel=1e-3)
 
 
 def test_person_far_from_walls_counts_as_unexplained() -> None:
-    found = misfit(WALL, 2.0)
+    found = residuals(WALL, 2.0)
     assert found is not None
     assert found.explained == pytest.approx(explained(0.0) / 2)
     assert found.mean_square == pytest.approx(0.0, abs=1e-9)
 
 
 def test_unknown_space_gives_no_residuals() -> None:
-    assert misfit(WALL, beyond=True) is None
-    assert misfit(10.0) is None
+    assert residuals(WALL, unmapped=True) is None
+    assert residuals(10.0) is None

@@ -19,10 +19,10 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     """Return the poses (n, 3) of particles that all started at the origin."""
     spec = ScanMatchingAmcl()
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
-    subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
-    subject.reset(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    subject.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
-    return subject.particles.poses
+    pf = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
+    pf.reset(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    pf.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
+    return pf.particles.poses
 
 
 def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
@@ -32,24 +32,24 @@ def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
 
 
-def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
+def test_some_particles_rotate_with_odometry_if_scan_matching_disagrees() -> None:
     poses = poses_after(Pose2(0.0, 0.0, 0.3), Pose2(0.0, 0.0, 0.5))
     by_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
     assert 0.4 < np.median(poses[by_odometry, 2]) < 0.6
 
 
-@pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
-def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalization: str, stays: bool) -> None:
-    """For a group of particles that no longer fits the scans."""
+@pytest.mark.parametrize(("relocalization", "stay_together"), [("scan_matching", True), ("random", False)])
+def test_random_particles_are_added_only_by_random_relocalization(relocalization: str, stay_together: bool) -> None:
+    """The particles no longer fit the scans."""
     spec = ScanMatchingAmcl.model_validate({
         "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,
         "map_trust_full": 0.0, "settling_distance": 0.0,
     })  # fmt: skip
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
-    subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
-    subject.reset(Estimate(START, (0.05, 0.05, 0.02)))
+    pf = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
+    pf.reset(Estimate(START, (0.05, 0.05, 0.02)))
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
     for pose in [START] * 5 + [ELSEWHERE] * 5:
-        subject.correct(scan(cast(np.array([pose]), angles)[0]))
-    assert subject.particles.are_within(1.5) is stays
+        pf.correct(scan(cast(np.array([pose]), angles)[0]))
+    assert pf.particles.are_within(1.5) is stay_together

@@ -1,4 +1,4 @@
-"""Tests of the tempered likelihood field and of where a map ends."""
+"""Tests of the tempered likelihood field and of the border of a map."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2
 
 
 @pytest.mark.parametrize(("resolution", "unknown"), [(0.1, 0.5), (0.1, 0.97), (0.3, 0.9), (1.5, 0.5), (0.1, 0.0)])
-def test_the_map_ends_in_unknown_cells_next_to_free_ones(resolution: float, unknown: float) -> None:
-    """It also ends more than a meter behind a wall."""
+def test_map_ends_at_unknown_cells_next_to_free_cells(resolution: float, unknown: float) -> None:
+    """It also ends at unknown cells more than a meter behind a wall."""
     rng = np.random.default_rng(3)
     cells = np.where(rng.random((40, 30)) < 0.5, FREE, OCCUPIED)
     cells[rng.random((40, 30)) < unknown] = UNKNOWN

@@ -16,30 +16,31 @@ from simscen.stack.localizers.sensor_models import obstacle_field
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 START = Pose2(-2.5, -1.8, 0.6)
-OFF = Pose2(0.4, -0.3, 0.15)
+ERROR = Pose2(0.4, -0.3, 0.15)
 
 
-def corner_of_the_map() -> OccupancyGrid:
-    """The room only around START: of what is seen there the map shows less than half."""
+def map_around_start() -> OccupancyGrid:
+    """Return the map of the corner around START only, which shows less than half of the surfaces seen there."""
     cells = grid().cells.copy()
     cells[:, grid().shape[1] * 35 // 100 :] = UNKNOWN
     cells[grid().shape[0] * 40 // 100 :] = UNKNOWN
     return OccupancyGrid(cells, grid().resolution, grid().origin)
 
 
-def found(
-    off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, estimated: Pose2 = Pose2(0, 0, 0),
+def relocalizations(
+    error: Pose2, spacing: float = 0.25, distance: float = 2.0, settling: float = 0.0, initial: Pose2 = Pose2(0, 0, 0),
     std: tuple[float, float, float] = (0.5, 0.5, 0.26), map_: OccupancyGrid | None = None, turn: float = 0.0,
 ) -> list[Array]:  # fmt: skip
-    """Return where a robot is put that believes to be `off`.
+    """Return the remaining errors after each relocalization of a robot whose belief is off by `error`.
 
-    It starts at START and drives some `way` with a curvature `turn` (rad/m), with scans so many m `apart`. It was
-    `estimated` to be that far off, with standard deviations `std`.
+    It drives `distance` m from START with a curvature `turn` (rad/m) and a scan every `spacing` m. `initial` and
+    `std` are error and standard deviations of the initial estimate.
     """
     known = map_ or grid()
     trust = MapTrust(obstacle_field(known, 2.0), unmapped_cells(known).ravel(), 0.45, 0.8)
-    finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(estimated), std), settling), []
-    for driven in np.arange(0.0, way, apart).tolist():
+    finder = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(initial), std), settling)
+    offsets = []
+    for driven in np.arange(0.0, distance, spacing).tolist():
         base = (
             Pose2(driven, 0.0, 0.0)
             if not turn
@@ -47,86 +48,87 @@ def found(
         )
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        put = finder.update(scan(ranges), base, pose.compose(off), (0.0, 100.0))
-        if put is not None:
-            places.append(np.array(pose.between(Pose2(*put[0][0].tolist()))))
-    return places
+        poses = finder.update(scan(ranges), base, pose.compose(error), (0.0, 100.0))
+        if poses is not None:
+            offsets.append(np.array(pose.between(Pose2(*poses[0][0].tolist()))))
+    return offsets
 
 
 def test_wrong_pose_is_corrected_by_recent_scans() -> None:
-    (place,) = found(OFF)
-    assert np.hypot(place[0], place[1]) < 0.1
-    assert abs(place[2]) < 0.03
+    (offset,) = relocalizations(ERROR)
+    assert np.hypot(offset[0], offset[1]) < 0.1
+    assert abs(offset[2]) < 0.03
 
 
-@pytest.mark.parametrize("off", [Pose2(0, 0, 0), Pose2(0.05, -0.05, 0.02)])
-def test_certain_pose_is_not_corrected(off: Pose2) -> None:
-    assert found(off) == []
+@pytest.mark.parametrize("error", [Pose2(0, 0, 0), Pose2(0.05, -0.05, 0.02)])
+def test_certain_pose_is_not_corrected(error: Pose2) -> None:
+    assert relocalizations(error) == []
 
 
-@pytest.mark.parametrize("apart", [0.25, 1.0], ids=["dense", "sparse"])
-def test_robot_returning_to_the_map_is_relocalized(apart: float) -> None:
+@pytest.mark.parametrize("spacing", [0.25, 1.0], ids=["dense", "sparse"])
+def test_robot_returning_to_the_map_is_relocalized(spacing: float) -> None:
     """The distance driven outside the map counts, not the number of scans."""
-    place = found(Pose2(40.0, 3.0, 0.7), apart=apart, way=11.0, turn=0.5)[0]
-    assert np.hypot(place[0], place[1]) < 0.1
-    assert abs(place[2]) < 0.03
+    offset = relocalizations(Pose2(40.0, 3.0, 0.7), spacing=spacing, distance=11.0, turn=0.5)[0]
+    assert np.hypot(offset[0], offset[1]) < 0.1
+    assert abs(offset[2]) < 0.03
 
 
 def test_particles_return_to_the_initial_pose_if_scans_fit_there() -> None:
-    """Until 1.5 m were driven nobody asked, and then only for a place that fits 0.82."""
-    place = found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=4.0)[0]
-    assert np.hypot(place[0], place[1]) < 0.15
-    assert abs(place[2]) < 0.05
+    """Regression: relocalization started after 1.5 m, and only for poses with a fit of 0.82."""
+    offset = relocalizations(Pose2(0.9, -0.5, 0.1), distance=0.3, settling=4.0)[0]
+    assert np.hypot(offset[0], offset[1]) < 0.15
+    assert abs(offset[2]) < 0.05
 
 
-@pytest.mark.parametrize(("off", "places"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
-def test_particles_stay_at_the_initial_pose_on_a_sparse_map(off: Pose2, places: int) -> None:
+@pytest.mark.parametrize(("error", "count"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
+def test_particles_stay_at_the_initial_pose_on_a_sparse_map(error: Pose2, count: int) -> None:
     """Regression: few mapped beams moved the particles by 4.9 m, although scan matching measured the motion."""
-    put = found(off, way=0.3, settling=4.0, map_=corner_of_the_map())
-    assert [np.abs(place).max() < 1e-9 for place in put[:1]] == [True] * places
+    offsets = relocalizations(error, distance=0.3, settling=4.0, map_=map_around_start())
+    assert [np.abs(offset).max() < 1e-9 for offset in offsets[:1]] == [True] * count
 
 
 def test_initial_pose_counts_only_for_the_settling_distance() -> None:
-    assert found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=0.0) == []
+    assert relocalizations(Pose2(0.9, -0.5, 0.1), distance=0.3, settling=0.0) == []
 
 
 def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
     """Regression: on a rebuilt floor, scans over 0.7 m matched a room 11 m away by chance."""
-    away = Pose2(3.0, 2.0, 2.5)
-    assert found(away, way=3.0) == []
-    (place,) = found(away, way=4.25)[:1]
-    assert np.hypot(place[0], place[1]) < 0.1
+    error = Pose2(3.0, 2.0, 2.5)
+    assert relocalizations(error, distance=3.0) == []
+    (offset,) = relocalizations(error, distance=4.25)[:1]
+    assert np.hypot(offset[0], offset[1]) < 0.1
 
 
-@pytest.mark.parametrize(("parted", "found_again"), [(True, True), (False, False)])
-def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: bool) -> None:
+@pytest.mark.parametrize(("is_detected", "is_relocalized"), [(True, True), (False, False)])
+def test_detected_kidnapping_clears_the_scan_memory(is_detected: bool, is_relocalized: bool) -> None:
     """Scans from before the kidnapping would make the correct pose fit no better than others."""
     trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
-    finder, there, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
+    finder, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), []
+    target = Pose2(3.9, -0.2, 2.17)
     step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
     for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
-        base, carried = Pose2(driven, 0.0, 0.0), k >= 8
-        pose = there.compose(Pose2(driven - 2.0, 0.0, 0.0)) if carried else START.compose(base)
+        base, is_moved = Pose2(driven, 0.0, 0.0), k >= 8
+        pose = target.compose(Pose2(driven - 2.0, 0.0, 0.0)) if is_moved else START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        way = ObservedMotion(step=None if k == 8 else step, was_carried=parted and k == 8)
-        put = finder.update(scan(ranges), base, START.compose(base), (0.0, 100.0), way)
-        if put is not None:
-            puts.append(pose.between(Pose2(*put[0][0].tolist())))
-    assert any(np.hypot(off.x, off.y) < 0.1 for off in puts) is found_again
+        motion = ObservedMotion(step=None if k == 8 else step, was_carried=is_detected and k == 8)
+        poses = finder.update(scan(ranges), base, START.compose(base), (0.0, 100.0), motion)
+        if poses is not None:
+            offsets.append(pose.between(Pose2(*poses[0][0].tolist())))
+    assert any(np.hypot(offset.x, offset.y) < 0.1 for offset in offsets) is is_relocalized
 
 
-@pytest.mark.parametrize("carried_off", [True, False])
-def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(carried_off: bool) -> None:
+@pytest.mark.parametrize("is_kidnapped", [True, False])
+def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(is_kidnapped: bool) -> None:
     """Unmapped rooms look like mapped ones, so a robot that left the map needs stronger evidence."""
     trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
-    finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
+    finder, error, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
     for k, driven in enumerate([0.25 * k for k in range(44)]):
         base = Pose2(2 * np.sin(driven / 2), 2 * (1 - np.cos(driven / 2)), driven / 2)  # a circle
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         ranges[::6] *= 0.5  # people
-        way = ObservedMotion(was_carried=carried_off and k == 1)
-        put = finder.update(scan(ranges), base, pose.compose(away), (0.0, 100.0), way)
-        if put is not None:
-            puts.append(pose.between(Pose2(*put[0][0].tolist())))
-    assert [np.hypot(off.x, off.y) < 0.1 for off in puts[:1]] == [True] * carried_off
+        motion = ObservedMotion(was_carried=is_kidnapped and k == 1)
+        poses = finder.update(scan(ranges), base, pose.compose(error), (0.0, 100.0), motion)
+        if poses is not None:
+            offsets.append(pose.between(Pose2(*poses[0][0].tolist())))
+    assert [np.hypot(offset.x, offset.y) < 0.1 for offset in offsets[:1]] == [True] * is_kidnapped

@@ -17,7 +17,7 @@ def view(pose: Pose2, boxes: np.ndarray | None = None) -> Scan:
     return scan(cast(*arguments)[0])
 
 
-def stepped(guess: Pose2, before: Scan, after: Scan) -> Step | None:
+def match(guess: Pose2, before: Scan, after: Scan) -> Step | None:
     matcher = ScanMatcher()
     matcher.step(before, Pose2(0, 0, 0))
     return matcher.step(after, guess)
@@ -25,16 +25,16 @@ def stepped(guess: Pose2, before: Scan, after: Scan) -> Step | None:
 
 @pytest.mark.parametrize("guess", [STEP, Pose2(0.4, 0.0, 0.2), Pose2(0.2, 0.0, 0.05)])
 def test_scan_matching_measures_a_step_to_a_centimeter_despite_slip(guess: Pose2) -> None:
-    step = stepped(guess, view(START), view(START.compose(STEP)))
+    step = match(guess, view(START), view(START.compose(STEP)))
     assert step is not None
-    off = STEP.between(step.delta)
-    assert np.hypot(off.x, off.y) < 0.02
-    assert abs(off.yaw) < 0.006
+    error = STEP.between(step.delta)
+    assert np.hypot(error.x, error.y) < 0.02
+    assert abs(error.yaw) < 0.006
 
 
 def test_odometry_determines_motion_along_an_endless_corridor() -> None:
     walls = np.array([(-100.0, 1.0, 100.0, 1.1), (-100.0, -1.1, 100.0, -1.0)])
-    step = stepped(Pose2(0.3, 0.1, 0.0), view(Pose2(0, 0, 0), walls), view(Pose2(0.25, 0, 0), walls))
+    step = match(Pose2(0.3, 0.1, 0.0), view(Pose2(0, 0, 0), walls), view(Pose2(0.25, 0, 0), walls))
     assert step is not None
     assert step.delta.x == pytest.approx(0.3, abs=0.01)
     assert step.delta.y == pytest.approx(0.0, abs=0.01)
@@ -45,37 +45,37 @@ def test_odometry_determines_motion_along_an_endless_corridor() -> None:
 def test_person_ahead_in_a_corridor_does_not_bias_the_match(wheels: float) -> None:
     """Regression: the person outvoted the wall at the end of the corridor, and scans showed 0.03 m of motion."""
     corridor = (-100.0, 1.0, 9.0, 1.1), (-100.0, -1.1, 9.0, -1.0), (9.0, -1.1, 9.1, 1.1)
-    before, after = (np.array([*corridor, (2.0 + gone, -0.2, 2.3 + gone, 0.2)]) for gone in (0.0, 0.25))
-    step = stepped(Pose2(wheels, 0, 0), view(Pose2(0, 0, 0), before), view(Pose2(0.25, 0, 0), after))
+    before, after = (np.array([*corridor, (2.0 + shift, -0.2, 2.3 + shift, 0.2)]) for shift in (0.0, 0.25))
+    step = match(Pose2(wheels, 0, 0), view(Pose2(0, 0, 0), before), view(Pose2(0.25, 0, 0), after))
     assert step is not None
     assert tuple(step.delta) == pytest.approx((wheels, 0.0, 0.0), abs=0.01)
 
 
 @pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(BEAMS, np.nan), np.full(40, 2.0), np.empty(0)])
 def test_scans_without_surfaces_give_no_match(ranges: np.ndarray) -> None:
-    assert stepped(STEP, scan(ranges), scan(ranges)) is None
-    assert stepped(STEP, view(START), scan(ranges)) is None
+    assert match(STEP, scan(ranges), scan(ranges)) is None
+    assert match(STEP, view(START), scan(ranges)) is None
 
 
 ELSEWHERE = Pose2(3.9, -0.2, 2.4)
 
 
 @pytest.mark.parametrize(
-    ("pose", "parted"),
+    ("pose", "expected"),
     [(START.compose(STEP), False), (START.compose(Pose2(0.3, 0.02, 0.4)), False), (ELSEWHERE, True)],
-    ids=["as the wheels say", "wheels that slip", "elsewhere"],
+    ids=["as in odometry", "wheel slip", "kidnapped"],
 )
-def test_kidnapped_robot_sees_no_known_surfaces(pose: Pose2, parted: bool) -> None:
+def test_kidnapped_robot_sees_no_known_surfaces(pose: Pose2, expected: bool) -> None:
     matcher = ScanMatcher()
     matcher.step(view(START), Pose2(0, 0, 0))
     assert matcher.was_carried is None
     matcher.step(view(pose), STEP)
-    assert matcher.was_carried is parted
+    assert matcher.was_carried is expected
     matcher.step(view(pose.compose(STEP)), STEP)
     assert matcher.was_carried is False
 
 
-@pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(40, 2.0)], ids=["blind", "coarse"])
+@pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(40, 2.0)], ids=["no returns", "40 beams"])
 def test_empty_scan_does_not_indicate_a_kidnapping(ranges: np.ndarray) -> None:
     matcher = ScanMatcher()
     matcher.step(scan(ranges), Pose2(0, 0, 0))
@@ -90,7 +90,7 @@ def test_particles_follow_a_step_with_its_covariance() -> None:
     assert poses.std(axis=0) == pytest.approx((0.02, 0.1, 0.01), rel=0.03)
 
 
-def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
+def test_particle_spread_equals_the_covariance_of_the_step() -> None:
     """Three particles with unit normal numbers: their differences give the covariance."""
 
     class Ones(np.random.Generator):
@@ -102,18 +102,16 @@ def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
         root = rng.normal(size=(3, 3)) * 0.05
         covariance, delta = root @ root.T + np.diag((1e-6, 1e-6, 1e-6)), Pose2(0.3, 0.1, -0.2)
         after = sample_step(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
-        off = (after - np.array(delta)).T
-        assert off @ off.T == pytest.approx(covariance, rel=1e-9, abs=1e-15)
+        error = (after - np.array(delta)).T
+        assert error @ error.T == pytest.approx(covariance, rel=1e-9, abs=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("guess", "parted"), [(STEP, True), (Pose2(1.0, 0.0, 0.15), None), (Pose2(0.3, 0.02, 1.0), None)]
+    ("guess", "expected"), [(STEP, True), (Pose2(1.0, 0.0, 0.15), None), (Pose2(0.3, 0.02, 1.0), None)]
 )
-def test_little_overlap_after_a_long_step_does_not_mean_that_the_robot_was_carried(
-    guess: Pose2, parted: bool | None
-) -> None:
+def test_little_overlap_after_a_long_step_is_not_a_kidnapping(guess: Pose2, expected: bool | None) -> None:
     """Sparse scans around a corner share little. Odometry reports this step, but not that a robot is carried."""
     matcher = ScanMatcher()
     matcher.step(view(START), Pose2(0, 0, 0))
     matcher.step(view(ELSEWHERE), guess)
-    assert matcher.was_carried is parted
+    assert matcher.was_carried is expected

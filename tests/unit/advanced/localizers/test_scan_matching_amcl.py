@@ -26,7 +26,7 @@ SKIPPING = ScanMatchingAmcl(sure_update_interval=2, settling_distance=0.0)
 KNOWN = Estimate(START, (0.05, 0.05, 0.02))
 
 
-def seen(pose: Pose2, tick: int) -> Scan:
+def scan_from(pose: Pose2, tick: int) -> Scan:
     return scan(cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0], tick)
 
 
@@ -34,19 +34,19 @@ def odometry(tick: int, pose: Pose2) -> Odometry:
     return Odometry("odom", tick, pose, Twist())
 
 
-def started(spec: ScanMatchingAmcl) -> Localizer:
+def started_localizer(spec: ScanMatchingAmcl) -> Localizer:
     """Return a localizer that has received its first odometry and its first scan."""
-    subject = build_localizer(spec, GUESS, 1)
-    subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
-    subject.on_scan(seen(START, 0))
-    return subject
+    localizer = build_localizer(spec, GUESS, 1)
+    localizer.on_odometry(odometry(0, Pose2(0, 0, 0)))
+    localizer.on_scan(scan_from(START, 0))
+    return localizer
 
 
-def moved(subject: Localizer, tick: int, step: Pose2) -> Belief:
+def belief_after(localizer: Localizer, tick: int, step: Pose2) -> Belief:
     """Return the belief after a step from the start with exact odometry."""
-    subject.on_odometry(odometry(tick, step))
-    subject.on_scan(seen(START.compose(step), tick))
-    return subject.belief
+    localizer.on_odometry(odometry(tick, step))
+    localizer.on_scan(scan_from(START.compose(step), tick))
+    return localizer.belief
 
 
 @pytest.fixture
@@ -55,60 +55,60 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     ticks: list[int] = []
     correct = ParticleFilter.correct
 
-    def watched(self: ParticleFilter, scan: Scan) -> tuple[Pose2, Array] | None:
+    def recorded(self: ParticleFilter, scan: Scan) -> tuple[Pose2, Array] | None:
         ticks.append(scan.tick)
         return correct(self, scan)
 
-    monkeypatch.setattr(ParticleFilter, "correct", watched)
+    monkeypatch.setattr(ParticleFilter, "correct", recorded)
     return ticks
 
 
 @pytest.mark.parametrize("interval", [1, 2, 3])
 def test_a_certain_robot_compares_every_nth_scan_with_the_map(interval: int, compared: list[int]) -> None:
-    driven = drive(20.0)
+    log = drive(20.0)
     spec = SKIPPING.model_copy(update={"sure_update_interval": interval})
-    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
-    looked_at = list(dict.fromkeys(belief.updated for belief in beliefs))
-    assert compared == looked_at[: CERTAIN_AFTER_UPDATES + 1] + looked_at[CERTAIN_AFTER_UPDATES + interval :: interval]
+    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*log.truth[0]), KNOWN.std), 1), log, 1)
+    updates = list(dict.fromkeys(belief.updated for belief in beliefs))
+    assert compared == updates[: CERTAIN_AFTER_UPDATES + 1] + updates[CERTAIN_AFTER_UPDATES + interval :: interval]
 
 
 @pytest.mark.parametrize("std", [1.0, 0.1])
 def test_a_scan_that_overlaps_little_is_compared_with_the_map(std: float, compared: list[int]) -> None:
     """A robot that is unsure of its pose needs each scan, above all where consecutive scans have little in common."""
-    subject = build_localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
+    localizer = build_localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
     for tick, meters in ((0, 0.0), (24, 0.26), (48, 0.52)):
-        there = Pose2(meters, 0.0, 0.0)
-        view = seen(START.compose(there), tick)
+        base = Pose2(meters, 0.0, 0.0)
+        view = scan_from(START.compose(base), tick)
         if tick == 24:
             view.ranges[: BEAMS // 2] = 0.3
-        subject.on_odometry(odometry(tick, there))
-        subject.on_scan(view)
+        localizer.on_odometry(odometry(tick, base))
+        localizer.on_scan(view)
     assert compared == [0, 24, 48]
 
 
 def test_covariance_estimation_compares_every_scan(compared: list[int]) -> None:
-    driven = drive(10.0)
+    log = drive(10.0)
     spec = SKIPPING.model_copy(update={"covariance": "scatter"})
-    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
+    beliefs = run_localizer(build_localizer(spec, Estimate(Pose2(*log.truth[0]), KNOWN.std), 1), log, 1)
     assert compared == list(dict.fromkeys(belief.updated for belief in beliefs))
     assert len(compared) > CERTAIN_AFTER_UPDATES + 4
 
 
-def turning(subject: Localizer, until: int) -> None:
+def turning(localizer: Localizer, until: int) -> None:
     for k in range(until):
-        moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
+        belief_after(localizer, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
 
 
 def test_a_skipped_scan_still_measures_the_motion(compared: list[int]) -> None:
-    """Odometry that is 2 cm off does not count as disagreement, and does not move the pose either."""
-    subject = build_localizer(SKIPPING, KNOWN, 1)
-    turning(subject, CERTAIN_AFTER_UPDATES + 1)
-    before, tick = subject.belief, 24 * (CERTAIN_AFTER_UPDATES + 1)
-    said = Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
-    truth = START.compose(said).compose(Pose2(0.02, 0.0, 0.0))
-    subject.on_odometry(odometry(tick, said))
-    subject.on_scan(seen(truth, tick))
-    after = subject.belief
+    """Odometry with an error of 2 cm neither counts as disagreement nor moves the pose."""
+    localizer = build_localizer(SKIPPING, KNOWN, 1)
+    turning(localizer, CERTAIN_AFTER_UPDATES + 1)
+    before, tick = localizer.belief, 24 * (CERTAIN_AFTER_UPDATES + 1)
+    reported = Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
+    truth = START.compose(reported).compose(Pose2(0.02, 0.0, 0.0))
+    localizer.on_odometry(odometry(tick, reported))
+    localizer.on_scan(scan_from(truth, tick))
+    after = localizer.belief
     assert after.updated == tick
     assert tick not in compared
     drifted = (
@@ -121,44 +121,44 @@ def test_a_skipped_scan_still_measures_the_motion(compared: list[int]) -> None:
 
 
 def test_slipping_wheels_end_the_skipping_at_once(compared: list[int]) -> None:
-    subject = build_localizer(SKIPPING, KNOWN, 1)
-    turning(subject, CERTAIN_AFTER_UPDATES + 1)
-    tick, said = 24 * (CERTAIN_AFTER_UPDATES + 1), Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
-    slipped = said.compose(Pose2(0.3, 0.0, 0.0))
-    subject.on_odometry(odometry(tick, said))
-    subject.on_scan(seen(START.compose(slipped), tick))
+    localizer = build_localizer(SKIPPING, KNOWN, 1)
+    turning(localizer, CERTAIN_AFTER_UPDATES + 1)
+    tick, reported = 24 * (CERTAIN_AFTER_UPDATES + 1), Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
+    slipped = reported.compose(Pose2(0.3, 0.0, 0.0))
+    localizer.on_odometry(odometry(tick, reported))
+    localizer.on_scan(scan_from(START.compose(slipped), tick))
     assert compared[-1] == tick
-    assert math.dist(START.compose(slipped)[:2], subject.belief.pose[:2]) < 0.1
+    assert math.dist(START.compose(slipped)[:2], localizer.belief.pose[:2]) < 0.1
 
 
-@pytest.mark.parametrize("strange_at", [CERTAIN_AFTER_UPDATES + 3, CERTAIN_AFTER_UPDATES + 4])
-def test_a_scan_that_does_not_fit_the_map_ends_the_skipping(strange_at: int, compared: list[int]) -> None:
-    subject = build_localizer(SKIPPING, KNOWN, 1)
+@pytest.mark.parametrize("misfit_at", [CERTAIN_AFTER_UPDATES + 3, CERTAIN_AFTER_UPDATES + 4])
+def test_a_scan_that_does_not_fit_the_map_ends_the_skipping(misfit_at: int, compared: list[int]) -> None:
+    localizer = build_localizer(SKIPPING, KNOWN, 1)
     for k in range(CERTAIN_AFTER_UPDATES + 10):
         step = Pose2(0.0, 0.0, 0.26 * k)
-        here = seen(START.compose(step), 24 * k)
-        subject.on_odometry(odometry(24 * k, step))
-        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if k == strange_at else here)
+        view = scan_from(START.compose(step), 24 * k)
+        localizer.on_odometry(odometry(24 * k, step))
+        localizer.on_scan(replace(view, ranges=np.full_like(view.ranges, 1.2)) if k == misfit_at else view)
     numbers = [tick // 24 for tick in compared]
-    sure = [k for k in range(CERTAIN_AFTER_UPDATES + 1, strange_at) if (k - CERTAIN_AFTER_UPDATES) % 2]
-    assert numbers == [k for k in range(CERTAIN_AFTER_UPDATES + 10) if k not in sure]
+    skipped = [k for k in range(CERTAIN_AFTER_UPDATES + 1, misfit_at) if (k - CERTAIN_AFTER_UPDATES) % 2]
+    assert numbers == [k for k in range(CERTAIN_AFTER_UPDATES + 10) if k not in skipped]
 
 
 def test_in_unknown_space_the_pose_follows_the_scans_and_not_slipping_wheels() -> None:
     unknown = replace(grid(), cells=np.full_like(grid().cells, UNKNOWN))
-    subject = scan_matching_amcl(
+    localizer = scan_matching_amcl(
         ScanMatchingAmcl(), Setting(replace(surroundings(), map=unknown), "localizer", Streams(1))
     )
-    subject.reset(Estimate(START, (0.01, 0.01, 0.01)))
+    localizer.reset(Estimate(START, (0.01, 0.01, 0.01)))
     for k in range(8):
-        subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0.03 * k, 0.04 * k)))
-        subject.on_scan(seen(START.compose(Pose2(0.26 * k, 0.0, 0.0)), 24 * k))
-    off = START.compose(Pose2(0.26 * 7, 0.0, 0.0)).between(subject.belief.pose)
+        localizer.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0.03 * k, 0.04 * k)))
+        localizer.on_scan(scan_from(START.compose(Pose2(0.26 * k, 0.0, 0.0)), 24 * k))
+    off = START.compose(Pose2(0.26 * 7, 0.0, 0.0)).between(localizer.belief.pose)
     assert np.hypot(off.x, off.y) < 0.06
     assert abs(off.yaw) < 0.03
 
 
 def test_the_first_scan_has_little_weight_beside_the_initial_pose() -> None:
-    settling, at_once = (started(ScanMatchingAmcl(settling_distance=meters)).belief for meters in (4.0, 0.0))
+    settling, at_once = (started_localizer(ScanMatchingAmcl(settling_distance=meters)).belief for meters in (4.0, 0.0))
     assert np.trace(settling.covariance) > 1.5 * np.trace(at_once.covariance)
     assert np.hypot(*(np.array(START) - settling.pose)[:2]) < 0.2

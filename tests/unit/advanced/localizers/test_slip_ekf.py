@@ -16,85 +16,85 @@ STD = np.array([0.1, 0.1, 0.05])
 """Standard deviations of the initial pose: m, m, rad."""
 SPEC = SlipEkf(type="slip_ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)
-SILENT = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
+NO_NOISE = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
 
 def ekf(estimate: Estimate) -> Localizer:
     return build_localizer(SPEC, estimate, 1)
 
 
-def feed(subject: Localizer, steps: int, step: Pose2, rate: float | None) -> None:
-    """Steps of 1/40 s; the gyroscope says `rate` in rad/s."""
+def feed(localizer: Localizer, steps: int, step: Pose2, rate: float | None) -> None:
+    """Feed odometry steps of 1/40 s and gyroscope readings of `rate` in rad/s."""
     pose = Pose2(0, 0, 0)
     for k in range(steps + 1):
         if rate is not None:
-            subject.on_imu(Imu("imu", 6 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
-        subject.on_odometry(Odometry("odom", 6 * k, pose, Twist()))
+            localizer.on_imu(Imu("imu", 6 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
+        localizer.on_odometry(Odometry("odom", 6 * k, pose, Twist()))
         pose = pose.compose(step)
 
 
 @pytest.mark.parametrize("imu", [False, True])
 def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
-    way = drive(30.0)
-    subject = ekf(Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
-    assert np.abs(pose_errors(run_localizer(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
+    log = drive(30.0)
+    localizer = ekf(Estimate(Pose2(*log.truth[0]), (0.0, 0.0, 0.0)))
+    assert np.abs(pose_errors(run_localizer(localizer, log, 1, NO_NOISE, imu=imu), log.truth)).max() < 1e-6
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("imu", [False, True])
 def test_covariance_is_consistent_with_the_errors(imu: bool, is_quick: bool) -> None:
     """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
-    way, values, runs = drive(10.0), [], 15 if is_quick else 50
+    log, values, runs = drive(10.0), [], 15 if is_quick else 50
     for seed in range(runs):
-        start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
-        subject = ekf(Estimate(start, (STD[0], STD[1], STD[2])))
-        beliefs = run_localizer(subject, way, seed, AS_SPECIFIED, imu=imu)
-        values.append(nees(beliefs[-1], pose_errors(beliefs, way.truth)[-1]))
+        start = Pose2(*(log.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
+        localizer = ekf(Estimate(start, (STD[0], STD[1], STD[2])))
+        beliefs = run_localizer(localizer, log, seed, AS_SPECIFIED, imu=imu)
+        values.append(nees(beliefs[-1], pose_errors(beliefs, log.truth)[-1]))
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs)
     assert low <= np.sum(values) <= high
 
 
-def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
+def test_gyroscope_without_rotation_outweighs_slipping_wheels() -> None:
     """The wheels measure 1 rad/s and the gyroscope 0 rad/s, which is far more precise."""
-    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
-    feed(subject, 40, Pose2(0.0125, 0, 0.025), 0.0)
-    alone = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
-    feed(alone, 40, Pose2(0.0125, 0, 0.025), None)
-    assert alone.belief.pose.yaw == pytest.approx(1.0)
-    assert abs(subject.belief.pose.yaw) < 0.1
-    assert subject.belief.covariance[2, 2] < alone.belief.covariance[2, 2]
+    localizer = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(localizer, 40, Pose2(0.0125, 0, 0.025), 0.0)
+    wheels_only = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(wheels_only, 40, Pose2(0.0125, 0, 0.025), None)
+    assert wheels_only.belief.pose.yaw == pytest.approx(1.0)
+    assert abs(localizer.belief.pose.yaw) < 0.1
+    assert localizer.belief.covariance[2, 2] < wheels_only.belief.covariance[2, 2]
 
 
-def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
+def test_gyroscope_bias_is_estimated_at_standstill() -> None:
     """Without the estimate of the bias, the heading would be wrong by 0.04 rad."""
-    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
-    feed(subject, 400, Pose2(0, 0, 0), 0.004)
-    assert abs(subject.belief.pose.yaw) < 2e-4
-    assert abs(subject.belief.pose.yaw) < 3 * subject.belief.covariance[2, 2] ** 0.5
+    localizer = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(localizer, 400, Pose2(0, 0, 0), 0.004)
+    assert abs(localizer.belief.pose.yaw) < 2e-4
+    assert abs(localizer.belief.pose.yaw) < 3 * localizer.belief.covariance[2, 2] ** 0.5
 
 
 def test_corrected_turn_also_corrects_the_path() -> None:
-    """Chords of odometry's 1 rad/s arcs, driven at the gyroscope's 0: a straight line."""
-    subject = build_localizer(
+    """Odometry reports arcs at 1 rad/s, the gyroscope reports 0 rad/s: the chords form a straight line."""
+    localizer = build_localizer(
         SlipEkf(type="slip_ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1
     )
     arc = Pose2(0.0125 * np.cos(0.0125), 0.0125 * np.sin(0.0125), 0.025)
-    feed(subject, 40, arc, 0.0)
-    assert subject.belief.pose == pytest.approx((0.5, 0, 0), abs=2e-3)
+    feed(localizer, 40, arc, 0.0)
+    assert localizer.belief.pose == pytest.approx((0.5, 0, 0), abs=2e-3)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
 def test_broken_gyroscope_is_ignored(bad: float) -> None:
-    subject = ekf(Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
-    feed(subject, 40, Pose2(0.01, 0, 0), bad)
-    assert subject.belief.pose == pytest.approx((0.4, 0, 0))
+    localizer = ekf(Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
+    feed(localizer, 40, Pose2(0.01, 0, 0), bad)
+    assert localizer.belief.pose == pytest.approx((0.4, 0, 0))
 
 
-def test_the_uncertainty_of_a_straight_way_is_that_of_the_closed_form() -> None:
-    """σ² of the heading grows with the way; across the way it is the integral of the swing, rn² L³ / 3."""
-    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
-    feed(subject, 400, Pose2(0.025, 0, 0), None)
-    covariance: Array = subject.belief.covariance
+def test_covariance_of_a_straight_path_equals_the_closed_form() -> None:
+    """The heading variance grows with the distance L, and the lateral variance is its integral, rn² L³ / 3."""
+    localizer = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(localizer, 400, Pose2(0.025, 0, 0), None)
+    covariance: Array = localizer.belief.covariance
     length, noise = 10.0, 0.01
     assert covariance[0, 0] == pytest.approx(noise**2 * length, rel=0.01)
     assert covariance[1, 1] == pytest.approx(noise**2 * length**3 / 3, rel=0.01)

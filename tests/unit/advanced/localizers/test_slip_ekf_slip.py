@@ -19,19 +19,19 @@ RATE, EVERY = 40, 6
 def replayed(
     spec: SlipEkf, twists: Array, wheels: Array, gyro: Array, start: Pose2 | None = None
 ) -> tuple[Belief, Array]:
-    """What the EKF believes at the end, and how wrong that is.
+    """Return the final belief of the EKF and its error.
 
-    `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those that the wheels claim, `gyro` (n,) readings.
+    `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those from odometry, `gyro` (n,) the readings.
     """
-    subject = build_localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    localizer = build_localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     true = claimed = Pose2(0, 0, 0)
-    subject.on_odometry(Odometry("odom", 0, claimed, Twist()))
+    localizer.on_odometry(Odometry("odom", 0, claimed, Twist()))
     for k in range(len(twists)):
         true, claimed = true.compose(_step(twists[k])), claimed.compose(_step(wheels[k]))
-        subject.on_imu(Imu("imu", EVERY * (k + 1), (0.0, 0.0, float(gyro[k])), (0.0, 0.0, 9.81)))
-        subject.on_odometry(Odometry("odom", EVERY * (k + 1), claimed, Twist()))
-    error = np.array(subject.belief.pose) - np.array(true)
-    return subject.belief, np.array([error[0], error[1], math.remainder(error[2], 2 * math.pi)])
+        localizer.on_imu(Imu("imu", EVERY * (k + 1), (0.0, 0.0, float(gyro[k])), (0.0, 0.0, 9.81)))
+        localizer.on_odometry(Odometry("odom", EVERY * (k + 1), claimed, Twist()))
+    error = np.array(localizer.belief.pose) - np.array(true)
+    return localizer.belief, np.array([error[0], error[1], math.remainder(error[2], 2 * math.pi)])
 
 
 def _step(twist: Array) -> Pose2:
@@ -41,7 +41,7 @@ def _step(twist: Array) -> Pose2:
 
 
 def turning(seconds: float = 4.0) -> Array:
-    """0.4 m/s and 1 rad/s."""
+    """Return a drive at 0.4 m/s and 1 rad/s."""
     return np.tile([0.4, 0.0, 1.0], (round(seconds * RATE), 1))
 
 
@@ -54,8 +54,8 @@ def test_locked_wheels_in_a_turn_are_detected() -> None:
     belief, error = replayed(spec, truth, claimed, truth[:, 2] + np.random.default_rng(1).normal(0, 0.005, len(truth)))
     assert abs(error[2]) < 0.02
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
-    assert math.hypot(*error[:2]) > 0.2  # nobody could know how far it slid, …
-    assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # … and the filter says so
+    assert math.hypot(*error[:2]) > 0.2  # no sensor measures the slide, …
+    assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # … so the covariance must be large
 
 
 def test_spinning_wheels_do_not_turn_the_estimate() -> None:
@@ -96,18 +96,18 @@ def test_position_variance_stops_growing_after_slip() -> None:
 
 def test_gyro_bias_variance_has_a_floor() -> None:
     """After ten minutes at rest, a drifting bias is still detected."""
-    n = 600 * RATE // 10  # at 4 Hz, to be quick
-    subject = build_localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    n = 600 * RATE // 10  # at 4 Hz, for a short run time
+    localizer = build_localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     for k in range(n):
-        subject.on_imu(Imu("imu", 60 * k, (0.0, 0.0, 0.003), (0.0, 0.0, 9.81)))
-        subject.on_odometry(Odometry("odom", 60 * k, Pose2(0, 0, 0), Twist()))
-    assert abs(subject.belief.pose.yaw) < 3 * math.sqrt(subject.belief.covariance[2, 2])
-    state, variance = subject._filter.x, subject._filter.P
+        localizer.on_imu(Imu("imu", 60 * k, (0.0, 0.0, 0.003), (0.0, 0.0, 9.81)))
+        localizer.on_odometry(Odometry("odom", 60 * k, Pose2(0, 0, 0), Twist()))
+    assert abs(localizer.belief.pose.yaw) < 3 * math.sqrt(localizer.belief.covariance[2, 2])
+    state, variance = localizer._filter.x, localizer._filter.P
     assert state[4] == pytest.approx(0.003, abs=1e-3)
     assert variance[4, 4] > 1e-9
 
 
-CASES = [  # a tidy robot, a rough one with a good gyroscope, a fast one with a poor gyroscope
+CASES = [  # precise robot, imprecise odometry with a good gyroscope, fast robot with a poor gyroscope
     {"speed": 0.5, "translation": 0.01, "rotation": 0.01, "gyro": 0.002, "bias": 0.002},
     {"speed": 0.8, "translation": 0.05, "rotation": 0.1, "gyro": 0.002, "bias": 0.002},
     {"speed": 2.0, "translation": 0.02, "rotation": 0.03, "gyro": 0.02, "bias": 0.01},
@@ -116,16 +116,16 @@ SECONDS = 5.0
 
 
 def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Array]:
-    """A drive in bends with noise as its specification says, and slips that last about a second."""
+    """Replay a drive in bends with the specified noise and slips of about a second."""
     rng = np.random.default_rng((seed, round(1000 * slip)))
     n, dt = round(SECONDS * RATE), 1 / RATE
     t = np.arange(n) * dt
-    phase, often = rng.uniform(0, 6.3), rng.uniform(0.3, 1.0)
-    truth = np.column_stack((np.full(n, case["speed"]), np.zeros(n), 1.2 * np.sin(often * t * 2 + phase)))
-    way, turn = np.abs(truth[:, 0]) * dt, np.abs(truth[:, 2]) * dt
+    phase, frequency = rng.uniform(0, 6.3), rng.uniform(0.3, 1.0)
+    truth = np.column_stack((np.full(n, case["speed"]), np.zeros(n), 1.2 * np.sin(frequency * t * 2 + phase)))
+    distance, turn = np.abs(truth[:, 0]) * dt, np.abs(truth[:, 2]) * dt
     claimed = truth.copy()
-    claimed[:, 0] += rng.normal(0, case["translation"] * np.sqrt(way)) / dt
-    claimed[:, 2] += rng.normal(0, case["rotation"] * np.sqrt(way + turn)) / dt
+    claimed[:, 0] += rng.normal(0, case["translation"] * np.sqrt(distance)) / dt
+    claimed[:, 2] += rng.normal(0, case["rotation"] * np.sqrt(distance + turn)) / dt
     share = rng.normal(0, slip)
     for k in range(n):
         truth[k, 0] *= 1 + share
@@ -141,7 +141,7 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("slip", [0.0, 0.2])
-@pytest.mark.parametrize("case", CASES, ids=["tidy", "rough", "fast"])
+@pytest.mark.parametrize("case", CASES, ids=["precise", "imprecise odometry", "fast"])
 def test_covariance_is_consistent_with_and_without_slip(case: dict[str, float], slip: float, is_quick: bool) -> None:
     """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
     runs = 10 if is_quick else 25

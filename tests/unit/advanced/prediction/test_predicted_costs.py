@@ -11,14 +11,14 @@ from simscen.testing.flatland import round_robot
 
 ROBOT = Pose2(0.0, 0.0)
 SPEED, RADIUS = 1.0, 0.22
-SURE = np.diag((1e-4, 1e-4, 1e-4, 1e-4))[None]
+COVARIANCE = np.diag((1e-4, 1e-4, 1e-4, 1e-4))[None]
 
 
 def crossing(x: float, y: float, vy: float) -> MovingObstacles:
-    return MovingObstacles(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), SURE, 0.3)
+    return MovingObstacles(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), COVARIANCE, 0.3)
 
 
-def ground(moving: MovingObstacles, resolution: float = 0.05) -> CostmapView:
+def costmap_with(moving: MovingObstacles, resolution: float = 0.05) -> CostmapView:
     cells = round(12 / resolution), round(12 / resolution)
     costs, distance = np.zeros(cells, np.uint8), np.full(cells, 2.0, np.float32)
     return CostmapView(costs, distance, resolution, (-6.0, -6.0), moving=moving)
@@ -31,35 +31,35 @@ def cost_at(view: CostmapView, x: float, y: float) -> int:
 @pytest.mark.parametrize("resolution", [0.05, 0.03, 0.25])
 def test_crossing_obstacle_is_marked_at_its_predicted_position(resolution: float) -> None:
     """The obstacle starts at (2, 2) and crosses the path 2 m ahead after 2 s, when the robot is there."""
-    view = add_predicted_costs(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
+    view = add_predicted_costs(costmap_with(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
     assert cost_at(view, 2.0, 0.0) > 50
-    assert cost_at(view, 2.0, 2.0) == 0  # where it is now
-    assert cost_at(view, 2.0, 1.2) == 0  # behind it: it has gone by then
+    assert cost_at(view, 2.0, 2.0) == 0  # current position of the obstacle
+    assert cost_at(view, 2.0, 1.2) == 0  # left by the obstacle when the robot arrives
     assert cost_at(view, 0.0, -2.0) == 0
-    assert view.costs.max() < 253  # dear, never shut
+    assert view.costs.max() < 253  # expensive, but never lethal
 
 
 def test_no_cost_is_added_for_static_or_distant_obstacles() -> None:
-    still = ground(NO_MOVING_OBSTACLES)
-    assert add_predicted_costs(still, ROBOT, SPEED, RADIUS) is still
-    far = ground(crossing(5.0, 5.0, -1.0))
-    assert add_predicted_costs(far, ROBOT, SPEED, RADIUS) is far  # so that no plan is made anew for it
-    beside = ground(crossing(2.0, 2.0, -1.0))
-    assert add_predicted_costs(beside, Pose2(40.0, 0.0), SPEED, RADIUS) is beside
+    static = costmap_with(NO_MOVING_OBSTACLES)
+    assert add_predicted_costs(static, ROBOT, SPEED, RADIUS) is static
+    far = costmap_with(crossing(5.0, 5.0, -1.0))
+    assert add_predicted_costs(far, ROBOT, SPEED, RADIUS) is far  # the same object, so that it causes no replanning
+    passed = costmap_with(crossing(2.0, 2.0, -1.0))
+    assert add_predicted_costs(passed, Pose2(40.0, 0.0), SPEED, RADIUS) is passed
 
 
 def test_plan_passes_behind_an_obstacle_that_arrives_first() -> None:
     for vy in (-1.0, 1.0):
-        view = add_predicted_costs(ground(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
+        view = add_predicted_costs(costmap_with(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
         points = OmplPlanner(Spec(), round_robot(RADIUS)).plan(view, ROBOT, Pose2(4.5, 0.0), 1).points
-        beside = points[np.abs(points[:, 0] - 2.0) < 0.1, 1]
-        assert (np.sign(beside) == -np.sign(vy)).all()
-        assert np.abs(beside).min() > 0.3
+        passed = points[np.abs(points[:, 0] - 2.0) < 0.1, 1]
+        assert (np.sign(passed) == -np.sign(vy)).all()
+        assert np.abs(passed).min() > 0.3
 
 
 def test_path_meets_only_obstacles_at_their_predicted_time() -> None:
-    way = [complex(x) for x in np.linspace(0.1, 4.5, 45)]
-    assert meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
-    assert not meets_moving_obstacle(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)
-    assert not meets_moving_obstacle(crossing(2.0, 0.9, -2.0), ROBOT, way, SPEED, RADIUS)  # it will have gone
-    assert not meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, way[:0], SPEED, RADIUS)
+    path = [complex(x) for x in np.linspace(0.1, 4.5, 45)]
+    assert meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, path, SPEED, RADIUS)
+    assert not meets_moving_obstacle(crossing(2.0, 2.0, 1.0), ROBOT, path, SPEED, RADIUS)
+    assert not meets_moving_obstacle(crossing(2.0, 0.9, -2.0), ROBOT, path, SPEED, RADIUS)  # passes first
+    assert not meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, path[:0], SPEED, RADIUS)

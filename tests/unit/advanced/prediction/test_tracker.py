@@ -25,20 +25,20 @@ FULL, FRONT = 2 * math.pi, math.radians(270.0)
 
 
 class Watch:
-    """A lidar of 10 Hz at `base(t)` among discs at `discs(t)`; `told(t)` is where odometry says that it is."""
+    """Tracker with a 10 Hz lidar at `base(t)` among discs at `discs(t)`; odometry reports the pose `odometry(t)`."""
 
     def __init__(
         self,
         discs: Callable[[float], list[Disc]],
         base: Callable[[float], Pose2] = lambda _: Pose2(0.0, 0.0),
-        told: Callable[[float], Pose2] | None = None,
+        odometry: Callable[[float], Pose2] | None = None,
         walls: Flatland | None = None,
         view: float = FRONT,
         beams: int = 720,
         covered: float | None = None,
     ) -> None:
-        """`covered`: range of the first 40 beams, if something covers them."""
-        self.discs, self.base, self.told = discs, base, told or base
+        """Set up the tracker; `covered` is the range of the first 40 beams if something covers the lens."""
+        self.discs, self.base, self.odometry = discs, base, odometry or base
         self.walls, self.view, self.beams, self.covered = walls or Flatland(), view, beams, covered
         self.tracker, self.rng, self.time = Tracker(Prediction(), TICK_RATE_HZ), np.random.default_rng(1), 0.0
 
@@ -54,7 +54,7 @@ class Watch:
             if self.covered is not None:
                 ranges[:40] = self.covered
             scan = Scan("lidar", round(self.time * TICK_RATE_HZ), ranges, -self.view / 2, step, 0.1, 30.0)
-            self.tracker.on_scan(scan, self.told(self.time))
+            self.tracker.on_scan(scan, self.odometry(self.time))
             each(self)
         return self
 
@@ -67,7 +67,7 @@ def oncoming(t: float) -> list[Disc]:
     return [(9.0 - 1.5 * t, 0.3, 0.3)]
 
 
-def room() -> Flatland:
+def static_room() -> Flatland:
     """A room with pillars of all sizes, a doorway and a box."""
     world = Flatland().room(12, 8)
     world.boxes += [(5.0, 0.0, 5.1, 3.0), (5.0, 4.0, 5.1, 8.0), (8.0, 2.0, 8.6, 2.6)]
@@ -77,29 +77,29 @@ def room() -> Flatland:
 
 @pytest.mark.parametrize("discs", [crossing, oncoming])
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
-def test_a_moving_cylinder_is_found_within_a_second_and_known_to_centimeters(
+def test_moving_cylinder_is_detected_within_a_second_and_tracked_to_centimeters(
     discs: Callable[[float], list[Disc]], view: float, beams: int
 ) -> None:
     watch = Watch(discs, view=view, beams=beams).run(1.2)
     assert len(watch.tracker.moving) == 1
-    places, speeds = [], []
+    position_errors, velocity_errors = [], []
 
     def compare(watch: Watch) -> None:
         x, y, radius = discs(watch.time)[0]
         later = discs(watch.time + 1.0)[0]
         moving = watch.tracker.moving
         assert len(moving) == 1
-        places.append(math.dist(moving.centers[0], (x, y)))
-        speeds.append(math.dist(moving.velocities[0], (later[0] - x, later[1] - y)))
+        position_errors.append(math.dist(moving.centers[0], (x, y)))
+        velocity_errors.append(math.dist(moving.velocities[0], (later[0] - x, later[1] - y)))
         assert moving.radii[0] == pytest.approx(radius, abs=0.08)
 
     watch.run(2.0, compare)
-    assert np.median(places) < 0.04 and max(places) < 0.12
-    assert np.median(speeds) < 0.12 and max(speeds) < 0.45
+    assert np.median(position_errors) < 0.04 and max(position_errors) < 0.12
+    assert np.median(velocity_errors) < 0.12 and max(velocity_errors) < 0.45
 
 
 def test_the_covariance_covers_the_error() -> None:
-    """NEES of the place, 2 on average for a consistent filter; ours is made for things that turn, and so lower."""
+    """The position NEES is 2 on average for a consistent filter, and lower for ours, which allows for turns."""
     watch, values = Watch(crossing).run(1.5), list[float]()
 
     def compare(watch: Watch) -> None:
@@ -166,41 +166,41 @@ def test_partly_visible_obstacle_is_reported_after_a_long_distance() -> None:
         return (1.5 * t + 3.0 * math.cos(edge), -3.0 * math.sin(edge), 0.5)
 
     watch = Watch(lambda t: [beside(t), (14.0, 6.0 - 1.2 * t, 0.5)], base).run(4.0)
-    assert any(math.dist(center, beside(watch.time)[:2]) < 0.5 for center, _ in told(watch))
+    assert any(math.dist(center, beside(watch.time)[:2]) < 0.5 for center, _ in reported_motion(watch))
 
 
-def told(watch: Watch) -> list[tuple[list[float], list[float]]]:
-    """Where what moves is said to be, and how fast."""
+def reported_motion(watch: Watch) -> list[tuple[list[float], list[float]]]:
+    """Return center and velocity of each reported obstacle."""
     moving = watch.tracker.moving
     return list(zip(moving.centers.tolist(), moving.velocities.tolist(), strict=True))
 
 
-def claims(watch: Watch, seconds: float) -> int:
-    """In how many scans something is said to move."""
-    told = list[bool]()
-    watch.run(seconds, lambda watch: told.append(len(watch.tracker.moving) > 0))
-    return sum(told)
+def scans_with_motion(watch: Watch, seconds: float) -> int:
+    """Return the number of scans after which the tracker reports motion."""
+    reported = list[bool]()
+    watch.run(seconds, lambda watch: reported.append(len(watch.tracker.moving) > 0))
+    return sum(reported)
 
 
 def tour(t: float) -> Pose2:
-    """Through the room, swinging by 70° to either side at up to 2 rad/s."""
+    """Return the pose of a drive through the room that swings by ±70° at up to 2 rad/s."""
     return Pose2(1.5 + 0.6 * t, 3.5 + 0.4 * math.sin(t), 1.2 * math.sin(1.7 * t))
 
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
 def test_no_motion_is_reported_in_a_static_room(view: float, beams: int) -> None:
-    assert claims(Watch(lambda _: [], tour, walls=room(), view=view, beams=beams), 12.0) == 0
+    assert scans_with_motion(Watch(lambda _: [], tour, walls=static_room(), view=view, beams=beams), 12.0) == 0
 
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
 def test_no_motion_is_reported_with_odometry_drift(view: float, beams: int) -> None:
-    """By 5 % of the distance and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope have."""
+    """The drift is 5 % of the distance and 1 % of each turn, more than that of wheels with a gyroscope."""
 
     def drifted(t: float) -> Pose2:
         pose = tour(t)
         return Pose2(1.05 * pose.x, 1.05 * pose.y, 1.01 * pose.yaw)
 
-    assert claims(Watch(lambda _: [], tour, drifted, walls=room(), view=view, beams=beams), 12.0) == 0
+    assert scans_with_motion(Watch(lambda _: [], tour, drifted, walls=static_room(), view=view, beams=beams), 12.0) == 0
 
 
 def test_no_motion_of_posts_is_reported_with_wheel_slip() -> None:
@@ -215,8 +215,8 @@ def test_no_motion_of_posts_is_reported_with_wheel_slip() -> None:
     def slipping(t: float) -> Pose2:
         return Pose2(2.2 * t, 0.0, straight(t).yaw)
 
-    assert claims(Watch(lambda _: [], straight, walls=posts), 8.0) == 0
-    assert claims(Watch(lambda _: [], straight, slipping, walls=posts), 8.0) == 0
+    assert scans_with_motion(Watch(lambda _: [], straight, walls=posts), 8.0) == 0
+    assert scans_with_motion(Watch(lambda _: [], straight, slipping, walls=posts), 8.0) == 0
 
 
 @pytest.mark.parametrize("gap", [0.4, 0.55, 0.7])
@@ -224,11 +224,11 @@ def test_track_of_a_removed_object_does_not_jump_to_a_post(gap: float) -> None:
     """The object stood in free space, and a post is within the gate of a track without speed."""
     posts = Flatland(discs=[(3.0 + 0.05 * k, gap * k, 0.1) for k in range(1, 8)])
     watch = Watch(lambda t: [(3.0, 0.0, 0.1)] if 1.0 <= t < 2.0 else [], walls=posts)
-    assert claims(watch, 4.0) == 0
+    assert scans_with_motion(watch, 4.0) == 0
 
 
 def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
-    """By 0.12 m within half a second, there and back, while it swings: nearly all of them stand where it was free."""
+    """It skids by 0.12 m within 0.5 s and back while it swings, so that most posts appear in formerly free space."""
     rng = np.random.default_rng(39)
     posts = Flatland()
     posts.discs += [(x, side * float(rng.uniform(0.4, 2.5)), 0.075) for x in np.arange(-2, 8, 0.2) for side in (-1, 1)]
@@ -238,35 +238,35 @@ def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
 
     def skidding(t: float) -> Pose2:
         pose = swinging(t)
-        aside = float(np.interp(t % 5.0, [0.5, 1.0, 3.0, 3.5], [0.0, 0.12, 0.12, 0.0]))
-        return Pose2(1.05 * pose.x, aside, 1.01 * pose.yaw)
+        lateral = float(np.interp(t % 5.0, [0.5, 1.0, 3.0, 3.5], [0.0, 0.12, 0.12, 0.0]))
+        return Pose2(1.05 * pose.x, lateral, 1.01 * pose.yaw)
 
-    assert claims(Watch(lambda _: [], swinging, skidding, walls=posts), 8.0) == 0
+    assert scans_with_motion(Watch(lambda _: [], swinging, skidding, walls=posts), 8.0) == 0
 
 
 def test_last_segment_of_a_scan_has_the_range_of_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
     found = divide_into_segments(find_valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
-    (piece,) = find_clusters(found, ranges, 0.0, step, 1.0)
+    (cluster,) = find_clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
-    assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
-    assert abs(piece.center) == pytest.approx(1.9 + piece.radius)
+    assert cluster.radius == pytest.approx(1.9 * sine / (1.0 - sine))
+    assert abs(cluster.center) == pytest.approx(1.9 + cluster.radius)
 
 
 def test_quick_check_never_separates_hits_of_one_segment() -> None:
-    rng, step, told = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
+    rng, step, reported = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
     for _ in range(400):
         ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
         ranges[rng.random(72) < 0.1] = np.inf
         hits = find_valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
         which = rng.random(len(hits.beams)) < 0.15
-        told.append(
+        reported.append(
             (divide_into_segments(hits).share_segment(which, 3), hits.may_share_segment(which.nonzero()[0].tolist(), 3))
         )
         first, last = divide_into_segments(hits).first, divide_into_segments(hits).last
-        assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
-    assert (True, False) not in told
-    assert min(told.count((True, True)), told.count((False, False))) > 50
+        assert reported[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
+    assert (True, False) not in reported
+    assert min(reported.count((True, True)), reported.count((False, False))) > 50
 
 
 def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
@@ -274,18 +274,18 @@ def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
     rng = np.random.default_rng(2)
     wires = Flatland(discs=[(6 * rng.random() + 1, 2.2 * (-1) ** k * (0.5 + rng.random()), 0.002) for k in range(30)])
 
-    def flies(t: float) -> list[Disc]:
-        """Four beams wide, where each sixth is looked at first."""
+    def flickering(t: float) -> list[Disc]:
+        """Return a disc of four beams, of which the sparse test of every sixth beam can miss all."""
         return [(0.4 * t + 2.5 * math.cos(3 * t), 2.5 * math.sin(3 * t), 0.03)] if round(10 * t) % 12 == 0 else []
 
-    def tracks(afresh: bool) -> list[list[complex]]:
+    def tracks(tests_all_beams: bool) -> list[list[complex]]:
         found = list[list[complex]]()
 
-        def note(watch: Watch) -> None:
+        def record(watch: Watch) -> None:
             found.append([track.position for track in watch.tracker._tracks])
-            watch.tracker._had_new_hits &= not afresh
+            watch.tracker._had_new_hits &= not tests_all_beams
 
-        Watch(flies, base=lambda t: Pose2(0.4 * t, 0.0), walls=wires).run(12.0, note)
+        Watch(flickering, base=lambda t: Pose2(0.4 * t, 0.0), walls=wires).run(12.0, record)
         return found
 
     found = tracks(False)
@@ -306,8 +306,8 @@ def test_garbage_scan_creates_no_tracks() -> None:
 
 
 @pytest.mark.parametrize("seen", [1.2, 1.8, 2.5])
-def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: float) -> None:
-    """Its points are where the circle's equation has them, `seen` rad of it, as from the origin."""
+def test_circle_fit_of_an_arc_converges_from_half_a_radius_away(seen: float) -> None:
+    """The points are exact and cover `seen` rad of the circle, as seen from the origin."""
     middle, radius = 2.0 + 1.0j, 0.3
     towards = math.pi + math.atan2(middle.imag, middle.real)
     arc = [middle + cmath.rect(radius, towards + seen * (k / 14 - 0.5)) for k in range(15)]

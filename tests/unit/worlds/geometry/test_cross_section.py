@@ -32,9 +32,9 @@ def test_sections_are_closed_loops_with_the_solid_on_the_left():
         Solid(Cone(1.0, 2.0), Pose3.from_rpy(-3, 0, 0.5, 0.7, 0.2, 0)),
         Solid(Capsule(0.3, 1.0), Pose3.from_rpy(0, -3, 0.4, 0, math.pi / 2, 0)),
     ]
-    cut = cross_section(merge_solids(solids), 0.4)
+    section = cross_section(merge_solids(solids), 0.4)
     for owner in range(3):
-        segments = cut.segments[cut.owners == owner]
+        segments = section.segments[section.owners == owner]
         starts = {tuple(p) for p in segments[:, 0].tolist()}
         assert starts == {tuple(p) for p in segments[:, 1].tolist()}
         (x0, y0), (x1, y1) = segments[:, 0].T, segments[:, 1].T
@@ -50,7 +50,7 @@ def test_a_box_is_cut_from_above_its_underside_up_to_its_top():
 
 
 def segments(*rings, shuffle=0):
-    """The directed sides of rings, in any order."""
+    """Return the directed sides of the rings in random order."""
     sides = [(a, b) for ring in rings for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     order = np.random.default_rng(shuffle).permutation(len(sides))
     return np.array(sides, dtype=np.float64)[order]
@@ -71,25 +71,25 @@ def same_ring(ring, other):
 
 
 @pytest.mark.parametrize("shuffle", range(5))
-def test_a_ring_comes_back_from_its_sides_in_any_order(shuffle):
+def test_ring_is_assembled_from_its_sides_in_any_order(shuffle):
     (ring,) = rings_from_segments(segments(square(2.0), shuffle=shuffle))
     assert same_ring(ring, square(2.0))
     assert signed_area(ring) == pytest.approx(4.0)
 
 
-def test_points_on_straight_edges_are_left_out():
+def test_points_on_straight_edges_are_removed():
     dense = [(x, 0.0) for x in (0.0, 0.3, 0.31, 1.9, 2.0)] + [(2.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.5)]
     (ring,) = rings_from_segments(segments(dense))
     assert len(ring) == 4
     assert signed_area(ring) == pytest.approx(2.0)
 
 
-def test_a_round_ring_stays_round():
+def test_circular_ring_keeps_its_corners():
     (ring,) = rings_from_segments(segments(circle(0.5, 180)))
     assert len(ring) == 180
 
 
-def test_an_open_cut_is_none():
+def test_open_cross_section_raises():
     with pytest.raises(OpenCrossSection):
         rings_from_segments(segments(square(1.0))[:-1])
 
@@ -103,31 +103,31 @@ def test_outer_rings_without_holes_stay_whole_and_others_become_triangles():
     assert any(same_ring(piece, room[2]) for piece in pieces)
 
 
-def test_a_ring_with_too_many_corners_is_taken_apart():
+def test_ring_with_too_many_corners_is_split():
     pieces = simple_polygons([circle(3.0, 400)])
     assert all(len(piece) <= 200 for piece in pieces)
     assert sum(map(signed_area, pieces)) == pytest.approx(Polygon(circle(3.0, 400)).area)
 
 
-A_HOLE_THAT_TOUCHES_THE_OUTSIDE = [(0, 0), (0, 1), (0, 2), (0, 4), (1, 0), (1, 2), (2, 0), (2, 1)]
+HOLE_THAT_TOUCHES_THE_OUTSIDE = [(0, 0), (0, 1), (0, 2), (0, 4), (1, 0), (1, 2), (2, 0), (2, 1)]
 
 
 @settings(max_examples=30, deadline=None)
-@example(A_HOLE_THAT_TOUCHES_THE_OUTSIDE)
+@example(HOLE_THAT_TOUCHES_THE_OUTSIDE)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12, unique=True))
-def test_any_blocks_cover_what_they_covered(cells):
-    """Unions of grid cells: rings that touch at corners, holes, islands in holes."""
+def test_pieces_of_any_grid_cells_cover_the_same_area(cells):
+    """Unions of grid cells have rings that touch at corners, holes, and islands in holes."""
     union = union_all([Polygon(square(1.0, float(x), float(y))) for x, y in cells])
     parts = list(union.geoms) if union.geom_type == "MultiPolygon" else [union]
     rings = []
     for part in parts:
         oriented = part.normalize()
-        rings.append(_turned(list(oriented.exterior.coords)[:-1], 1))
-        rings += [_turned(list(hole.coords)[:-1], -1) for hole in oriented.interiors]
+        rings.append(_oriented(list(oriented.exterior.coords)[:-1], 1))
+        rings += [_oriented(list(hole.coords)[:-1], -1) for hole in oriented.interiors]
     pieces = simple_polygons(rings_from_segments(segments(*rings)))
     assert sum(map(signed_area, pieces)) == pytest.approx(union.area)
     assert union_all([Polygon(piece) for piece in pieces]).symmetric_difference(union).area < 1e-9
 
 
-def _turned(ring, sign):
+def _oriented(ring, sign):
     return ring if signed_area(ring) * sign > 0 else ring[::-1]

@@ -11,9 +11,9 @@ ROUND = tuple((0.2 * cos(2 * pi * k / 16), 0.2 * sin(2 * pi * k / 16)) for k in 
 
 
 @pytest.mark.parametrize("ring", [SQUARE, ROUND], ids=["square", "round"])
-@pytest.mark.parametrize("turned", [0, 1, 2, 4])
-def test_a_polygon_overlaps_itself_with_whatever_corner_it_begins(ring, turned):
-    assert polygons_overlap(ring, (*ring[turned:], *ring[:turned]))
+@pytest.mark.parametrize("shift", [0, 1, 2, 4])
+def test_polygon_overlaps_itself_whichever_corner_is_first(ring, shift):
+    assert polygons_overlap(ring, (*ring[shift:], *ring[:shift]))
 
 
 def test_polygons_side_by_side_do_not_overlap():

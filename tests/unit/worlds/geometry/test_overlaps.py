@@ -11,16 +11,16 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc
 BODY = (0.05, 0.4)
 
 
-def test_a_point_inside_or_near_a_solid_names_it():
-    here = Solid(Box((1, 1, 1)), Pose3(0, 0, 0.5), "crate"), Solid(Cylinder(0.5, 1.0), Pose3(3, 0, 0.5), "post")
-    assert first_solid_in_disc(here, (0.1, 0.2), 0.0001, BODY) == "crate"
-    assert first_solid_in_disc(here, (0.7, 0.0), 0.21, BODY) == "crate"
-    assert first_solid_in_disc(here, (0.7, 0.0), 0.19, BODY) is None
-    assert first_solid_in_disc(here, (3.0, 0.65), 0.16, BODY) == "post"
-    assert first_solid_in_disc(here, (3.0, 0.65), 0.14, BODY) is None
+def test_solid_at_or_near_a_point_is_named():
+    solids = Solid(Box((1, 1, 1)), Pose3(0, 0, 0.5), "crate"), Solid(Cylinder(0.5, 1.0), Pose3(3, 0, 0.5), "post")
+    assert first_solid_in_disc(solids, (0.1, 0.2), 0.0001, BODY) == "crate"
+    assert first_solid_in_disc(solids, (0.7, 0.0), 0.21, BODY) == "crate"
+    assert first_solid_in_disc(solids, (0.7, 0.0), 0.19, BODY) is None
+    assert first_solid_in_disc(solids, (3.0, 0.65), 0.16, BODY) == "post"
+    assert first_solid_in_disc(solids, (3.0, 0.65), 0.14, BODY) is None
 
 
-def test_only_what_is_as_high_as_the_robot_counts():
+def test_only_solids_at_the_height_of_the_robot_count():
     table = Solid(Box((2, 2, 0.05)), Pose3(0, 0, 0.75), "table")
     carpet = Solid(Box((2, 2, 0.01)), Pose3(0, 0, 0.005), "carpet")
     assert first_solid_in_disc((table, carpet), (0, 0), 0.2, BODY) is None
@@ -39,7 +39,7 @@ def test_distances_are_computed_only_to_solids_nearby(monkeypatch):
     assert len(near) < 10
 
 
-def test_asking_imports_no_heavy_library():
+def test_overlap_check_imports_no_heavy_library():
     code = (
         "import sys; from simscen.worlds.geometry.overlaps import first_solid_in_disc;"
         "from simscen.core.geometry.shapes import Box, Solid, Extrusion;"

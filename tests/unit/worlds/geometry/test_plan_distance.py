@@ -12,16 +12,16 @@ from simscen.worlds.geometry.triangulation import merge_solids
 BODY = (0.05, 0.4)
 
 
-def test_a_sphere_blocks_with_what_it_has_below_the_top_of_the_robot():
+def test_sphere_blocks_with_its_part_below_the_top_of_the_robot():
     ball = merge_solids([Solid(Sphere(1.0), Pose3(0, 0, 1.0))])
     assert horizontal_distance(ball, (2.0, 0.0), (0.05, 0.4)) == pytest.approx(2 - math.sqrt(1 - 0.6**2), abs=0.001)
     assert horizontal_distance(ball, (0.0, 0.0), (0.05, 0.4)) == 0.0
     assert horizontal_distance(ball, (0.0, 0.0), (2.1, 3.0)) == math.inf
 
 
-def test_a_point_under_a_slope_is_inside_where_the_slope_is_low():
+def test_point_under_the_low_part_of_a_slope_is_inside():
     ramp = merge_solids([Solid(Box((2.0, 1.0, 0.01)), Pose3.from_rpy(0, 0, 0.5, 0, -math.pi / 6, 0))])
-    # The sheet rises by 1 over a length of 1.73 in plan; it is 0.4 m high 0.17 m before its middle.
+    # The sheet rises by 1 m over 1.73 m in the plane; it is 0.4 m high at x = -0.17 m.
     assert horizontal_distance(ramp, (-0.4, 0.0), BODY) == 0.0
     assert horizontal_distance(ramp, (0.5, 0.0), BODY) == pytest.approx(0.5 + 0.1 * math.sqrt(3), abs=0.02)
 
@@ -37,18 +37,18 @@ def test_distances_agree_with_shapely(seed):
         assert horizontal_distance(mesh, (x, y), BODY) == pytest.approx(polygon.distance(shapely.Point(x, y)), abs=1e-9)
 
 
-def test_a_tilted_cone_blocks_where_its_slab_is():
+def test_tilted_cone_blocks_with_its_part_at_the_height_of_the_robot():
     cone = merge_solids([Solid(Cone(0.5, 2.0), Pose3.from_rpy(0, 0, 0.5, 1.1, 0.3, 0.2))])
     rng = np.random.default_rng(4)
     slab = cone.vertices[cone.faces]
     for x, y in rng.uniform(-2, 2, (10, 2)):
-        dense = []  # brute force: sample every triangle densely, keep what is in the slab
+        samples = []  # brute force: sample every triangle densely, keep what is in the slab
         for a in np.linspace(0, 1, 40):
             for b in np.linspace(0, 1 - a, 40):
-                dense.append(slab[:, 0] * (1 - a - b) + slab[:, 1] * a + slab[:, 2] * b)
-        points = np.concatenate(dense)
+                samples.append(slab[:, 0] * (1 - a - b) + slab[:, 1] * a + slab[:, 2] * b)
+        points = np.concatenate(samples)
         points = points[(points[:, 2] >= BODY[0]) & (points[:, 2] <= BODY[1])]
         brute = np.hypot(points[:, 0] - x, points[:, 1] - y).min()
-        ours = horizontal_distance(cone, (x, y), BODY)
-        assert ours == 0.0 or ours == pytest.approx(brute, abs=0.01)
-        assert ours <= brute + 1e-9
+        distance = horizontal_distance(cone, (x, y), BODY)
+        assert distance == 0.0 or distance == pytest.approx(brute, abs=0.01)
+        assert distance <= brute + 1e-9

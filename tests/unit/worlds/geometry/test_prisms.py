@@ -15,11 +15,11 @@ L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0
 STAR = tuple((math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)) for k in range(5))
 
 sizes = st.floats(0.01, 3.0)
-places = st.floats(-3.0, 3.0)
+coordinates = st.floats(-3.0, 3.0)
 heights = st.floats(-1.0, 1.0)
 headings = st.floats(-math.pi, math.pi)
 poses = st.builds(
-    lambda x, y, z, yaw: Pose3.planar(Pose2(x, y, yaw), z), places, places, st.floats(-1.0, 1.0), headings
+    lambda x, y, z, yaw: Pose3.planar(Pose2(x, y, yaw), z), coordinates, coordinates, st.floats(-1.0, 1.0), headings
 )
 quadrangles = st.builds(
     lambda a, b, c, d, h: Extrusion(((a, 0.0), (0.0, b), (-c, 0.0), (0.0, -d)), h), sizes, sizes, sizes, sizes, sizes
@@ -32,7 +32,7 @@ shapes = st.one_of(
 )
 
 
-@given(shape=shapes, pose=poses, point=st.tuples(places, places))
+@given(shape=shapes, pose=poses, point=st.tuples(coordinates, coordinates))
 def test_distances_are_those_of_the_triangle_mesh(shape, pose, point):
     solid, slab = Solid(shape, pose), (0.02, 0.4)
     prism = upright_prism(solid)
@@ -60,14 +60,14 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
         Solid(Extrusion(STAR, 1.0)),
         Solid(Extrusion(((0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 1.0)),
     ],
-    ids=["tilted", "ball", "cone", "hollow corner", "star", "corner given twice"],
+    ids=["tilted", "ball", "cone", "concave", "star", "duplicate corner"],
 )
 def test_other_solids_use_the_mesh(solid):
     assert upright_prism(solid) is None
     assert bounding_rectangle(solid) == pytest.approx(mesh_rectangle(solid))
 
 
-def test_a_solid_in_a_tilted_frame_is_left_to_the_mesh():
+def test_solid_in_a_tilted_frame_uses_the_mesh():
     assert upright_prism(Solid(Box((1, 1, 1))), Pose3.from_rpy(0, 0, 0, 0, 0.2, 0)) is None
 
 
@@ -81,5 +81,5 @@ def test_solid_that_only_touches_the_height_range_is_ignored():
 def test_rectangles_of_meshes_follow_the_pose_of_solid_and_frame():
     solid = Solid(Box((2.0, 1.0, 1.0)), Pose3(x=1.0))
     assert mesh_rectangle(solid) == pytest.approx((0, -0.5, 2, 0.5))
-    turned = Pose3.from_rpy(10, 0, 0, 0, 0, math.pi / 2)
-    assert mesh_rectangle(solid, turned) == pytest.approx((9.5, 0, 10.5, 2))
+    frame = Pose3.from_rpy(10, 0, 0, 0, 0, math.pi / 2)
+    assert mesh_rectangle(solid, frame) == pytest.approx((9.5, 0, 10.5, 2))

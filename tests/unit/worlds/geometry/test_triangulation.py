@@ -37,19 +37,19 @@ VOLUMES = [
 @pytest.mark.parametrize(("shape", "volume"), VOLUMES, ids=lambda value: type(value).__name__)
 def test_every_shape_is_a_closed_surface_with_outward_normals_and_the_right_volume(shape, volume):
     mesh = triangulate(shape)
-    judge = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    assert judge.is_watertight
-    assert judge.is_winding_consistent
-    assert judge.volume == pytest.approx(volume, rel=0.004)
-    assert judge.volume <= volume + 1e-9
+    reference = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert reference.is_watertight
+    assert reference.is_winding_consistent
+    assert reference.volume == pytest.approx(volume, rel=0.004)
+    assert reference.volume <= volume + 1e-9
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.2, 0.5, 1.0, 2.0])
 def test_facets_stay_within_a_millimeter_of_the_circle(radius):
     assert radius * (1 - math.cos(math.pi / facet_count(radius))) <= 0.001
     ball = triangulate(Sphere(radius))
-    middles = ball.vertices[ball.faces].mean(axis=1)
-    assert np.abs(np.linalg.norm(middles, axis=1) - radius).max() < 0.001
+    centers = ball.vertices[ball.faces].mean(axis=1)
+    assert np.abs(np.linalg.norm(centers, axis=1) - radius).max() < 0.001
 
 
 def test_extents_of_round_shapes_are_exact():
@@ -58,9 +58,9 @@ def test_extents_of_round_shapes_are_exact():
     assert np.allclose(mesh.vertices.min(axis=0), [-0.37, -0.37, -1.0], atol=1e-12)
 
 
-def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
-    turned = Pose3.from_rpy(5, 0, 0.5, 0, 0, math.pi / 2)
-    mesh = merge_solids([Solid(Box((2.0, 1.0, 1.0)), turned, "a"), Solid(Cylinder(0.2, 1.0), Pose3(x=-3), "b")])
+def test_merged_mesh_has_all_solids_and_the_owner_of_each_face():
+    pose = Pose3.from_rpy(5, 0, 0.5, 0, 0, math.pi / 2)
+    mesh = merge_solids([Solid(Box((2.0, 1.0, 1.0)), pose, "a"), Solid(Cylinder(0.2, 1.0), Pose3(x=-3), "b")])
     box = mesh.vertices[mesh.faces[mesh.owners == 0]].reshape(-1, 3)
     assert np.allclose(box.min(axis=0), [4.5, -1, 0])
     assert np.allclose(box.max(axis=0), [5.5, 1, 1])
@@ -70,29 +70,29 @@ def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
 
 
 def test_convex_shapes_are_their_own_hulls():
-    quad, bent = ((0, 0), (2, 0), (2.2, 1), (0, 0.9)), ((0, 0), (2, 0), (0.5, 0.5), (0, 2))
-    shapes = [*(shape for shape, _ in VOLUMES), Extrusion(quad, 1.0), Extrusion(bent, 1.0), triangulate(Box((1, 1, 1)))]
+    quad, dent = ((0, 0), (2, 0), (2.2, 1), (0, 0.9)), ((0, 0), (2, 0), (0.5, 0.5), (0, 2))
+    shapes = [*(shape for shape, _ in VOLUMES), Extrusion(quad, 1.0), Extrusion(dent, 1.0), triangulate(Box((1, 1, 1)))]
     rng = np.random.default_rng(2)
     poses = [Pose3.from_rpy(*rng.uniform(-50, 50, 3), *rng.uniform(-3, 3, 3)) for _ in shapes]
     mesh = merge_solids([Solid(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
-    told = [hull is not None for hull in mesh.hulls]
-    assert told == [True, True, False, False, False, False, True, False, False, True, False, False]
+    found = [hull is not None for hull in mesh.hulls]
+    assert found == [True, True, False, False, False, False, True, False, False, True, False, False]
     assert {len(triangulate(shape).faces) > MAX_CONVEX_FACES for shape, _ in VOLUMES[2:6]} == {True}
     for owner, hull in enumerate(mesh.hulls):
         solid = submesh(mesh.vertices, mesh.faces[mesh.owners == owner])
         if hull is not None:
             assert np.array_equal(mesh.vertices[hull], solid.vertices)
             assert is_convex(solid)
-            judge = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
-            assert judge.convex_hull.volume == pytest.approx(judge.volume, rel=1e-9)
+            reference = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+            assert reference.convex_hull.volume == pytest.approx(reference.volume, rel=1e-9)
 
 
-def test_nothing_fuses_to_an_empty_mesh():
+def test_no_solids_merge_to_an_empty_mesh():
     mesh = merge_solids([])
     assert mesh.vertices.shape == (0, 3)
     assert mesh.faces.shape == (0, 3)
 
 
-def test_a_mesh_is_taken_as_it_is():
+def test_mesh_is_returned_unchanged():
     mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], dtype=np.int32))
     assert triangulate(mesh) is mesh

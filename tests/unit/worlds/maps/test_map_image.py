@@ -10,15 +10,15 @@ from simscen.core.errors import InvalidInput
 from simscen.worlds.maps.ros_map import read_image
 
 
-def refused(path, because):
-    with pytest.raises(InvalidInput, match=because) as caught:
+def assert_refused(path, reason):
+    with pytest.raises(InvalidInput, match=reason) as caught:
         read_image(path)
     assert len(caught.value.problems) == 1
     assert caught.value.problems[0].path == str(path)
 
 
 @pytest.mark.parametrize(
-    ("data", "because"),
+    ("data", "reason"),
     [
         (b"P5 100000 100000 255\n", "map too large: 100000 x 100000 pixels"),
         (b"P5 10 10 255\n" + bytes(99), "truncated: 99 of 100 pixels"),
@@ -40,16 +40,16 @@ def refused(path, because):
         (b"BM" + bytes(12) + struct.pack("<Iii", 40, 10, 10), "BMP cannot be decoded"),
     ],
 )
-def test_a_bad_image_is_refused_with_the_reason(tmp_path, data, because):
+def test_a_bad_image_is_refused_with_the_reason(tmp_path, data, reason):
     path = tmp_path / "m.img"
     path.write_bytes(data)
-    refused(path, because)
+    assert_refused(path, reason)
 
 
 def test_a_png_bomb_is_refused_before_it_is_decoded(tmp_path):
     Image.new("1", (13000, 13000)).save(tmp_path / "bomb.png")
     tracemalloc.start()
-    refused(tmp_path / "bomb.png", "map too large")
+    assert_refused(tmp_path / "bomb.png", "map too large")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 20e6
@@ -59,10 +59,10 @@ def test_a_truncated_png_is_refused(tmp_path):
     Image.fromarray(np.random.default_rng(0).integers(0, 255, (50, 50), np.uint8)).save(tmp_path / "m.png")
     data = (tmp_path / "m.png").read_bytes()
     (tmp_path / "m.png").write_bytes(data[: len(data) // 2])
-    refused(tmp_path / "m.png", "PNG cannot be decoded")
+    assert_refused(tmp_path / "m.png", "PNG cannot be decoded")
 
 
 def test_nonregular_file_is_refused_without_opening_it(tmp_path):
     os.mkfifo(tmp_path / "pipe.pgm")
-    refused(tmp_path / "pipe.pgm", "not a regular file")
-    refused(tmp_path, "not a regular file")
+    assert_refused(tmp_path / "pipe.pgm", "not a regular file")
+    assert_refused(tmp_path, "not a regular file")

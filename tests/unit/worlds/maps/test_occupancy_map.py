@@ -27,13 +27,13 @@ def grid_of(*solids, height=0.3, resolution=0.05, **world):
     return draw_map(World("w", solids, **world), merge_solids(solids), height, resolution)
 
 
-def by_shapely(grid, polygon):
-    """The cells whose open square meets the open polygon."""
+def cells_by_shapely(grid, polygon):
+    """Return the cells whose interior overlaps the interior of the polygon."""
     x = grid.origin.x + np.arange(grid.shape[1]) * grid.resolution
     y = grid.origin.y + np.arange(grid.shape[0]) * grid.resolution
     xs, ys = np.meshgrid(x, y)
-    small = 1e-6
-    squares = shapely.box(xs + small, ys + small, xs + grid.resolution - small, ys + grid.resolution - small)
+    epsilon = 1e-6
+    squares = shapely.box(xs + epsilon, ys + epsilon, xs + grid.resolution - epsilon, ys + grid.resolution - epsilon)
     return shapely.intersects(squares, polygon)
 
 
@@ -52,11 +52,11 @@ def test_a_cell_is_occupied_exactly_if_a_solid_is_in_it(seed):
         solids.append(Solid(Extrusion(tuple(map(tuple, corners.tolist())), 1.0), Pose3.planar(Pose2(x, y, yaw))))
         polygons.append(shapely.Polygon(Pose2(x, y, yaw).apply(corners)))
     grid = grid_of(*solids)
-    expected = by_shapely(grid, shapely.union_all(polygons))
+    expected = cells_by_shapely(grid, shapely.union_all(polygons))
     assert ((grid.cells == OCCUPIED) != expected).sum() == 0
 
 
-def test_walls_on_cell_edges_fill_just_their_own_cells():
+def test_walls_on_cell_edges_fill_only_their_own_cells():
     grid = grid_of(Solid(Box((0.2, 0.1, 1.0)), Pose3(1.1, 2.05, 0.5)))
     rows, columns = np.nonzero(grid.cells == OCCUPIED)
     centers = grid.center_of(np.column_stack((rows, columns)))
@@ -70,18 +70,18 @@ def test_a_wall_thinner_than_a_cell_is_not_lost():
     assert (grid.cells == OCCUPIED).sum() == 40
 
 
-def test_things_above_or_below_the_lidar_are_not_on_the_map():
+def test_solids_above_or_below_the_lidar_are_not_on_the_map():
     solids = Solid(Box((1, 1, 0.1)), Pose3(0, 0, 0.05)), Solid(Box((1, 1, 0.1)), Pose3(3, 0, 2.0))
     assert not (grid_of(*solids).cells == OCCUPIED).any()
 
 
-def test_outside_of_a_closed_building_nothing_is_known():
+def test_cells_outside_of_a_closed_building_are_unknown():
     grid = grid_of(*ROOM)
-    inside, beyond = grid.values_at(np.array([[2.0, 1.5], [-0.5, -0.5]])).tolist()
-    assert (inside, beyond) == (FREE, UNKNOWN)
+    inside, outside = grid.values_at(np.array([[2.0, 1.5], [-0.5, -0.5]])).tolist()
+    assert (inside, outside) == (FREE, UNKNOWN)
 
 
-def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
+def test_outside_is_free_if_it_has_a_place_or_a_door_is_open():
     yard = grid_of(*ROOM, places={"yard": Pose2(4.5, 1.0, 0.0)}, bounds=(0, 0, 5, 3))
     open_door = grid_of(*ROOM[:3])
     for grid in (yard, open_door):
@@ -89,39 +89,39 @@ def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 4])
-def test_rotated_or_winged_building_is_still_closed(yaw):
-    plan = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 6), (0, 6), (0, 0)]
-    turned = Pose2(0, 0, yaw).apply(np.array(plan, dtype=float)).tolist()
-    grid = grid_of(*wall_solids([(x, y) for x, y in turned], 0.1, 1.0, "w"))
-    inside, beyond, corner = grid.values_at(Pose2(0, 0, yaw).apply(np.array([[1, 1], [-0.5, 3], [4, 4]]))).tolist()
-    assert (inside, beyond, corner) == (FREE, UNKNOWN, UNKNOWN)
+def test_outside_of_an_l_shaped_or_rotated_building_is_unknown(yaw):
+    outline = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 6), (0, 6), (0, 0)]
+    corners = Pose2(0, 0, yaw).apply(np.array(outline, dtype=float)).tolist()
+    grid = grid_of(*wall_solids([(x, y) for x, y in corners], 0.1, 1.0, "w"))
+    inside, outside, corner = grid.values_at(Pose2(0, 0, yaw).apply(np.array([[1, 1], [-0.5, 3], [4, 4]]))).tolist()
+    assert (inside, outside, corner) == (FREE, UNKNOWN, UNKNOWN)
 
 
-def test_a_field_of_posts_is_free_all_over():
+def test_field_of_posts_has_no_unknown_cells():
     posts = [Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x in range(5) for y in range(5)]
     assert not (grid_of(*posts).cells == UNKNOWN).any()
 
 
-def test_an_open_mesh_leaves_only_its_outline():
+def test_open_mesh_occupies_only_its_outline():
     box = triangulate(Box((2.0, 2.0, 1.0)))
     open_box = Mesh(box.vertices, box.faces[box.faces.min(axis=1) != 1])  # some sides are missing
     grid = grid_of(Solid(open_box, Pose3(z=0.3)))
     assert 40 < (grid.cells == OCCUPIED).sum() < 200
 
 
-def test_a_room_modeled_from_within_keeps_its_floor_free():
+def test_room_with_inward_normals_has_a_free_floor():
     box = triangulate(Box((3.0, 3.0, 2.0)))
     grid = grid_of(Solid(Mesh(box.vertices, box.faces[:, ::-1]), Pose3(z=1.0)))
     assert grid.values_at(np.array([[0.0, 0.0], [1.5, 0.0]])).tolist() == [FREE, OCCUPIED]
 
 
 def test_additions_to_a_ros_map_respect_its_yaw():
-    own = OccupancyGrid(np.full((40, 40), UNKNOWN, np.int8), 0.1, Pose2(1.0, 2.0, math.pi / 6))
-    own.cells[5:30, 5:30] = FREE
-    place = own.center_of(np.array([[20, 10]]))[0]
-    grid = grid_of(Solid(Box((0.05, 0.05, 1.0)), Pose3(place[0], place[1], 0.5)), grid=own)
+    ros_map = OccupancyGrid(np.full((40, 40), UNKNOWN, np.int8), 0.1, Pose2(1.0, 2.0, math.pi / 6))
+    ros_map.cells[5:30, 5:30] = FREE
+    place = ros_map.center_of(np.array([[20, 10]]))[0]
+    grid = grid_of(Solid(Box((0.05, 0.05, 1.0)), Pose3(place[0], place[1], 0.5)), grid=ros_map)
     assert np.argwhere(grid.cells == OCCUPIED).tolist() == [[20, 10]]
-    assert (grid.cells == UNKNOWN).sum() == (own.cells == UNKNOWN).sum()
+    assert (grid.cells == UNKNOWN).sum() == (ros_map.cells == UNKNOWN).sum()
 
 
 def test_a_map_that_would_be_too_large_is_refused_with_its_size():
@@ -129,30 +129,30 @@ def test_a_map_that_would_be_too_large_is_refused_with_its_size():
         grid_of(bounds=(-1e4, -1e4, 1e4, 1e4))
 
 
-def test_a_world_of_places_alone_has_a_map_that_holds_them():
+def test_map_of_a_world_without_solids_contains_its_places():
     built = grid_of(places={"a": Pose2(3, 2), "b": Pose2(8, 2)}, bounds=(3, 2, 8, 2))
     assert built.values_at(np.array([[3.0, 2.0], [8.0, 2.0]])).tolist() == [FREE, FREE]
 
 
-TURNED = Pose2(3.0, -2.0, 0.7)
+ROTATED_ORIGIN = Pose2(3.0, -2.0, 0.7)
 
 
-def speckled(seed, shape=(30, 40), share=0.3):
+def random_map(seed, shape=(30, 40), share=0.3):
     cells = np.where(np.random.default_rng(seed).random(shape) < share, OCCUPIED, 0).astype(np.int8)
     cells[0, :3] = UNKNOWN
-    return OccupancyGrid(cells, 0.05, TURNED)
+    return OccupancyGrid(cells, 0.05, ROTATED_ORIGIN)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_walls_made_of_a_map_draw_that_map_again(seed):
-    grid = speckled(seed)
+def test_walls_built_from_a_map_give_the_same_map(seed):
+    grid = random_map(seed)
     mesh = merge_solids(walls_from_map(grid, 1.0))
-    again = occupied_cells(grid, cross_section(mesh, 0.5))
-    assert np.array_equal(again, grid.cells == OCCUPIED)
+    redrawn = occupied_cells(grid, cross_section(mesh, 0.5))
+    assert np.array_equal(redrawn, grid.cells == OCCUPIED)
 
 
-def test_walls_enclose_just_the_occupied_cells_and_rise_to_their_height():
-    grid = speckled(9)
+def test_walls_enclose_only_the_occupied_cells_up_to_their_height():
+    grid = random_map(9)
     mesh = merge_solids(walls_from_map(grid, 1.5))
     volume = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).volume
     assert volume == pytest.approx((grid.cells == OCCUPIED).sum() * 0.05**2 * 1.5)
@@ -160,13 +160,13 @@ def test_walls_enclose_just_the_occupied_cells_and_rise_to_their_height():
     assert mesh.vertices[:, 2].max() == 1.5
 
 
-def test_a_long_wall_is_six_faces_however_many_cells_it_has():
+def test_long_wall_has_six_faces_for_any_number_of_cells():
     cells = np.zeros((100, 1000), np.int8)
     cells[20:24, 10:990] = OCCUPIED
     assert len(merge_solids(walls_from_map(OccupancyGrid(cells, 0.05), 1.0)).faces) == 12
 
 
-def test_a_map_without_walls_makes_none():
+def test_map_without_walls_gives_no_solids():
     assert walls_from_map(OccupancyGrid(np.zeros((5, 5), np.int8), 0.05), 1.0) == []
 
 

@@ -12,7 +12,7 @@ from simscen.model.world import RosMapSpec
 from simscen.worlds.maps.ros_map import cell_values, load_map, save_map
 
 GOLD = Path(__file__).parents[5] / "shared" / "data" / "nav2_map_loader_gold"
-needs_gold = pytest.mark.skipif(not GOLD.is_dir(), reason="the maps of others are not here: see CONTRIBUTING.md")
+needs_gold = pytest.mark.skipif(not GOLD.is_dir(), reason="the third-party maps are missing: see CONTRIBUTING.md")
 
 
 def spec(**changes):
@@ -27,7 +27,7 @@ def pgm(path, header, body=b""):
 
 @needs_gold
 @pytest.mark.parametrize("image", ["testmap.png", "testmap.bmp", "testmap.pgm"])
-def test_nav2s_own_test_map_loads_as_its_loader_loads_it(image):
+def test_nav2_test_map_loads_as_in_nav2(image):
     expected = np.loadtxt(GOLD / "expected_grid.txt", dtype=int)
     grid, notes = load_map(RosMapSpec.model_validate(yaml.safe_load((GOLD / "testmap.yaml").read_text())), GOLD / image)
     assert np.array_equal(grid.cells, expected)
@@ -37,10 +37,10 @@ def test_nav2s_own_test_map_loads_as_its_loader_loads_it(image):
 
 
 @needs_gold
-def test_a_missing_image_is_one_clear_error():
-    bad = RosMapSpec.model_validate(yaml.safe_load((GOLD / "invalid_image.yaml").read_text()))
+def test_missing_image_is_one_error():
+    invalid = RosMapSpec.model_validate(yaml.safe_load((GOLD / "invalid_image.yaml").read_text()))
     with pytest.raises(InvalidInput, match="no such file") as caught:
-        load_map(bad, GOLD / bad.image)
+        load_map(invalid, GOLD / invalid.image)
     assert len(caught.value.problems) == 1
 
 
@@ -82,7 +82,7 @@ def test_pixels_that_are_not_opaque_are_unknown_except_in_raw_mode(tmp_path):
     assert load_map(spec(mode="raw"), tmp_path / "a.png")[0].cells.tolist() == [[0, 0, -1]]
 
 
-def test_colors_count_by_their_luma(tmp_path):
+def test_colors_are_converted_by_luma(tmp_path):
     Image.fromarray(np.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255]]], np.uint8)).save(tmp_path / "c.png")
     raw = load_map(spec(mode="raw"), tmp_path / "c.png")[0].cells.tolist()
     assert raw == [[76, -1, 29]]  # 0.299, 0.587 and 0.114 of 255, rounded down
@@ -103,7 +103,7 @@ def test_all_formats_and_depths_of_the_same_map_agree(tmp_path):
         assert np.array_equal(load_map(spec(), path)[0].cells, expected), path.name
 
 
-def test_gray_205_that_counts_as_free_is_worth_a_warning(tmp_path):
+def test_gray_205_that_counts_as_free_gives_a_warning(tmp_path):
     path = pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
     assert load_map(spec(free_thresh=0.196), path)[1] == ()
     (note,) = load_map(spec(free_thresh=0.25), path)[1]
@@ -116,7 +116,7 @@ def test_a_saved_map_loads_as_exactly_the_same_map(tmp_path, values):
     cells = np.random.default_rng(2).choice(values, (11, 6)).astype(np.int8)
     grid = OccupancyGrid(cells, 0.05, Pose2(-1.2345678901234567, 1e-5, -0.1))
     save_map(grid, tmp_path / "my: map.yaml")
-    read = RosMapSpec.model_validate(yaml.safe_load((tmp_path / "my: map.yaml").read_text()))
-    again, notes = load_map(read, tmp_path / read.image)
-    assert np.array_equal(again.cells, cells)
-    assert (again.resolution, again.origin, notes) == (grid.resolution, grid.origin, ())
+    saved_spec = RosMapSpec.model_validate(yaml.safe_load((tmp_path / "my: map.yaml").read_text()))
+    loaded, notes = load_map(saved_spec, tmp_path / saved_spec.image)
+    assert np.array_equal(loaded.cells, cells)
+    assert (loaded.resolution, loaded.origin, notes) == (grid.resolution, grid.origin, ())

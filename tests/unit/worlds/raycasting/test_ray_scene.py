@@ -27,7 +27,7 @@ ORIGIN = Pose3()
 CART = merge_solids([Solid(Box((0.8, 0.5, 1.0)), Pose3(z=0.5)), Solid(Cylinder(0.2, 1.5), Pose3(0.2, 0, 0.75))])
 
 
-def around(count, origin):
+def level_rays(count, origin):
     angles = np.arange(count) * (2 * math.pi / count)
     directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(count)))
     return np.tile(np.array(origin, dtype=float), (count, 1)), directions
@@ -40,7 +40,7 @@ def random_rays(count, seed, low, high):
 
 
 class Bullet:
-    """PyBullet's own rays over the same triangles."""
+    """Ray casts of PyBullet against the same triangles."""
 
     def __init__(self):
         self.client = pybullet.connect(pybullet.DIRECT)
@@ -73,7 +73,7 @@ def bullet():
 
 
 def assert_agree(ours, theirs):
-    """Within 1 mm, but for the handful of rays that graze an edge, where either answer is right."""
+    """Assert equal ranges within 1 mm, except for a few rays that graze an edge, where both answers are valid."""
     same_kind = np.isfinite(ours) == np.isfinite(theirs)
     both = np.isfinite(ours) & np.isfinite(theirs)
     apart = np.abs(ours[both] - theirs[both]) > 0.001
@@ -81,7 +81,7 @@ def assert_agree(ours, theirs):
     assert both.sum() > len(ours) // 10
 
 
-def test_ten_thousand_random_rays_agree_with_pybullet_moving_bodies_included(bullet):
+def test_random_rays_agree_with_pybullet_for_walls_and_moving_bodies(bullet):
     walls = merge_solids(ROOM)
     scene = RayScene(walls)
     bullet.add(walls)
@@ -96,21 +96,21 @@ def test_ten_thousand_random_rays_agree_with_pybullet_moving_bodies_included(bul
         assert_agree(ours, theirs)
 
 
-def test_a_world_ten_kilometers_away_is_as_exact_as_one_at_the_origin():
+def test_ranges_ten_kilometers_from_the_origin_are_as_exact_as_at_the_origin():
     shift = (9900.0, -9900.0, 0.0)
     far = [Solid(s.shape, Pose3(s.pose.x + shift[0], s.pose.y + shift[1], *s.pose[2:]), s.name) for s in ROOM]
     origins, directions = random_rays(2000, 2, (-4.5, -4.5, 0.05), (4.5, 4.5, 1.9))
     near_scene, far_scene = RayScene(merge_solids(ROOM)), RayScene(merge_solids(far))
-    near = near_scene.cast(origins, directions)
-    there = far_scene.cast(origins + shift, directions)
-    assert (np.isfinite(near) != np.isfinite(there)).sum() <= 1
-    both = np.isfinite(near) & np.isfinite(there)
-    assert np.quantile(np.abs(near[both] - there[both]), 0.999) < 1e-4
+    near_ranges = near_scene.cast(origins, directions)
+    far_ranges = far_scene.cast(origins + shift, directions)
+    assert (np.isfinite(near_ranges) != np.isfinite(far_ranges)).sum() <= 1
+    both = np.isfinite(near_ranges) & np.isfinite(far_ranges)
+    assert np.quantile(np.abs(near_ranges[both] - far_ranges[both]), 0.999) < 1e-4
 
 
-def test_bodies_come_move_and_go():
+def test_bodies_are_added_moved_and_removed():
     scene = RayScene(merge_solids([]))
-    origins, directions = around(1, (0, 0, 0.3))
+    origins, directions = level_rays(1, (0, 0, 0.3))
     assert scene.cast(origins, directions)[0] == math.inf
     scene.set_bodies({"cart": (CART, Pose3(3, 0, 0))})
     assert scene.cast(origins, directions)[0] == pytest.approx(2.6)
@@ -120,7 +120,7 @@ def test_bodies_come_move_and_go():
     assert scene.cast(origins, directions)[0] == math.inf
 
 
-def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodies():
+def test_ranges_do_not_depend_on_earlier_queries_or_the_order_of_bodies():
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
     one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
@@ -131,7 +131,7 @@ def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodie
     assert np.array_equal(one.cast(origins, directions), other.cast(origins, directions))
 
 
-def test_many_bodies_are_seen_as_if_they_were_one_world():
+def test_many_bodies_give_the_ranges_of_one_merged_world():
     rng = np.random.default_rng(6)
     places = [Pose3.from_rpy(*rng.uniform((-9, -9, 0), (9, 9, 1)), *rng.uniform(-3, 3, 3)) for _ in range(40)]
     apart, together = (
@@ -150,31 +150,34 @@ def field(count):
 
 
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 361, 5000])
-def test_rays_meet_what_the_package_of_embree_says_of_each_alone_to_the_last_bit(count):
+def test_rays_equal_single_rays_of_the_embree_package_bit_for_bit(count):
     mesh = field(1500)
     device = EmbreeDevice()
     theirs = EmbreeScene(device, True)
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    EmbreeMesh(theirs, mesh.vertices - middle, mesh.faces)
-    for origins, directions in (around(count, (1.0, 2.0, 0.3)), random_rays(count, 9, (-60, -60, 0.1), (60, 60, 0.8))):
-        starts, along = (origins - middle).astype(np.float32), directions.astype(np.float32)
+    center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    EmbreeMesh(theirs, mesh.vertices - center, mesh.faces)
+    for origins, directions in (
+        level_rays(count, (1.0, 2.0, 0.3)),
+        random_rays(count, 9, (-60, -60, 0.1), (60, 60, 0.8)),
+    ):
+        starts, headings = (origins - center).astype(np.float32), directions.astype(np.float32)
         for reach in (4.0, 1e6):
-            told = theirs.run(starts, along, 1.001 * reach, query="DISTANCE").astype(float)
-            told[told > reach] = np.inf
-            assert np.array_equal(RayScene(mesh).cast(origins, directions, reach), told)
+            found = theirs.run(starts, headings, 1.001 * reach, query="DISTANCE").astype(float)
+            found[found > reach] = np.inf
+            assert np.array_equal(RayScene(mesh).cast(origins, directions, reach), found)
 
 
-def test_a_scene_survives_a_fork_and_others_are_built_there():
-    mesh, (origins, directions) = field(200), around(720, (1.0, 2.0, 0.3))
+def test_scene_survives_a_fork_and_the_child_can_build_others():
+    mesh, (origins, directions) = field(200), level_rays(720, (1.0, 2.0, 0.3))
     here = RayScene(mesh).cast(origins, directions)
     child = os.fork()
     if not child:
-        inherited, anew = (RayScene(one).cast(origins, directions) for one in (mesh, field(200)))
-        os._exit(0 if np.array_equal(inherited, here) and np.array_equal(anew, here) else 1)
+        inherited, rebuilt = (RayScene(one).cast(origins, directions) for one in (mesh, field(200)))
+        os._exit(0 if np.array_equal(inherited, here) and np.array_equal(rebuilt, here) else 1)
     assert os.waitpid(child, 0)[1] == 0
 
 
-COLLECTED = """
+COLLECT_CYCLES = """
 import gc
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.geometry.triangulation import merge_solids
@@ -187,22 +190,22 @@ for _ in range(200):
 """
 
 
-def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
-    """Embree 2 did, once in a hundred runs in one process: its device went before its scenes."""
-    assert subprocess.run([sys.executable, "-c", COLLECTED], check=False).returncode == 0
+def test_garbage_collected_scene_does_not_crash():
+    """Embree 2 crashed in 1 % of the runs, as its device was released before its scenes."""
+    assert subprocess.run([sys.executable, "-c", COLLECT_CYCLES], check=False).returncode == 0
 
 
 @pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
-def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
-    """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
+def test_fan_gives_the_ranges_of_its_single_rays(first, beams, field):
+    """The bodies: one behind the lidar, hit by the first and last rays, one around it, and one out of reach."""
     scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
     scene.set_bodies({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
         for reach in (2.0, 20.0):
-            seen, alone = scene.sweep(fan, lens, reach), scene.cast(*fan.at(lens), reach)
-            assert np.array_equal(seen > reach, np.isinf(alone))
-            assert np.allclose(seen[seen <= reach], alone[seen <= reach], rtol=0, atol=2e-6)
+            seen, single = scene.sweep(fan, lens, reach), scene.cast(*fan.at(lens), reach)
+            assert np.array_equal(seen > reach, np.isinf(single))
+            assert np.allclose(seen[seen <= reach], single[seen <= reach], rtol=0, atol=2e-6)
 
 
 def test_rays_within_a_cone_match_brute_force():
@@ -210,33 +213,33 @@ def test_rays_within_a_cone_match_brute_force():
     for _ in range(500):
         count, first = int(rng.integers(1, 60)), float(rng.uniform(-7, 7))
         increment = float(rng.uniform(0.01, 2 * math.pi / count))
-        (x, y), least = rng.normal(size=2), float(rng.uniform(-2.5, 2.5))
+        (x, y), low = rng.normal(size=2), float(rng.uniform(-2.5, 2.5))
         angles = first + increment * np.arange(count)
-        met = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= least).tolist())
-        told = [ray for rays in RayFan(first, increment, count).rays_towards(x, y, least) for ray in range(count)[rays]]
-        assert met <= set(told)
-        beside = set(told) - met
-        assert all((ray - 1) % count in met or (ray + 1) % count in met or not met for ray in beside)
-        assert len(beside) <= 4
+        hit = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= low).tolist())
+        found = [ray for rays in RayFan(first, increment, count).rays_towards(x, y, low) for ray in range(count)[rays]]
+        assert hit <= set(found)
+        extra = set(found) - hit
+        assert all((ray - 1) % count in hit or (ray + 1) % count in hit or not hit for ray in extra)
+        assert len(extra) <= 4
 
 
 @pytest.mark.parametrize("spread", [0.0, 3.0])
-def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_nearer(spread):
-    """Also where rays begin in several places, and where a body lies far from the origin of its frame."""
-    off = merge_solids([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
-    scene, (origins, directions) = RayScene(merge_solids([])), around(8, (0.0, 0.0, 0.5))
+def test_body_beyond_the_reach_of_all_rays_is_skipped_until_it_is_nearer(spread):
+    """Holds for rays from several origins and for a body far from the origin of its frame."""
+    offset_box = merge_solids([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
+    scene, (origins, directions) = RayScene(merge_solids([])), level_rays(8, (0.0, 0.0, 0.5))
     origins[4:, 0] -= spread
     for x, seen in ((18.0, math.inf), (10.0, 3.5), (30.0, math.inf)):
-        scene.set_bodies({"far": (CART, Pose3(50.0)), "body": (off, Pose3(x))})
+        scene.set_bodies({"far": (CART, Pose3(50.0)), "body": (offset_box, Pose3(x))})
         assert scene.cast(origins, directions, 5.0)[0] == pytest.approx(seen)
-    scene.set_bodies({"body": (off, Pose3(6.0 - 4.0 - spread))})
+    scene.set_bodies({"body": (offset_box, Pose3(6.0 - 4.0 - spread))})
     assert scene.cast(origins, directions, 5.0)[4] == pytest.approx(3.5)
 
 
 @pytest.mark.parametrize("turns", range(4))
 @pytest.mark.parametrize("tilt", [1e-19, 1.8e-18, 1e-17, 1e-9])
-def test_rays_that_rounding_tilts_meet_what_level_ones_meet(turns, tilt):
-    """Embree took whole packets for nothing whose rays part by the sign of next to nothing."""
+def test_rays_tilted_by_rounding_give_the_ranges_of_level_rays(turns, tilt):
+    """Embree missed all hits of packets whose rays differ in the sign of a tiny component."""
     ends = [Solid(Box((0.2, 10.0, 2.0)), Pose3(x, 0, 1)) for x in (-5, 5)]
     scene, fan = RayScene(merge_solids([*ROOM, *ends])), RayFan(-math.pi, math.pi / 180, 360)
     half = turns * math.pi / 4

@@ -11,7 +11,7 @@ from simscen.worlds.routes.clearance import MAX_LEVELS, clearance_field, section
 BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
 
 
-def scattered(seed):
+def random_boxes(seed):
     rng = np.random.default_rng(seed)
     solids, polygons = [], []
     for x, y, yaw in rng.uniform(-2.5, 2.5, (6, 3)):
@@ -24,25 +24,25 @@ def scattered(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
-    mesh, truth = scattered(seed)
+    mesh, reference = random_boxes(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
     points = np.random.default_rng(seed).uniform(-2.9, 2.9, (3000, 2))
-    exact = truth.distance(shapely.points(points))
-    deep = truth.buffer(-0.04).distance(shapely.points(points)) == 0
+    exact = reference.distance(shapely.points(points))
+    deep_inside = reference.buffer(-0.04).distance(shapely.points(points)) == 0
     outside = exact > 0.04
     assert np.abs(field.exact(points) - exact)[outside].max() < 0.0015
-    assert (field.exact(points)[deep] < 0).all()
+    assert (field.exact(points)[deep_inside] < 0).all()
     for distance in (0.1, 0.25, 0.6):
         assert np.array_equal(field.has_clearance(points, distance), field.exact(points) >= distance)
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("distance", [0.04, 0.25, 0.6])
-def test_free_cells_are_those_whose_middle_keeps_the_distance(seed, distance):
-    mesh, _ = scattered(seed)
+def test_free_cells_are_those_whose_center_has_the_clearance(seed, distance):
+    mesh, _ = random_boxes(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
-    middles = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
-    expected = (field.exact(middles) >= distance).reshape(field.grid.shape)
+    centers = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
+    expected = (field.exact(centers) >= distance).reshape(field.grid.shape)
     assert np.array_equal(field.free_cells(distance), expected)
 
 
@@ -54,7 +54,7 @@ def test_points_are_pushed_off_the_nearest_solid():
     assert field.push_away(points, 0.3) == pytest.approx(expected, abs=0.001)
 
 
-def test_where_nothing_stands_everything_is_far_away():
+def test_clearance_is_large_everywhere_in_an_empty_world():
     field = clearance_field(merge_solids([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.has_clearance(np.zeros((3, 2)), 100.0).all()
     assert field.free_cells(100.0).all()
@@ -66,7 +66,7 @@ def test_upright_solids_need_one_cross_section():
     assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_LEVELS
 
 
-def test_a_low_shelf_is_seen_between_the_heights_of_the_robot():
+def test_thin_shelf_within_the_height_of_the_robot_is_an_obstacle():
     shelf = merge_solids([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
     field = clearance_field(shelf, empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.exact(np.array([[0.0, 0.0]]))[0] < 0

@@ -16,8 +16,8 @@ def wall(name, x, y, length, width, yaw=0.0):
 
 
 def leg(start, goal, *solids):
-    ways = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
-    return ways.leg(Pose2(*start), Pose2(*goal), "goal")
+    paths = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
+    return paths.leg(Pose2(*start), Pose2(*goal), "goal")
 
 
 DOOR = wall("left", 0, 10.5, 0.1, 20), wall("right", 0, -10.5, 0.1, 20)
@@ -26,7 +26,7 @@ DOOR = wall("left", 0, 10.5, 0.1, 20), wall("right", 0, -10.5, 0.1, 20)
 
 @pytest.mark.parametrize("start", [(-4, 0), (-4, 4), (-0.6, -3)])
 @pytest.mark.parametrize("goal", [(4, 0), (4, 4), (0.6, 4)])
-def test_a_door_is_found_at_its_true_width_however_the_way_crosses_it(start, goal):
+def test_door_has_its_true_width_at_any_angle_of_the_path(start, goal):
     found = leg(start, goal, *DOOR).passages
     narrowest = min(found, key=lambda passage: passage.width)
     assert narrowest.width == pytest.approx(1.0, abs=0.03)
@@ -34,27 +34,27 @@ def test_a_door_is_found_at_its_true_width_however_the_way_crosses_it(start, goa
     assert narrowest.middle == pytest.approx((0.0, 0.0), abs=0.1)
 
 
-def test_passages_come_in_the_direction_of_the_way_and_each_crosses_it():
+def test_passages_are_ordered_along_the_path_and_cross_it():
     corridor = wall("north", 0, 1, 8, 0.2), wall("south", 0, -1, 8, 0.2)
-    forth = leg((-3.5, 0), (3.5, 0.3), *corridor).passages
-    assert len(forth) > 10
-    assert all(passage.width == pytest.approx(1.8, abs=0.1) for passage in forth)
-    middles = [passage.middle[0] for passage in forth]
+    passages = leg((-3.5, 0), (3.5, 0.3), *corridor).passages
+    assert len(passages) > 10
+    assert all(passage.width == pytest.approx(1.8, abs=0.1) for passage in passages)
+    middles = [passage.middle[0] for passage in passages]
     assert middles == sorted(middles)
-    assert all(min(passage.ends)[1] * max(passage.ends)[1] < 0 for passage in forth)
+    assert all(min(passage.ends)[1] * max(passage.ends)[1] < 0 for passage in passages)
 
 
-def test_in_the_open_and_along_a_single_wall_there_is_none():
+def test_open_space_and_a_single_wall_have_no_passages():
     assert leg((-4, 0), (4, 0)).passages == ()
-    assert leg((-4, 0), (4, 0), wall("lonely", 0, 1, 8, 0.2)).passages == ()
+    assert leg((-4, 0), (4, 0), wall("single", 0, 1, 8, 0.2)).passages == ()
 
 
-def test_where_there_is_no_way_there_are_no_passages():
+def test_unreachable_goal_without_a_gap_has_no_passages():
     closed = leg((-4, 0), (4, 0), wall("across", 0, 0, 0.1, 40.0))
     assert (closed.length, closed.passages) == (math.inf, ())
 
 
-def test_an_oblique_door_is_as_wide_as_it_is():
+def test_oblique_door_has_its_true_width():
     yaw = math.radians(50)
     posts = [
         wall(name, *(k * 1.9 * np.array([math.cos(yaw), math.sin(yaw)])), 3.0, 0.1, yaw)
@@ -64,7 +64,7 @@ def test_an_oblique_door_is_as_wide_as_it_is():
     assert min(passage.width for passage in found) == pytest.approx(0.8, abs=0.03)
 
 
-def test_a_gap_too_narrow_for_the_robot_is_the_passage_of_a_way_that_is_none():
+def test_passage_of_an_unreachable_goal_is_the_gap_that_is_too_narrow():
     narrow = wall("left", 0, 10.15, 0.1, 20), wall("right", 0, -10.15, 0.1, 20)
     closed = leg((-4, 0), (4, 0), *narrow)
     assert closed.length == math.inf

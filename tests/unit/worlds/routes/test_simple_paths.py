@@ -21,10 +21,10 @@ BOUNDS = (0.0, 0.0, 4.0, 4.0)
 START, GOAL = Pose2(0.5, 2.0), Pose2(3.5, 2.0)
 
 sizes = st.floats(0.2, 3.0)
-spots = st.floats(0.0, 4.0)
+positions = st.floats(0.0, 4.0)
 boxes = st.builds(
     lambda x, y, yaw, a, b: Solid(Box((a, b, 1.0)), Pose3.planar(Pose2(x, y, yaw), 0.5), "box"),
-    st.floats(1.2, 2.8), spots, st.floats(-3.0, 3.0), st.floats(0.1, 0.6), sizes,
+    st.floats(1.2, 2.8), positions, st.floats(-3.0, 3.0), st.floats(0.1, 0.6), sizes,
 )  # fmt: skip
 
 
@@ -42,10 +42,10 @@ ROOM = [
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(boxes, max_size=5))
-def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest(solids: list[Solid]) -> None:
-    plain = simple_paths_between([*ROOM, *solids], 0.2, Z)
-    assert plain is not None
-    length = plain.length((0.5, 2.0), (3.5, 2.0))
+def test_simple_path_is_no_shorter_than_the_exact_shortest_path(solids: list[Solid]) -> None:
+    simple = simple_paths_between([*ROOM, *solids], 0.2, Z)
+    assert simple is not None
+    length = simple.length((0.5, 2.0), (3.5, 2.0))
     exact = ShortestPaths(merge_solids([*ROOM, *solids]), BOUNDS, 0.2, Z)
     if math.isfinite(length):
         assert exact.may_reach(START, GOAL)
@@ -54,7 +54,7 @@ def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest
         assert exact.length(START, GOAL) == math.inf
 
 
-def test_a_sealed_room_is_proven_and_the_wall_between_is_where() -> None:
+def test_sealed_room_is_unreachable_and_its_narrowest_gap_is_in_the_wall() -> None:
     solids = [*ROOM, wall(2.5, 0.0, 4.0, "partition")]
     exact = ShortestPaths(merge_solids(solids), BOUNDS, 0.2, Z)
     assert not exact.may_reach(START, GOAL)
@@ -63,7 +63,7 @@ def test_a_sealed_room_is_proven_and_the_wall_between_is_where() -> None:
     assert (gap.width, round(gap.x, 1)) == (0.0, 2.5)
 
 
-def test_the_width_of_a_gap_is_measured_between_its_posts() -> None:
+def test_width_of_a_gap_is_measured_between_its_walls() -> None:
     for width in (0.2, 0.31, 0.38):
         solids = [*ROOM, wall(2.0, 0.0, 3.0, "low"), wall(2.0, 3.0 + width, 4.0, "high")]
         gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
@@ -76,12 +76,12 @@ OUTLINE = ((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2))
 
 
 @settings(max_examples=60, deadline=None)
-@given(boxes, st.floats(0.5, 3.5), spots, st.floats(-3.0, 3.0))
-def test_a_footprint_overlaps_what_its_points_are_in(box: Solid, x: float, y: float, yaw: float) -> None:
+@given(boxes, st.floats(0.5, 3.5), positions, st.floats(-3.0, 3.0))
+def test_footprint_overlaps_boxes_that_contain_its_points(box: Solid, x: float, y: float, yaw: float) -> None:
     pose = Pose2(x, y, yaw)
-    told = first_solid_in_footprint([box], OUTLINE, pose, Z) is not None
+    hit = first_solid_in_footprint([box], OUTLINE, pose, Z) is not None
     assert (
-        footprint_overlaps_solid(box, place_polygon(tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE), pose), Z) == told
+        footprint_overlaps_solid(box, place_polygon(tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE), pose), Z) == hit
     )
     size = box.shape.size  # type: ignore[union-attr]
     corners = place_polygon(
@@ -90,4 +90,4 @@ def test_a_footprint_overlaps_what_its_points_are_in(box: Solid, x: float, y: fl
     )
     grid = np.stack(np.meshgrid(np.linspace(-0.39, 0.39, 40), np.linspace(-0.19, 0.19, 20)), -1).reshape(-1, 2)
     inside = any(polygon_contains(corners, (px, py)) for px, py in pose.apply(grid).tolist())
-    assert told or not inside
+    assert hit or not inside

@@ -18,13 +18,13 @@ Refuse = Callable[..., list[Problem]]
 def data() -> Path:
     folder = Path(__file__).parents[5] / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip("the worlds of others are not here: see CONTRIBUTING.md")
+        pytest.skip("the third-party worlds are missing: see CONTRIBUTING.md")
     return folder
 
 
 @pytest.fixture
 def load(tmp_path: Path) -> Load:
-    """Load the content of a `<world>` named w, of a `<model>` file, or of whole text."""
+    """Return a function that loads a whole SDF text, or the content of a `<world>` named w."""
 
     def _load(content: str, version: str = "1.9", lenient: bool = False, **options: object) -> World:
         file = tmp_path / "shop.world"
@@ -37,7 +37,7 @@ def load(tmp_path: Path) -> Load:
 
 @pytest.fixture
 def refuse(load: Load) -> Refuse:
-    """The problems that loading ends with."""
+    """Return a function that returns the problems with which loading fails."""
 
     def _refuse(content: str, **options: object) -> list[Problem]:
         with pytest.raises(InvalidInput) as caught:

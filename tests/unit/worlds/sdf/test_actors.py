@@ -36,7 +36,7 @@ def test_scripted_actor_is_an_unpushable_body_with_a_path(load):
     assert body.pose.plane == body.path.poses[0]
 
 
-def test_a_person_stands_in_for_a_skin_on_the_ground(load):
+def test_skin_is_replaced_by_a_person_on_the_ground(load):
     world = load(actor(WALK))
     (solid,) = world.bodies[0].solids
     assert solid.shape == Cylinder(0.3, 1.8)
@@ -44,14 +44,14 @@ def test_a_person_stands_in_for_a_skin_on_the_ground(load):
     assert "stands in for its skin" in world.notes[0]
 
 
-def test_collision_geometry_is_used_where_there_is_some(load):
+def test_collision_geometry_is_used_if_present(load):
     world = load(actor(WALK, SKIN + BOX))
     (solid,) = world.bodies[0].solids
     assert world.bodies[0].pose.compose(solid.pose).position == (1, 0, 1.5)
     assert not world.notes
 
 
-def test_scripts_loop_unless_they_say_otherwise_and_wait_before_each_round(load):
+def test_scripts_loop_by_default_and_wait_before_each_round(load):
     path = load(actor("<delay_start>2</delay_start>" + WALK)).bodies[0].path
     assert (path.mode, path.start) == ("loop", 0)
     assert path.times == (0, 2, 6, 7)
@@ -73,17 +73,17 @@ def test_trajectories_follow_each_other_by_id(load):
 def test_a_jump_between_trajectories_takes_no_time(load):
     path = load(actor(WALK + trajectory([(0, 9, 9, 1, 0), (3, 5, 6, 1, 0)], 1))).bodies[0].path
     assert path.times == (0, 4, 5, 5, 8)
-    assert largest_step(path, 1 / 240) < MAX_STEP_M, "a jump is no fast motion"
+    assert largest_step(path, 1 / 240) < MAX_STEP_M, "a jump is not a fast motion"
 
 
-def test_an_actor_waits_at_a_first_waypoint_that_is_late(load):
+def test_actor_waits_at_its_first_waypoint_until_its_time(load):
     path = load(actor(trajectory([(2, 1, 1, 1, 0), (4, 2, 1, 1, 0)]))).bodies[0].path
     assert path.times == (0, 2, 4)
     assert path.poses[0] == path.poses[1]
 
 
 @pytest.mark.parametrize("script", ["", "<auto_start>false</auto_start>" + WALK, trajectory([(0, 1, 0, 1, 0)])])
-def test_an_actor_without_a_running_script_stands_still(load, script):
+def test_actor_without_a_running_script_is_stationary(load, script):
     world = load(actor(script, rest="<pose>1 0 1 0 0 0</pose>"))
     assert world.bodies[0].path is None
     assert world.bodies[0].pose.plane == Pose2(1, 0, 0)
@@ -95,7 +95,7 @@ def test_a_path_that_climbs_is_flattened_with_a_note(load):
     assert any("keeps the height and the tilt" in note for note in world.notes)
 
 
-def test_included_actors_walk_too(load, tmp_path):
+def test_included_actors_walk(load, tmp_path):
     (tmp_path / "anna.sdf").write_text(f"<sdf version='1.9'>{actor(WALK)}</sdf>")
     (body,) = load("<include><uri>anna.sdf</uri><name>berta</name></include>").bodies
     assert (body.name, body.path.times) == ("berta", (0, 4, 5))

@@ -38,7 +38,7 @@ def test_movable_joints_are_held_rigid_with_a_note(load):
     assert world.notes == ("shop.world: world[w]/model[cart]/joint[j]: a joint of type revolute is treated as fixed",)
 
 
-def test_links_without_a_joint_are_bodies_of_their_own(load):
+def test_links_without_a_joint_are_separate_bodies(load):
     bodies = load(model(link("a") + link("b", 4), rest="<pose>1 0 0 0 0 0</pose>")).bodies
     assert [(body.name, body.pose.x) for body in bodies] == [("cart::a", 1), ("cart::b", 5)]
 
@@ -63,7 +63,7 @@ def test_joints_may_name_frames_and_nested_models(load):
     assert body.mass == 2
 
 
-def test_two_copies_of_one_file_are_not_confused(load, tmp_path):
+def test_joint_attaches_only_the_named_one_of_two_copies_of_a_file(load, tmp_path):
     (tmp_path / "wheel.sdf").write_text(f"<sdf version='1.9'><model name='wheel'>{link('hub')}</model></sdf>")
     wheels = "".join(
         f"<include><uri>wheel.sdf</uri><name>{name}</name><pose>{x} 0 0 0 0 0</pose></include>"
@@ -73,13 +73,13 @@ def test_two_copies_of_one_file_are_not_confused(load, tmp_path):
     assert [(body.name, body.mass) for body in world.bodies] == [("cart::base", 2), ("cart::right::hub", 1)]
 
 
-def test_a_static_parent_keeps_everything_below_it(load):
+def test_nested_models_of_a_static_model_are_static(load):
     inner = f"<model name='n'><static>false</static>{link('a')}</model>"
     world = load(model(inner, rest="<static>TRUE</static>"))
     assert (len(world.solids), len(world.bodies)) == (1, 0)
 
 
-def test_a_kinematic_link_is_moved_by_nothing_but_the_scenario(load):
+def test_kinematic_link_is_moved_only_by_the_scenario(load):
     assert load(model(link("a", rest="<kinematic>1</kinematic>"))).bodies[0].mass == 0
 
 
@@ -104,7 +104,7 @@ def test_invalid_mass_is_refused(refuse, mass):
     assert "/inertial/mass: " in problem.message
 
 
-def test_joints_to_nowhere_are_refused(refuse):
+def test_joints_to_missing_links_are_refused(refuse):
     assert "unknown link or frame 'b'" in refuse(model(link("a") + joint("a", "b")))[0].message
     assert "<parent> is missing" in refuse(model(link("a") + "<joint name='j'><child>a</child></joint>"))[0].message
 

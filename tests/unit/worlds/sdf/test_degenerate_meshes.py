@@ -1,4 +1,4 @@
-"""Degenerate meshes and shapes load and are drawn, or are refused, without any warning of NumPy or trimesh."""
+"""Tests that degenerate meshes and shapes are loaded or refused without warnings of NumPy or trimesh."""
 
 import math
 import struct
@@ -96,8 +96,8 @@ def dae(triangle: Triangle, transform: str = "", unit: str = "1") -> bytes:
 WRITERS = {"binary.stl": stl, "ascii.stl": ascii_stl, "mesh.obj": obj, "mesh.dae": dae}
 
 
-def use(world: World) -> None:
-    """Do everything that a session does with a world before physics."""
+def process_world(world: World) -> None:
+    """Run all steps of a session that process a world before the physics."""
     built = build_world_and_map(world, 0.2)
     inspect_world(built)
     draw_world(built, 0.2)
@@ -109,7 +109,7 @@ def use(world: World) -> None:
     first_solid_in_footprint(world.solids, footprint, Pose2(0.0, 0.0, 0.4), (0.0, 0.4))
 
 
-def load_and_use(folder: Path, geometry: str, pose: str) -> None:
+def load_and_process(folder: Path, geometry: str, pose: str) -> None:
     file = folder / "degenerate.sdf"
     file.write_text(
         f"<sdf version='1.9'><world name='w'><model name='m'><static>1</static><pose>{pose}</pose><link name='a'>"
@@ -117,7 +117,7 @@ def load_and_use(folder: Path, geometry: str, pose: str) -> None:
         "</world></sdf>"
     )
     try:
-        use(load_sdf(file, root=folder))
+        process_world(load_sdf(file, root=folder))
     except InvalidInput as error:
         assert all(problem.message for problem in error.problems)
 
@@ -126,23 +126,23 @@ def load_and_use(folder: Path, geometry: str, pose: str) -> None:
 @pytest.mark.parametrize("pose", ["0 0 0 0 0 0", "1000.1 2000.3 0.1 0.3 0.2 0.3"])
 @pytest.mark.parametrize("file_name", WRITERS)
 @pytest.mark.parametrize("triangle", TRIANGLES)
-def test_worlds_with_degenerate_meshes_make_no_warnings(
+def test_worlds_with_degenerate_meshes_cause_no_warnings(
     tmp_path: Path, triangle: str, file_name: str, pose: str
 ) -> None:
     (tmp_path / file_name).write_bytes(WRITERS[file_name](TRIANGLES[triangle]))
     for scale in SCALES:
-        load_and_use(tmp_path, f"<mesh><uri>{file_name}</uri><scale>{scale}</scale></mesh>", pose)
+        load_and_process(tmp_path, f"<mesh><uri>{file_name}</uri><scale>{scale}</scale></mesh>", pose)
 
 
 @pytest.mark.parametrize("pose", ["0 0 0 0 0 0", "1000.1 2000.3 0.1 0.3 0.2 0.3"])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_worlds_with_degenerate_shapes_make_no_warnings(tmp_path: Path, shape: str, pose: str) -> None:
-    load_and_use(tmp_path, shape, pose)
+def test_worlds_with_degenerate_shapes_cause_no_warnings(tmp_path: Path, shape: str, pose: str) -> None:
+    load_and_process(tmp_path, shape, pose)
 
 
 @pytest.mark.parametrize("transform", TRANSFORMS)
 @pytest.mark.parametrize("triangle", ["regular", "huge"])
-def test_degenerate_transformations_make_no_warnings(triangle: str, transform: str) -> None:
+def test_degenerate_transformations_cause_no_warnings(triangle: str, transform: str) -> None:
     try:
         parts = read_parts(dae(TRIANGLES[triangle], transform), ".dae")
     except UnusableMesh as error:
@@ -152,7 +152,7 @@ def test_degenerate_transformations_make_no_warnings(triangle: str, transform: s
 
 
 @pytest.mark.parametrize("unit", ["0", "1e-320", "9e3", "nan", "inf"])
-def test_degenerate_units_make_no_warnings(unit: str) -> None:
+def test_degenerate_units_cause_no_warnings(unit: str) -> None:
     try:
         parts = read_parts(dae(TRIANGLES["huge"], unit=unit), ".dae")
     except UnusableMesh as error:
@@ -163,7 +163,7 @@ def test_degenerate_units_make_no_warnings(unit: str) -> None:
 
 @pytest.mark.parametrize("file_name", WRITERS)
 @pytest.mark.parametrize("triangle", ["infinite", "not_a_number"])
-def test_broken_coordinates_are_refused_or_read_as_finite_ones(triangle: str, file_name: str) -> None:
+def test_non_finite_coordinates_are_refused_or_read_as_finite_ones(triangle: str, file_name: str) -> None:
     try:
         parts = read_parts(WRITERS[file_name](TRIANGLES[triangle]), Path(file_name).suffix)
     except UnusableMesh as error:
@@ -172,7 +172,7 @@ def test_broken_coordinates_are_refused_or_read_as_finite_ones(triangle: str, fi
         assert all(np.isfinite(part.vertices).all() for part in parts)
 
 
-def test_quads_of_an_obj_become_two_triangles() -> None:
+def test_quads_of_an_obj_file_become_two_triangles() -> None:
     (part,) = read_parts(b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", ".obj")
     assert part.faces.tolist() == [[0, 1, 2], [2, 3, 0]]
 

@@ -51,17 +51,16 @@ def test_the_number_of_elements_is_limited(refuse, monkeypatch):
     assert "more than 1000 elements" in problem.message
 
 
-def test_a_kind_of_element_is_looked_up_once_however_often_it_is_there(tmp_path, monkeypatch):
-    looks = []
+def test_repeated_unknown_element_is_looked_up_once(tmp_path, monkeypatch):
+    lookups = []
     real = difflib.get_close_matches
-    monkeypatch.setattr(
-        difflib, "get_close_matches", lambda word, *rest, **how: looks.append(word) or real(word, *rest, **how)
-    )
+    counting = lambda word, *rest, **options: lookups.append(word) or real(word, *rest, **options)  # noqa: E731
+    monkeypatch.setattr(difflib, "get_close_matches", counting)
     (tmp_path / "x.world").write_text(
         f"<sdf version='1.6'><world name='w'>{MODEL}{'<never_heard_of/>' * 1000}</world></sdf>"
     )
     load_sdf(tmp_path / "x.world", root=tmp_path)
-    assert looks == ["never_heard_of"]
+    assert lookups == ["never_heard_of"]
 
 
 def test_files_beyond_20_mib_are_refused_without_being_read(tmp_path):
@@ -87,9 +86,9 @@ def test_a_missing_world_is_reported(tmp_path):
         load_sdf(tmp_path / "x.world", root=tmp_path)
 
 
-def test_several_mistakes_are_reported_at_once_in_file_order(refuse):
-    wrong = LINK.replace("1 1 1", "1 0 1")
-    problems = refuse(f"<model name='m'>{wrong}</model>\n<population name='p'/>\n<include/>\n{MODEL}")
+def test_several_mistakes_are_reported_together_in_file_order(refuse):
+    invalid = LINK.replace("1 1 1", "1 0 1")
+    problems = refuse(f"<model name='m'>{invalid}</model>\n<population name='p'/>\n<include/>\n{MODEL}")
     assert [problem.line for problem in problems] == [2, 3, 4]
 
 
@@ -121,7 +120,7 @@ def test_unknown_elements_without_geometry_leave_a_note(load):
     )
 
 
-def test_lights_plugins_extensions_and_definitions_of_xacro_are_passed_over(load):
+def test_lights_plugins_extensions_and_xacro_definitions_are_ignored(load):
     harmless = (
         "<light name='sun' type='directional'/><plugin name='p' filename='f'><model/></plugin><gz:extra/>"
         "<xacro:property name='x' value='1'/><xacro:unless value='1'><plugin/></xacro:unless>"
@@ -131,25 +130,25 @@ def test_lights_plugins_extensions_and_definitions_of_xacro_are_passed_over(load
     assert not world.notes
 
 
-def test_the_world_takes_its_name_and_bounds_from_the_file(load):
+def test_world_has_the_name_and_bounds_of_the_file(load):
     world = load(MODEL.replace("1 1 1", "2 4 1"))
     assert world.name == "w"
     assert world.bounds == pytest.approx((-1, -2, 1, 2))
 
 
-def test_a_file_of_models_only_is_a_world_of_its_own(load):
+def test_file_with_only_models_is_a_world(load):
     other = MODEL.replace("'m'", "'n'")
     world = load(f"<sdf version='1.7'>{MODEL}{other}</sdf>")
     assert (world.name, len(world.solids)) == ("shop", 2)
 
 
-def test_loading_twice_gives_the_same(load):
+def test_loading_twice_gives_equal_worlds(load):
     text = MODEL + MODEL.replace("'m'", "'n'").replace("<static>1</static>", "")
     first, second = load(text), load(text)
     assert (first.solids, first.bodies, first.notes) == (second.solids, second.bodies, second.notes)
 
 
-def test_messages_show_no_control_characters_and_no_endless_names(refuse):
+def test_messages_contain_no_control_characters_and_shorten_long_names(refuse):
     for name in ("a\u202eb", "x" * 100_000):
         (problem,) = refuse(MODEL.replace("1 1 1", "1 1").replace("'c'", f"'{name}'"))
         assert problem.message.isprintable()

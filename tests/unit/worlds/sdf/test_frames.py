@@ -30,7 +30,7 @@ def test_a_link_may_be_placed_relative_to_another_link(load):
     assert position(world) == pytest.approx((5, 1, 1))
 
 
-def test_a_frame_stands_on_what_it_is_attached_to(load):
+def test_frame_is_placed_relative_to_its_attached_frame(load):
     world = load(
         model(
             "<link name='a'><pose>2 0 0 0 0 0</pose></link>"
@@ -41,7 +41,7 @@ def test_a_frame_stands_on_what_it_is_attached_to(load):
     assert position(world) == pytest.approx((3, 0, 3))
 
 
-def test_a_joint_stands_on_its_child_link_unless_it_says_otherwise(load):
+def test_joint_is_placed_relative_to_its_child_link_by_default(load):
     joint = "<joint name='j' type='fixed'><parent>world</parent><child>a</child><pose{}>0 0 1 0 0 0</pose></joint>"
     rest = f"<link name='a'><pose>2 0 0 0 0 0</pose></link><link name='b'><pose relative_to='j'/>{BOX}</link>"
     assert position(load(model(rest + joint.format("")))) == pytest.approx((2, 0, 1))
@@ -57,7 +57,7 @@ def test_a_collision_may_be_placed_relative_to_any_frame_of_its_model(load):
     np.testing.assert_allclose(world.solids[0].pose, Pose3(9, 0, 1), atol=1e-12)
 
 
-def test_names_reach_into_nested_models(load):
+def test_relative_to_may_name_frames_of_nested_models(load):
     world = load(
         model(
             "<model name='n'><pose>1 0 0 0 0 0</pose><link name='a'><pose>0 2 0 0 0 0</pose></link></model>"
@@ -67,7 +67,7 @@ def test_names_reach_into_nested_models(load):
     assert position(world) == pytest.approx((1, 2, 3))
 
 
-def test_models_may_stand_on_frames_and_other_models_of_the_world(load):
+def test_models_may_be_placed_relative_to_frames_and_models_of_the_world(load):
     world = load(
         f"<model name='table'><static>1</static><pose>4 0 0 0 0 0</pose><link name='a'>{BOX}</link></model>"
         f"<model name='cup'><static>1</static><pose relative_to='table::a'>0 0 1 0 0 0</pose>"
@@ -76,7 +76,7 @@ def test_models_may_stand_on_frames_and_other_models_of_the_world(load):
     assert position(world, 1) == pytest.approx((4, 0, 1))
 
 
-def test_a_placement_frame_is_what_the_pose_places(load):
+def test_pose_of_a_model_applies_to_its_placement_frame(load):
     world = load(
         "<model name='m' placement_frame='foot'><static>1</static><pose>5 0 0 0 0 0</pose>"
         f"<link name='foot'><pose>1 0 2 0 0 0</pose></link><link name='a'>{BOX}</link></model>"
@@ -106,7 +106,7 @@ def test_poses_that_depend_on_each_other_are_refused(refuse):
     assert "depends on itself" in problems[0].message
 
 
-def test_a_thousand_frames_on_top_of_each_other_are_an_error_and_no_crash(refuse):
+def test_chain_of_a_thousand_frames_is_an_error(refuse):
     frames = "".join(f"<frame name='f{k + 1}' attached_to='f{k}'/>" for k in range(3000))
     (problem,) = refuse(model(f"<frame name='f0'/>{frames}<link name='a'><pose relative_to='f3000'/>{BOX}</link>"))
     assert "nested too deeply" in problem.message

@@ -15,13 +15,13 @@ BALL = "<sphere><radius>0.5</radius></sphere>"
 
 
 def write(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, extra="<static>1</static>"):
-    place = folder / name
-    place.mkdir(parents=True, exist_ok=True)
+    model_folder = folder / name
+    model_folder.mkdir(parents=True, exist_ok=True)
     for file in files:
-        (place / file).write_text(CRATE.format(version="1.6", shape=shape, extra=extra))
+        (model_folder / file).write_text(CRATE.format(version="1.6", shape=shape, extra=extra))
     if config is not None:
-        (place / "model.config").write_text(f"<model><name>{name}</name>{config}</model>")
-    return place
+        (model_folder / "model.config").write_text(f"<model><name>{name}</name>{config}</model>")
+    return model_folder
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_model_uris_are_looked_up_in_the_search_folders_in_order(load, models, t
 
 @pytest.mark.parametrize("uri", ["elsewhere/models/crate", "file://elsewhere/models/crate",
                                  "elsewhere/models/crate/model.sdf", "elsewhere/models/../models/crate"])  # fmt: skip
-def test_relative_paths_start_at_the_file_that_names_them(load, models, uri):
+def test_relative_paths_are_relative_to_the_including_file(load, models, uri):
     assert len(load(include(uri)).solids) == 1
 
 
@@ -54,33 +54,33 @@ def test_absolute_paths_inside_the_root_are_read(load, models):
 
 
 def test_an_include_overrides_name_pose_and_static(load, models):
-    over = "<name>left</name><pose>1 2 3 0 0 0</pose>"
-    (solid,) = load(include("model://crate", over), search=[models]).solids
+    overrides = "<name>left</name><pose>1 2 3 0 0 0</pose>"
+    (solid,) = load(include("model://crate", overrides), search=[models]).solids
     assert solid.name == "left::a::c"
     assert solid.pose.position == (1, 2, 3)
-    (body,) = load(include("model://crate", over + "<static>false</static>"), search=[models]).bodies
+    (body,) = load(include("model://crate", overrides + "<static>false</static>"), search=[models]).bodies
     assert body.name == "left"
 
 
 @pytest.mark.parametrize(
     ("name", "message"), [("", "has no name"), ("x" * 121, "longer than 120"), ("a\u202eb", "control")]
 )
-def test_the_new_name_is_checked_like_any_other(refuse, models, name, message):
+def test_new_name_of_an_include_is_validated(refuse, models, name, message):
     assert message in refuse(include("model://crate", f"<name>{name}</name>"), search=[models])[0].message
 
 
-def test_without_a_pose_of_its_own_an_include_keeps_that_of_the_model(load, tmp_path):
+def test_include_without_a_pose_keeps_that_of_the_model(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
     assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
 
 
-def test_a_placement_frame_of_an_include_is_what_its_pose_places(load, tmp_path):
+def test_pose_of_an_include_applies_to_its_placement_frame(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static><frame name='corner'><pose>1 1 0 0 0 0</pose></frame>")
     world = load(include("m/crate", "<pose>0 0 0 0 0 0</pose><placement_frame>corner</placement_frame>"))
     assert world.solids[0].pose.position == (-1, -1, 0)
 
 
-def test_the_pose_of_an_include_may_be_relative_to_a_frame_beside_it(load, models):
+def test_pose_of_an_include_may_be_relative_to_a_frame_of_its_parent(load, models):
     frame = "<frame name='f'><pose>10 0 0 0 0 0</pose></frame>"
     world = load(frame + include("model://crate", "<pose relative_to='f'>1 0 0 0 0 0</pose>"), search=[models])
     assert world.solids[0].pose.position == (11, 0, 0)
@@ -94,7 +94,7 @@ def test_model_included_in_a_static_model_is_static(load, tmp_path):
     assert world.solids[0].pose.position == (1, 2, 0)
 
 
-def test_a_merged_include_lends_its_names_and_takes_its_owners_static(load, tmp_path):
+def test_merged_include_exposes_its_names_and_takes_static_from_its_owner(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static>")
     ball = f"<collision name='c'><geometry>{BALL}</geometry></collision>"
     on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose>{ball}</link>"
@@ -117,13 +117,13 @@ def test_a_folder_without_a_model_is_refused(refuse, tmp_path):
     assert "neither model.config nor model.sdf" in refuse(include("m"))[0].message
 
 
-def test_gazebos_own_sun_and_ground_need_not_be_there(load, models):
+def test_sun_and_ground_plane_of_gazebo_need_no_files(load, models):
     world = load(include("model://sun") + include("model://ground_plane") + include("model://crate"), search=[models])
     assert len(world.solids) == 1
     assert not world.notes
 
 
-def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
+def test_missing_model_lists_the_searched_folders(refuse, models):
     (problem,) = refuse(f"\n  {include('model://crates')}", search=[models])
     assert (problem.path, problem.line, problem.col) == ("shop.world", 3, 13)
     assert "model://crates: no such file or directory" in problem.message
@@ -131,7 +131,7 @@ def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
 
 
 @pytest.mark.parametrize(("tag", "message"), [("poes", "did you mean <pose>?"), ("xacro:include", "expand it first")])
-def test_an_include_is_not_half_understood(refuse, models, tag, message):
+def test_unsupported_elements_of_an_include_are_refused(refuse, models, tag, message):
     text = include("model://crate", f"<{tag}>1 0 0 0 0 0</{tag}>")
     (problem,) = refuse(f"<sdf version='1.9' xmlns:xacro='x'><world name='w'>{text}</world></sdf>", search=[models])
     assert problem.hint.startswith(message)
@@ -176,7 +176,7 @@ def test_online_models_are_not_fetched(refuse):
     )
 
 
-def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
+def test_include_cycle_is_refused_with_its_chain(tmp_path, load, refuse):
     for here, there in (("a", "b"), ("b", "a")):
         write(tmp_path, here, extra=include(f"../{there}"))
     (problem,) = refuse(include("a"))
@@ -184,7 +184,7 @@ def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
     assert "include cycle: a/model.sdf → b/model.sdf → a/model.sdf" in problem.message
 
 
-def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse, monkeypatch):
+def test_exponentially_nested_includes_are_refused(tmp_path, refuse, monkeypatch):
     monkeypatch.setattr(model_tree, "MAX_MODELS", 1000)
     for level in range(8):
         inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
@@ -228,29 +228,29 @@ class TestContainment:
         write(folder, shape="<box><size>7 7 7</size></box>")
         return folder
 
-    def test_a_way_out_by_dots_is_refused(self, refuse, outside):
+    def test_relative_path_out_of_the_root_is_refused(self, refuse, outside):
         (problem,) = refuse(include(f"../{outside.name}/crate"))
         assert "outside the scenario root" in problem.message
 
-    def test_an_absolute_way_out_is_refused_whether_or_not_it_exists(self, refuse, outside):
+    def test_absolute_path_out_of_the_root_is_refused_whether_or_not_it_exists(self, refuse, outside):
         for uri in (f"file://{outside}/crate", str(outside / "nothing"), "/etc/passwd"):
             assert "outside the scenario root" in refuse(include(uri))[0].message
 
-    def test_a_symbolic_link_out_is_refused(self, refuse, outside, tmp_path):
+    def test_symbolic_link_out_of_the_root_is_refused(self, refuse, outside, tmp_path):
         (tmp_path / "link").symlink_to(outside / "crate")
         assert "outside the scenario root" in refuse(include("link"))[0].message
         (tmp_path / "m").mkdir()
         (tmp_path / "m" / "model.sdf").symlink_to(outside / "crate" / "model.sdf")
         assert "outside the scenario root" in refuse(include("m"))[0].message
 
-    def test_model_uris_do_not_climb_either(self, refuse, outside, tmp_path):
+    def test_model_uris_out_of_the_root_are_refused(self, refuse, outside, tmp_path):
         (problem,) = refuse(include(f"model://../../{outside.name}/crate"), search=[tmp_path])
         assert "outside" in problem.message
 
-    def test_a_folder_the_user_allows_is_inside(self, load, outside):
+    def test_folder_allowed_by_the_user_can_be_read(self, load, outside):
         assert len(load(include("model://crate"), search=[outside]).solids) == 1
 
-    def test_the_world_itself_must_be_inside(self, outside, tmp_path):
+    def test_world_file_outside_the_root_is_refused(self, outside, tmp_path):
         with pytest.raises(InvalidInput, match="outside the scenario root"):
             load_sdf(outside / "crate" / "model.sdf", root=tmp_path)
 
@@ -266,11 +266,11 @@ class TestContainment:
         (tmp_path / "b").symlink_to(tmp_path / "a")
         assert "symbolic link loop" in refuse(include("a"))[0].message
 
-    def test_a_pipe_is_refused_and_not_waited_for(self, refuse, tmp_path):
+    def test_named_pipe_is_refused_without_waiting(self, refuse, tmp_path):
         os.mkfifo(tmp_path / "pipe.sdf")
         assert "not a regular file" in refuse(include("pipe.sdf"))[0].message
 
-    def test_names_with_nul_or_without_end_are_refused(self, refuse):
+    def test_names_with_nul_and_very_long_names_are_refused(self, refuse):
         assert "not a usable path" in refuse(include("a" * 5000))[0].message
         assert "not a usable path" in refuse(include("a" * 300))[0].message
         assert "control character" in refuse(include("a\u202eb"))[0].message

@@ -78,14 +78,14 @@ def corners(mesh):
 
 
 class TestCollada:
-    def test_the_unit_scales_and_the_up_axis_does_not_turn(self, mesh):
+    def test_unit_scales_and_up_axis_is_ignored(self, mesh):
         shape = mesh(dae(geometry("g", [(0, 0, 0), (100, 0, 0), (0, 0, 50)]), unit='<unit meter="0.01"/>', up="Y_UP"))
         np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 0, 0.5)], atol=1e-12)
 
     def test_a_missing_unit_is_a_meter(self, mesh):
         np.testing.assert_allclose(corners(mesh(dae(unit="")))[1], (1, 0, 0))
 
-    def test_nodes_move_what_they_hold(self, mesh):
+    def test_node_transforms_apply_to_their_geometry(self, mesh):
         inner = node("inner", transform="<translate>0 0 3</translate>")
         outer = f"<node><rotate>0 0 1 90</rotate><translate>5 0 0</translate>{inner}</node>"
         np.testing.assert_allclose(corners(mesh(dae(nodes=outer)))[1], (0, 6, 3), atol=1e-6)
@@ -122,7 +122,7 @@ class TestCollada:
         np.testing.assert_allclose(centered.vertices.min(axis=0), (-2, -1, 0))
         assert len(mesh(dae(both, nodes)).faces) == 2
 
-    def test_an_unknown_submesh_is_refused_with_those_there_are(self, broken):
+    def test_unknown_submesh_is_refused_with_the_existing_names(self, broken):
         problem = broken(dae(), "<submesh><name>door</name></submesh>")
         assert "no submesh 'door' in x.dae" in problem.message
         assert problem.hint == "it has part"
@@ -135,18 +135,18 @@ class TestCollada:
     def test_broken_files_are_refused(self, broken, content):
         assert broken(content).message.startswith("world[w]/model[m]/link[a]/collision[c]/geometry/mesh/uri: x.dae: ")
 
-    def test_a_part_that_cannot_be_read_is_not_left_out_silently(self, broken):
+    def test_unreadable_part_of_a_mesh_is_an_error(self, broken):
         both = geometry("g") + geometry("h", primitive=TRIANGLES.replace("triangles", "tristrips"))
         assert "<tristrips> is not read" in broken(dae(both, node("a") + node("b", "h"))).message
         assert "its geometry 'h' is missing" in broken(dae(nodes=node("a") + node("b", "h"))).message
 
-    def test_missing_materials_do_no_harm(self, mesh):
+    def test_missing_materials_are_ignored(self, mesh):
         material = "<technique_common><instance_material symbol='s' target='#gone'/></technique_common>"
         bound = f"<bind_material>{material}</bind_material>"
         nodes = node("a").replace('url="#g"/>', f'url="#g">{bound}</instance_geometry>')
         assert len(mesh(dae(nodes=nodes)).faces) == 1
 
-    def test_nodes_that_unfold_without_end_are_refused(self):
+    def test_exponentially_nested_nodes_are_refused(self):
         levels = "".join(
             f'<node id="l{k}"><instance_node url="#l{k + 1}"/><instance_node url="#l{k + 1}"/></node>'
             for k in range(20)
@@ -179,7 +179,7 @@ class TestStl:
         message = f"STL header says {claimed} triangles, file holds {held}"
         assert message in broken(stl(claimed, held), name="x.stl").message
 
-    def test_an_empty_one_is_refused(self, broken):
+    def test_empty_file_is_refused(self, broken):
         assert "has no triangles" in broken(stl(0, 0), name="x.stl").message
         assert "too short" in broken(b"solid", name="x.stl").message
 
@@ -187,7 +187,7 @@ class TestStl:
         with pytest.raises(UnusableMesh, match="more than 1000000 triangles"):
             read_parts(stl(1_000_001, 1)[:84] + bytes(50 * 1_000_001), ".stl")
 
-    def test_values_that_are_no_numbers_are_refused(self, broken):
+    def test_nan_coordinates_are_refused(self, broken):
         content = stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan")))
         assert "not a finite number" in broken(content, name="x.stl").message
 
@@ -198,7 +198,7 @@ OBJ = (
 
 
 class TestObj:
-    def test_all_objects_are_read_and_materials_are_not(self, mesh):
+    def test_all_objects_are_read_without_materials(self, mesh):
         shape = mesh(OBJ, name="x.obj")
         assert len(shape.faces) == 2
         assert shape.vertices[:, 0].max() == 6
@@ -228,7 +228,7 @@ def test_a_mesh_beyond_10_km_is_refused(broken):
     assert "reaches farther than" in broken(dae(), "<scale>1e5 1 1</scale>").message
 
 
-def test_a_mesh_file_beyond_64_mib_is_refused_unread(refuse, tmp_path):
+def test_mesh_file_beyond_64_mib_is_refused_without_being_read(refuse, tmp_path):
     with (tmp_path / "x.stl").open("wb") as file:
         file.truncate(200 * 2**20)
     tracemalloc.start()
@@ -256,7 +256,7 @@ def test_requested_convex_hull_is_ignored_with_a_note(load, tmp_path):
     assert "the mesh is used unchanged" in note
 
 
-def test_a_mesh_may_be_read_by_itself(tmp_path):
+def test_mesh_file_may_be_read_without_a_world(tmp_path):
     (tmp_path / "x.dae").write_text(dae(unit='<unit meter="0.5"/>'))
     np.testing.assert_allclose(read_mesh(tmp_path / "x.dae").vertices.max(axis=0), (0.5, 0.5, 0))
     (tmp_path / "x.stl").write_bytes(stl(5, 1))

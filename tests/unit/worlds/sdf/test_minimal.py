@@ -40,7 +40,7 @@ MOVING = {
     "two_models_joint": [("m", 2.0, [AT_ORIGIN, Pose3(2, 0, 0)])],
 }
 EMPTY = ("nolink", "visual_only")
-"""Nothing in them is skipped: an empty floor may be meant."""
+"""Files in which nothing is skipped, because an empty floor may be intended."""
 
 REFUSED = {
     "gazebo_root": (1, "the root element is <gazebo>, expected <sdf>"),
@@ -66,7 +66,7 @@ def test_every_file_has_an_expectation(data: Path) -> None:
 
 
 @pytest.mark.parametrize("name", STATIC)
-def test_static_models_become_solids_where_gazebo_has_them(data: Path, name: str) -> None:
+def test_static_models_become_solids_with_the_poses_of_gazebo(data: Path, name: str) -> None:
     world = load(data, name)
     assert [solid.shape for solid in world.solids] == [shape for shape, _ in STATIC[name]]
     poses = [pose for _, pose in STATIC[name]]
@@ -85,22 +85,22 @@ def test_other_models_become_bodies_with_their_mass(data: Path, name: str) -> No
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_unsupported_geometry_is_an_error_with_its_position(data: Path, name: str) -> None:
-    col, start = REFUSED[name]
+    col, message = REFUSED[name]
     with pytest.raises(InvalidInput) as caught:
         load(data, name)
     (problem,) = caught.value.problems
     assert (problem.path, problem.line, problem.col) == (f"{name}.sdf", 1, col)
-    assert start in problem.message
+    assert message in problem.message
 
 
-def test_lenient_loading_leaves_it_out_and_says_so(data: Path) -> None:
+def test_lenient_loading_skips_unsupported_geometry_with_a_note(data: Path) -> None:
     world = load(data, "include_plus", lenient=True)
     assert len(world.solids) == 1
     assert any("include_plus.sdf: world[w]" in note and "skipped" in note for note in world.notes)
 
 
 @pytest.mark.parametrize("name", [name for name in REFUSED if name not in ("gazebo_root", "include_plus", *EMPTY)])
-def test_lenient_loading_that_leaves_nothing_is_an_error(data: Path, name: str) -> None:
+def test_lenient_loading_that_skips_everything_is_an_error(data: Path, name: str) -> None:
     with pytest.raises(InvalidInput, match="nothing is left of this world"):
         load(data, name, lenient=True)
 

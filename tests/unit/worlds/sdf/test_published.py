@@ -35,13 +35,13 @@ def box(name, x, y=0.0, static=1):
         "model://ground_plane/",
     ],
 )
-def test_sun_and_ground_plane_are_known_whatever_their_address(load, uri):
+def test_sun_and_ground_plane_are_known_at_any_url(load, uri):
     world = load(include(uri) + box("m", 0))
     assert [solid.name for solid in world.solids] == ["m::a::c"]
 
 
 @pytest.mark.parametrize(
-    ("place", "uri"),
+    ("layout", "uri"),
     [
         ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big Crate"),
         ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big%20Crate/2"),
@@ -52,8 +52,8 @@ def test_sun_and_ground_plane_are_known_whatever_their_address(load, uri):
         ("crate", "file://models/crate"),
     ],
 )
-def test_a_model_is_found_in_an_allowed_folder_as_a_cache_or_a_person_stores_it(load, tmp_path, place, uri):
-    crate(tmp_path / "models" / place)
+def test_model_is_found_in_an_allowed_folder_in_any_common_layout(load, tmp_path, layout, uri):
+    crate(tmp_path / "models" / layout)
     assert len(load(include(uri), search=[tmp_path / "models"]).solids) == 1
 
 
@@ -66,7 +66,7 @@ def test_the_newest_cached_version_is_used(load, tmp_path):
 
 
 @pytest.mark.parametrize("uri", [f"{FUEL}/../../secret", f"{FUEL}/..", f"{FUEL}/%2e%2e/files/../../x", "model:///../x"])
-def test_no_address_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
+def test_no_url_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
     crate(tmp_path.parent / "secret") if not (tmp_path.parent / "secret").exists() else None
     (tmp_path / "models").mkdir()
     (problem,) = refuse(include(uri), search=[tmp_path / "models"])
@@ -74,7 +74,7 @@ def test_no_address_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
 
 
 @pytest.mark.parametrize(
-    ("there", "asked", "hint"),
+    ("existing", "requested", "hint"),
     [
         ("meshes/Map.dae", "model://hall/meshes/map.dae", "did you mean `hall/meshes/Map.dae`?"),
         ("Meshes/map.DAE", "model://hall/meshes/map.dae", "did you mean `hall/Meshes/map.DAE`?"),
@@ -82,11 +82,11 @@ def test_no_address_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
         ("meshes/other.dae", "model://hall/meshes/map.dae", "looked in models; allow its folder with --world-path"),
     ],
 )
-def test_files_next_to_a_missing_mesh_are_named(refuse, tmp_path, there, asked, hint):
-    mesh = tmp_path / "models" / "hall" / there
+def test_files_next_to_a_missing_mesh_are_named(refuse, tmp_path, existing, requested, hint):
+    mesh = tmp_path / "models" / "hall" / existing
     mesh.parent.mkdir(parents=True)
     mesh.write_bytes(b"")
-    shape = f"<collision name='c'><geometry><mesh><uri>{asked}</uri></mesh></geometry></collision>"
+    shape = f"<collision name='c'><geometry><mesh><uri>{requested}</uri></mesh></geometry></collision>"
     (problem,) = refuse(f"<model name='m'><link name='a'>{shape}</link></model>", search=[tmp_path / "models"])
     assert problem.hint == hint
 
@@ -113,7 +113,7 @@ def test_a_missing_model_is_reported_once_with_the_number_of_its_places(refuse):
 @pytest.mark.parametrize(
     "config", ["<model>", "<model><name>x</name></model>", "<model><sdf>gone.sdf</sdf></model>", "\x00"]
 )
-def test_a_broken_model_config_does_not_matter_where_there_is_a_model_sdf(load, tmp_path, config):
+def test_broken_model_config_next_to_a_model_sdf_is_ignored(load, tmp_path, config):
     crate(tmp_path / "models" / "crate")
     (tmp_path / "models" / "crate" / "model.config").write_text(config)
     world = load(include("model://crate"), search=[tmp_path / "models"])
@@ -121,7 +121,7 @@ def test_a_broken_model_config_does_not_matter_where_there_is_a_model_sdf(load, 
     assert world.notes[0].endswith("; model.sdf in the same folder is used")
 
 
-def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
+def test_broken_model_config_without_a_model_sdf_is_an_error(refuse, tmp_path):
     (tmp_path / "models" / "crate").mkdir(parents=True)
     (tmp_path / "models" / "crate" / "model.config").write_text("<model><name>x</name></model>")
     (problem,) = refuse(include("model://crate"), search=[tmp_path / "models"])
@@ -130,27 +130,27 @@ def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
 
 @pytest.mark.parametrize("static", [0, 1])
 @pytest.mark.parametrize(
-    ("x", "told"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
+    ("x", "message"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
 )
-def test_distant_object_is_left_out_with_a_note(load, x, told, static):
+def test_distant_object_is_left_out_with_a_note(load, x, message, static):
     world = load("".join(box(f"m{k}", k, k) for k in range(5)) + box("far", x, static=static))
     assert sorted({solid.name[:2] for solid in world.solids}) == ["m0", "m1", "m2", "m3", "m4"]
     assert world.bodies == ()
     assert world.bounds == (-0.5, -0.5, 4.5, 4.5)
-    assert any(told in note for note in world.notes)
+    assert any(message in note for note in world.notes)
 
 
-def test_a_world_that_is_large_throughout_is_left_as_it_is(load):
+def test_large_world_without_gaps_keeps_all_its_solids(load):
     world = load("".join(box(f"m{k}", 300 * k) for k in range(20)))
     assert len(world.solids) == 20
 
 
-def test_a_world_of_which_nothing_is_left_is_an_error_even_leniently(load):
+def test_world_without_usable_geometry_is_an_error_even_if_lenient(load):
     with pytest.raises(InvalidInput, match="nothing is left of this world: 2 of its elements were skipped"):
         load(include("model://gone") + include("model://lost"), lenient=True)
 
 
-def test_a_world_of_only_a_ground_plane_is_empty_and_says_so(load):
+def test_world_with_only_a_ground_plane_is_empty_with_a_note(load):
     world = load(include("model://ground_plane"))
     assert world.solids == ()
     assert any("only a ground plane" in note for note in world.notes)

@@ -1,4 +1,4 @@
-"""Tests of third-party worlds against independent readings and their own maps."""
+"""Tests of third-party worlds against independent parsers and their maps."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -21,7 +21,7 @@ BARN = ("world_1", "world_40", "world_55", "world_111", "world_217", "world_289"
 
 
 @pytest.mark.parametrize("name", BARN)
-def test_barn_cylinders_stand_where_the_saved_state_has_them(data: Path, name: str) -> None:
+def test_barn_cylinders_have_the_poses_of_the_saved_state(data: Path, name: str) -> None:
     world = load_sdf(data / "barn_sample" / f"{name}.world", root=data)
     expected = _cylinders(data / "barn_sample" / f"{name}.world")
     assert len(world.solids) == len(expected) > 190
@@ -34,7 +34,7 @@ def test_barn_cylinders_stand_where_the_saved_state_has_them(data: Path, name: s
 
 
 def _cylinders(file: Path) -> list[tuple[str, float, float, float, float, float]]:
-    """Name, radius, length and place: read with ElementTree; every rotation in these files is zero."""
+    """Return name, radius, length, and position, read with ElementTree; all rotations in these files are zero."""
     world = ET.parse(file).getroot()[0]
     saved = {model.get("name"): model.find("link") for model in world.findall("state/model")}
     found = []
@@ -50,7 +50,7 @@ def _cylinders(file: Path) -> list[tuple[str, float, float, float, float, float]
 
 
 @pytest.mark.parametrize("name", ["small_warehouse", "no_roof_small_warehouse"])
-def test_every_include_of_the_warehouse_brings_its_mesh(data: Path, name: str) -> None:
+def test_every_include_of_the_warehouse_loads_its_mesh(data: Path, name: str) -> None:
     folder = data / "aws_small_warehouse"
     file = folder / "worlds" / f"{name}.world"
     world = load_sdf(file, root=folder, search=[folder / "models"])
@@ -68,41 +68,41 @@ def test_concave_walls_are_not_filled(data: Path) -> None:
     world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
     walls = [solid for solid in world.solids if "Wall" in solid.name]
     scene = RayScene(merge_solids(walls))
-    ways = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-    distances = scene.cast(np.tile([[0.0, 0.0, 1.0]], (4, 1)), ways)
-    # The inner faces, in centimeters, as they stand in the DAE: 685.14, 686.14, 1032.08, 1032.08.
+    directions = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    distances = scene.cast(np.tile([[0.0, 0.0, 1.0]], (4, 1)), directions)
+    # The coordinates of the inner faces in the DAE, in cm: 685.14, 686.14, 1032.08, 1032.08.
     np.testing.assert_allclose(distances, [6.8514, 6.8614, 10.3208, 10.3208], atol=0.001)
 
 
-def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
-    """Occupied cells of the map within 15 cm of the solids at lidar height, but for a shift of the whole map."""
+def test_warehouse_map_matches_the_warehouse_world(data: Path) -> None:
+    """95 % of the occupied cells are within 15 cm of solids at lidar height, after a shift of the whole map."""
     folder = data / "aws_small_warehouse"
     world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
-    ours = draw_map(world, merge_solids(world.solids), 0.2)
-    occupied, _ = _map(folder / "maps/005/map_rotated.png")
+    map_ = draw_map(world, merge_solids(world.solids), 0.2)
+    occupied, _ = _read_map(folder / "maps/005/map_rotated.png")
     rows, columns = np.nonzero(occupied)
     shift = (0.1, 0.15)  # best of a search over whole cells and quarter turns
     points = np.column_stack([columns, rows]) * CELL + 0.025 + (-7, -10.5) + shift
-    cells = ours.cell_of(points)
-    away = distance_transform_edt(ours.cells != 100) * CELL
-    assert np.mean(away[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
+    cells = map_.cell_of(points)
+    distances = distance_transform_edt(map_.cells != 100) * CELL
+    assert np.mean(distances[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
 
 
-def test_units_are_honored_and_up_axis_is_not_as_in_gazebo(data: Path) -> None:
-    """The hexagon says inches and Y_UP and stands upright along z: 0.55 x 1.4 m wide, up to 1.4 m high."""
+def test_unit_applies_and_up_axis_is_ignored_as_in_gazebo(data: Path) -> None:
+    """The hexagon has a unit of inches and Y_UP, but is upright along z in Gazebo, up to 1.4 m high."""
     world = _sandbox(data)
-    hand = next(solid for solid in world.solids if solid.name.endswith("left_hand"))
-    assert isinstance(hand.shape, Mesh)
-    heights = hand.shape.vertices[:, 2]
+    hexagon = next(solid for solid in world.solids if solid.name.endswith("left_hand"))
+    assert isinstance(hexagon.shape, Mesh)
+    heights = hexagon.shape.vertices[:, 2]
     assert (heights.min(), heights.max()) == pytest.approx((0.0, 100 * 0.0254 * 0.55), abs=0.01)
 
 
 def test_rays_in_the_sandbox_agree_with_its_map(data: Path) -> None:
-    """60 free poses x 90 beams within 15 cm of the beam model's own ray cast through the shipped map: 92 % or more.
+    """92 % of the ranges are within 15 cm of ray casts through the shipped map.
 
-    The rest graze a column, which the map draws up to a cell thicker than it is.
+    The other rays graze a column, which is up to one cell thicker in the map.
     """
-    occupied, free = _map(data / "nav2_tb3_sandbox" / "tb3_sandbox.pgm")
+    occupied, free = _read_map(data / "nav2_tb3_sandbox" / "tb3_sandbox.pgm")
     rows, columns = np.nonzero(free & (distance_transform_edt(~occupied) * CELL > 0.2))
     chosen = np.random.default_rng(0).choice(len(rows), 60, replace=False)
     scene = RayScene(merge_solids(_sandbox(data).solids))
@@ -110,10 +110,10 @@ def test_rays_in_the_sandbox_agree_with_its_map(data: Path) -> None:
     directions = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(90)])
     agreeing = 0
     for row, column in zip(rows[chosen], columns[chosen], strict=True):
-        here = [(column + 0.5) * CELL - 10, (row + 0.5) * CELL - 10, 0.2]
-        seen = np.minimum(scene.cast(np.tile(here, (90, 1)), directions), RANGE)
+        origin = [(column + 0.5) * CELL - 10, (row + 0.5) * CELL - 10, 0.2]
+        ranges = np.minimum(scene.cast(np.tile(origin, (90, 1)), directions), RANGE)
         mapped = np.minimum(_map_range(occupied, row, column, angles), RANGE)
-        agreeing += int(np.sum(np.abs(seen - mapped) <= 0.15))
+        agreeing += int(np.sum(np.abs(ranges - mapped) <= 0.15))
     assert agreeing >= 0.92 * 60 * 90
 
 
@@ -125,7 +125,7 @@ def _sandbox(data: Path) -> World:
     return load_sdf(folder / "worlds/tb3_sandbox.sdf.xacro", root=folder, search=[folder / "models"])
 
 
-def _map(file: Path) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def _read_map(file: Path) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     darkness = (255 - np.asarray(Image.open(file).convert("L"), dtype=float)[::-1]) / 255
     return darkness > 0.65, darkness < 0.196
 
@@ -133,7 +133,7 @@ def _map(file: Path) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
 def _map_range(
     occupied: npt.NDArray[np.bool_], row: int, column: int, angles: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """Range to the first occupied cell by Bresenham's steps, as AMCL's map_calc_range."""
+    """Return the ranges to the first occupied cell by Bresenham steps, as in map_calc_range of AMCL."""
     slope = np.maximum(np.abs(np.cos(angles)), np.abs(np.sin(angles)))
     steps = np.arange(int(RANGE / CELL))[:, None]
     columns = np.rint(column + steps * np.cos(angles) / slope).astype(int)
@@ -146,7 +146,7 @@ def _map_range(
     return np.where(hit.any(axis=0), ranges, np.inf)
 
 
-def test_an_empty_world_with_only_a_floor_says_so(data: Path) -> None:
+def test_published_world_with_only_a_floor_is_empty_with_a_note(data: Path) -> None:
     folder = data / "nav2_tb3_sandbox"
     world = load_sdf(folder / "worlds/tb3_empty_world.sdf.xacro", root=folder, lenient=True)
     assert not world.solids

@@ -60,7 +60,7 @@ def test_invalid_sizes_are_errors_at_their_line(refuse, geometry, message):
     assert message in problem.message
 
 
-def test_a_lenient_load_leaves_only_the_wrong_shape_out(load):
+def test_lenient_loading_skips_only_the_invalid_shape(load):
     text = shaped("<box><size>1 1 1</size></box>") + shaped("<box/>").replace("'m'", "'n'")
     world = load(text, lenient=True)
     assert len(world.solids) == 1
@@ -77,7 +77,7 @@ BOX = shaped("<box><size>1 1 1</size></box>").replace("'m'", "'n'")
 
 
 class TestPlanes:
-    def test_the_ground_is_the_simulators_own(self, load):
+    def test_ground_plane_is_left_to_the_simulator(self, load):
         world = load(shaped(plane()) + BOX)
         assert [solid.name for solid in world.solids] == ["n::a::c"]
         assert not world.notes
@@ -99,7 +99,7 @@ class TestPlanes:
         face = slab.pose.apply(np.array([[0, 0, slab.shape.size[2] / 2]]))[0]
         np.testing.assert_allclose(face, [0, 0, 3], atol=1e-12)
 
-    def test_a_floor_turned_upright_is_a_wall(self, load):
+    def test_rotated_plane_is_a_wall(self, load):
         assert len(load(shaped(plane(), f"<pose>0 0 0 {math.pi / 2} 0 0</pose>")).solids) == 1
 
     def test_a_normal_without_length_is_refused(self, refuse):
@@ -119,7 +119,7 @@ def area(solids):
 
 
 class TestPolylines:
-    def test_one_outline_is_one_solid_whichever_way_it_runs(self, load):
+    def test_one_outline_is_one_solid_in_either_orientation(self, load):
         for points in (SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]]):
             (solid,) = load(shaped(outline(points))).solids
             assert isinstance(solid.shape, Extrusion)
@@ -133,10 +133,10 @@ class TestPolylines:
         assert area(solids).symmetric_difference(shapely.Polygon(SQUARE, [HOLE])).area < 1e-9
 
     def test_outlines_side_by_side_are_all_filled(self, load):
-        far = [(x + 10, y) for x, y in HOLE]
-        assert area(load(shaped(outline(SQUARE) + outline(far))).solids).area == pytest.approx(17)
+        distant = [(x + 10, y) for x, y in HOLE]
+        assert area(load(shaped(outline(SQUARE) + outline(distant))).solids).area == pytest.approx(17)
 
-    def test_an_outline_that_crosses_itself_is_filled_on_both_sides(self, load):
+    def test_both_loops_of_a_self_intersecting_outline_are_filled(self, load):
         solids = load(shaped(outline([(0, 0), (2, 2), (2, 0), (0, 2)]))).solids
         assert area(solids).area == pytest.approx(2)
 
@@ -160,9 +160,9 @@ class TestPolylines:
     @given(st.lists(st.lists(coordinates, min_size=3, max_size=6, unique=True), min_size=1, max_size=3))
     @example([[(-1, 6), (6, -5), (1, 4), (-2, -6)]])
     @example([[(0, 0), (-5, -1), (6, -4)], [(2, -6), (0, 1), (8, 8), (0, 0)], [(0, 0), (0, 1), (3, -4)]])
-    def test_trapezoids_cover_the_odd_area_of_any_outlines_once(self, outlines):
+    def test_trapezoids_cover_the_even_odd_area_of_any_outlines_once(self, outlines):
         pieces = [shapely.Polygon(piece) for piece in trapezoids([np.array(o, float) for o in outlines])]
-        assert sum(piece.area for piece in pieces) == pytest.approx(float(odd_area(outlines)), abs=1e-6)
+        assert sum(piece.area for piece in pieces) == pytest.approx(float(even_odd_area(outlines)), abs=1e-6)
         assert all(piece.exterior.is_ccw for piece in pieces)
         borders = shapely.union_all([shapely.LinearRing(outline) for outline in outlines])
         for point in shapely.points(np.indices((34, 34)).reshape(2, -1).T * 0.5 - OFF_GRID):
@@ -172,33 +172,33 @@ class TestPolylines:
 
 
 def crossings(outline, x, y):
-    """How often the ray from a point along x crosses an outline."""
+    """Return the number of crossings of an outline and the ray along x from a point."""
     edges = zip(outline, [*outline[1:], outline[0]], strict=True)
     return sum((b > y) != (d > y) and x < a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges)
 
 
-def odd_area(outlines):
-    """The area that an odd number of outlines enclose, in exact fractions: slab by slab between all crossings."""
+def even_odd_area(outlines):
+    """Return the exact area that an odd number of outlines encloses, summed over the slabs between all crossings."""
     edges = [(a, b) for outline in outlines for a, b in zip(outline, [*outline[1:], outline[0]], strict=True)]
     edges = [((Fraction(a), Fraction(b)), (Fraction(c), Fraction(d))) for (a, b), (c, d) in edges if b != d]
     heights = {y for edge in edges for _, y in edge} | {
-        y for one in edges for other in edges for y in meeting(one, other)
+        y for one in edges for other in edges for y in crossing_heights(one, other)
     }
-    return sum((top - low) * odd_width(edges, (top + low) / 2) for low, top in pairwise(sorted(heights)))
+    return sum((top - low) * even_odd_width(edges, (top + low) / 2) for low, top in pairwise(sorted(heights)))
 
 
-def odd_width(edges, y):
-    """Of a level that no corner lies on; it is linear within a slab, so that of the middle is the mean."""
-    at = sorted(a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges if (b > y) != (d > y))
-    return sum(right - left for left, right in zip(at[::2], at[1::2], strict=True))
+def even_odd_width(edges, y):
+    """Return the enclosed width at y. It is linear within a slab, so its mean is the value in the middle."""
+    crossings_x = sorted(a + (y - b) * (c - a) / (d - b) for (a, b), (c, d) in edges if (b > y) != (d > y))
+    return sum(right - left for left, right in zip(crossings_x[::2], crossings_x[1::2], strict=True))
 
 
-def meeting(one, other):
-    """The height at which two edges cross, if they do."""
+def crossing_heights(one, other):
+    """Yield the y at which two edges cross, if they do."""
     (a, b), (c, d) = one
     (e, f), (g, h) = other
-    turn = (c - a) * (h - f) - (d - b) * (g - e)
-    if turn != 0 and 0 <= (share := ((e - a) * (h - f) - (f - b) * (g - e)) / turn) <= 1:
+    determinant = (c - a) * (h - f) - (d - b) * (g - e)
+    if determinant != 0 and 0 <= (share := ((e - a) * (h - f) - (f - b) * (g - e)) / determinant) <= 1:
         yield b + share * (d - b)
 
 
@@ -237,24 +237,24 @@ class TestHeightmaps:
         assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3])
 
     @pytest.mark.parametrize("height", [np.nan, -9999.0])
-    def test_a_tiff_with_cells_without_a_height_is_refused(self, refuse, tmp_path, height):
+    def test_tiff_with_missing_heights_is_refused(self, refuse, tmp_path, height):
         Image.fromarray(np.array([[0, 1], [height, 0]], np.float32)).save(tmp_path / "h.png", format="TIFF")
         assert "a height is negative or not a number" in refuse(shaped(heightmap()))[0].message
 
-    def test_pos_moves_it(self, load, tmp_path):
+    def test_heightmap_is_moved_by_its_pos(self, load, tmp_path):
         self.save(tmp_path, [[0, 0], [0, 0]])
         (solid,) = load(shaped(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
         assert solid.pose.position == (1, 2, 3)
 
-    def test_one_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
+    def test_image_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
         Image.new("L", (3000, 3000)).save(tmp_path / "h.png")
         assert "3000 x 3000 pixels; an edge must have 2 to 513" in refuse(shaped(heightmap()))[0].message
 
-    def test_a_bomb_is_refused(self, refuse, tmp_path):
+    def test_decompression_bomb_is_refused(self, refuse, tmp_path):
         Image.new("1", (14_000, 14_000)).save(tmp_path / "h.png")
         assert "image too large" in refuse(shaped(heightmap()))[0].message
 
-    def test_no_image_is_refused(self, refuse, tmp_path):
+    def test_file_that_is_not_an_image_is_refused(self, refuse, tmp_path):
         (tmp_path / "h.png").write_bytes(b"GeoTIFF")
         assert "not a readable image" in refuse(shaped(heightmap()))[0].message
 

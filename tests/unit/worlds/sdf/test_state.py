@@ -13,36 +13,36 @@ def state(content):
     return f"<state world_name='w'><sim_time>1 0</sim_time>{content}</state>"
 
 
-def xs(world):
+def x_positions(world):
     return [round(solid.pose.x, 9) for solid in world.solids]
 
 
-def test_a_saved_model_pose_replaces_its_own(load):
-    assert xs(load(model() + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [7]
+def test_saved_pose_replaces_that_of_the_model(load):
+    assert x_positions(load(model() + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [7]
 
 
 def test_a_saved_link_pose_is_a_world_pose(load):
     saved = "<model name='m'><pose>7 0 0 0 0 0</pose><link name='a'><pose>9 0 0 0 0 0</pose></link></model>"
-    assert xs(load(model() + state(saved))) == [9]
+    assert x_positions(load(model() + state(saved))) == [9]
 
 
-def test_nested_models_are_saved_in_the_world_frame_too(load):
+def test_saved_poses_of_nested_models_are_world_poses(load):
     nested = model("n", f"<link name='a'>{BOX}</link><link name='b'>{BOX}</link>")
     inner = "<pose>3 0 0 0 0 0</pose><link name='b'><pose>4 0 0 0 0 0</pose></link>"
     saved = f"<model name='m'><pose>7 0 0 0 0 0</pose><model name='n'>{inner}</model></model>"
-    assert xs(load(model("m", nested) + state(saved))) == [3, 4]
-    assert xs(load(model("m", nested) + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [8, 8]
+    assert x_positions(load(model("m", nested) + state(saved))) == [3, 4]
+    assert x_positions(load(model("m", nested) + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [8, 8]
 
 
 def test_older_worlds_name_links_of_nested_models_with_colons(load):
     saved = "<model name='m'><link name='n::a'><pose>5 0 0 0 0 0</pose></link></model>"
-    assert xs(load(model("m", model("n")) + state(saved))) == [5]
+    assert x_positions(load(model("m", model("n")) + state(saved))) == [5]
 
 
 def test_included_models_are_moved_by_their_name(load, tmp_path):
     (tmp_path / "crate.sdf").write_text(f"<sdf version='1.6'>{model('crate')}</sdf>")
     include = "<include><uri>crate.sdf</uri><name>left</name></include>"
-    assert xs(load(include + state("<model name='left'><pose>6 0 0 0 0 0</pose></model>"))) == [6]
+    assert x_positions(load(include + state("<model name='left'><pose>6 0 0 0 0 0</pose></model>"))) == [6]
 
 
 def test_insertions_and_deletions_are_applied(load):
@@ -51,19 +51,19 @@ def test_insertions_and_deletions_are_applied(load):
     assert [(solid.name, solid.pose.x) for solid in world.solids] == [("new::a::c", 2)]
 
 
-def test_free_models_start_where_they_were_saved(load):
+def test_movable_models_start_at_their_saved_pose(load):
     world = load(model(rest="") + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))
     assert world.bodies[0].pose.x == 7
 
 
-def test_states_of_unknown_models_do_no_harm(load):
-    assert xs(load(model() + state("<model name='gone'><pose>7 0 0 0 0 0</pose></model>"))) == [1]
+def test_states_of_unknown_models_are_ignored(load):
+    assert x_positions(load(model() + state("<model name='gone'><pose>7 0 0 0 0 0</pose></model>"))) == [1]
 
 
 def test_only_the_first_state_counts(load):
     text = "".join(state(f"<model name='m'><pose>{x} 0 0 0 0 0</pose></model>") for x in (2, 3))
     world = load(model() + text)
-    assert xs(world) == [2]
+    assert x_positions(world) == [2]
     assert "only the first <state>" in world.notes[0]
 
 
@@ -86,7 +86,7 @@ def test_inapplicable_state_is_an_error(refuse, saved, message):
         ("<sphere><radius>1</radius></sphere>", Sphere(2.0)),
     ],
 )
-def test_a_saved_scale_multiplies_sizes_and_moves_nothing(load, written, expected):
+def test_saved_scale_multiplies_sizes_but_not_positions(load, written, expected):
     shape = f"<collision name='c'><pose>0.5 0 0 0 0 0</pose><geometry>{written}</geometry></collision>"
     world = load(
         model(content=f"<link name='a'>{shape}</link>") + state("<model name='m'><scale>2 3 4</scale></model>")
