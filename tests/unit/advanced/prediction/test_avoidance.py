@@ -150,17 +150,11 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
     monitor = CollisionMonitor(CollisionMonitorSpec(), robot, (), TICK_RATE_HZ)
     certain = np.zeros((1, 4, 4))
 
-<<<<<<< HEAD
-    def told(x: float, y: float, vx: float, vy: float) -> float:
+    def allowed_speed(x: float, y: float, vx: float, vy: float) -> float:
         monitor.set_moving_obstacles(
-            MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0)
+            MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), certain, 1.0)
         )
         return monitor.limit_command(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
-=======
-    def allowed_speed(x: float, y: float, vx: float, vy: float) -> float:
-        monitor.on_moving(MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), certain, 1.0))
-        return monitor.allow(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
->>>>>>> origin/main
 
     assert allowed_speed(1.0, 0.0, 1.0, 0.0) == 1.0  # drives ahead at the speed of the robot
     at_rest = allowed_speed(1.0, 0.0, 0.0, 0.0)
