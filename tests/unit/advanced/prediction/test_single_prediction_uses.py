@@ -32,7 +32,7 @@ def min_clearance(user: str, controller: str = "regulated_pure_pursuit") -> floa
     def update(tick: int, frames: Frames) -> None:
         original(tick, frames)
         if user != "monitor":
-            stack._monitor.on_moving(no_moving_obstacles())
+            stack._monitor.set_moving_obstacles(no_moving_obstacles())
         if user != "controller":
             stack._costmaps.local_costmap.moving = no_moving_obstacles()
 
