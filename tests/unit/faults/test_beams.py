@@ -18,11 +18,11 @@ def answered(sector: dict) -> list[int]:
     return [k - 180 for k in range(360) if ranges[k] == 2.0]
 
 
-def test_a_sector_is_blind_from_its_first_direction_to_its_last():
+def test_blind_sector_extends_from_its_first_to_its_last_direction():
     assert answered({"from": "-30 deg", "to": "45 deg"}) == [*range(-180, -30), *range(46, 180)]
 
 
-def test_a_sector_may_go_through_the_back():
+def test_blind_sector_can_cross_180_degrees():
     assert answered({"from": "170 deg", "to": "-170 deg"}) == list(range(-169, 170))
     assert answered({"from": "0 deg", "to": "360 deg"}) == []
 
@@ -31,14 +31,14 @@ def test_sector_without_width_is_refused():
     assert unsuitable_key({"sector": {"from": 1, "to": 1}}, "Scan")[0] == "to"
 
 
-def test_beyond_its_limit_a_lidar_sees_nothing_and_thinks_that_nothing_is_there():
+def test_ranges_beyond_the_limit_become_infinite():
     told = begun({"range_limit": {"max": 3}}, "Scan").reading(scan([1.0, 3.0, 3.01, np.inf, np.nan])).ranges
     assert told == pytest.approx([1.0, 3.0, np.inf, np.inf, np.nan], nan_ok=True)
     assert begun({"range_limit": {"max": 3}}, "Image").reading(image([[2.0, 4.0]])).depth.tolist() == [[2.0, np.inf]]
     assert unsuitable_key({"range_limit": {"max": 12}}, "Scan", spec=Lidar())[0] == "max"
 
 
-def test_a_ghost_is_in_its_window_and_behind_what_is_nearer():
+def test_ghost_fills_its_sector_behind_nearer_ranges():
     ranges = np.full(360, 2.0)
     ranges[180], ranges[181], ranges[182] = 0.5, np.inf, np.nan
     told = begun({"ghost": {"range": 1, "width": "10 deg"}}, "Scan").reading(scan(ranges)).ranges
@@ -47,7 +47,7 @@ def test_a_ghost_is_in_its_window_and_behind_what_is_nearer():
     assert unsuitable_key({"ghost": {"range": 20}}, "Scan", spec=Lidar())[0] == "range"
 
 
-def test_dust_ends_beams_early_as_a_poisson_process_along_them_does():
+def test_dust_shortens_beams_by_a_poisson_process():
     """At range r a share 1 - exp(-r / L) is short; of those the mean is L - r / (exp(r / L) - 1)."""
     path, there = 8.0, 5.0
     told = begun({"dust": {"mean_free_path": path}}, "Scan").reading(scan(np.full(40_000, there), least=0.0)).ranges
@@ -57,7 +57,7 @@ def test_dust_ends_beams_early_as_a_poisson_process_along_them_does():
     assert (told[~short] == there).all()
 
 
-def test_dust_is_seen_where_nothing_else_is_and_not_nearer_than_the_lidar_can():
+def test_dust_is_hit_by_beams_without_target_within_the_range_of_the_lidar():
     told = (
         begun({"dust": {"mean_free_path": 1}}, "Scan").reading(scan(np.full(20_000, np.inf), least=0.5, most=4)).ranges
     )
@@ -67,7 +67,7 @@ def test_dust_is_seen_where_nothing_else_is_and_not_nearer_than_the_lidar_can():
     assert np.isneginf(told).mean() == pytest.approx(1 - math.exp(-0.5), abs=0.015)
 
 
-def test_rain_hides_what_is_farther_than_its_equation_says():
+def test_rain_hides_targets_beyond_the_detection_limit():
     """The farthest range that is seen solves ρ exp(-2 α z) / z² = 0.9 / 12² (here by bisection)."""
     alpha, low, high = 0.01 * 25**0.6, 0.1, 12.0
     for _ in range(60):
@@ -79,12 +79,12 @@ def test_rain_hides_what_is_farther_than_its_equation_says():
     assert np.isinf(told[ranges > low + 0.005]).all()
 
 
-def test_rain_makes_ranges_uncertain_by_two_percent_where_it_pours():
+def test_heavy_rain_adds_range_noise_of_two_percent():
     told = begun({"rain": {"rate": 10 * MM_PER_HOUR}}, "Scan").reading(scan(np.full(20_000, 4.0))).ranges
     assert told.std() == pytest.approx(0.08, rel=0.03)
     assert told.mean() == pytest.approx(4.0, abs=0.003)
 
 
-def test_white_in_hardly_any_rain_is_seen_to_the_end_of_the_range():
+def test_light_rain_does_not_hide_white_targets():
     told = begun({"rain": {"rate": 1e-6 * MM_PER_HOUR}}, "Scan").reading(scan(np.array([11.9, 0.2]))).ranges
     assert told == pytest.approx([11.9, 0.2])

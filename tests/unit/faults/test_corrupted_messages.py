@@ -16,7 +16,7 @@ def test_garbage_values_have_the_given_types(what):
     np.testing.assert_array_equal(begun(spec, "Image").reading(image([[1.0]])).depth, [[np.float32(value)]])
 
 
-def test_a_message_can_be_cut_off_or_empty():
+def test_message_can_be_truncated_or_empty():
     assert begun({"garbage": {"value": "empty"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == []
     assert begun({"garbage": {"value": "short"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == [1.0] * 4
     assert begun({"garbage": {"value": "short"}}, "Image").reading(image(np.ones((6, 4)))).rgb.shape == (3, 4, 3)
@@ -29,7 +29,7 @@ def test_garbage_has_the_given_share_and_other_messages_are_unchanged():
     assert sum(one is not good for one in got) / 4000 == pytest.approx(0.3, abs=0.03)
 
 
-def test_anything_is_one_of_all_that_there_is():
+def test_default_garbage_is_drawn_from_all_values():
     work = begun({"garbage": {}}, "Scan")
     sizes = [len(work.reading(scan([1.0] * 8)).ranges) for _ in range(400)]
     assert {size: sizes.count(size) / 400 for size in (0, 4, 8)} == pytest.approx(

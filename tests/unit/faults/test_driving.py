@@ -16,31 +16,31 @@ def rims(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
     return motion.vx - separation / 2 * motion.wz, motion.vx + separation / 2 * motion.wz
 
 
-def test_a_gain_scales_a_command_on_its_way():
+def test_gain_scales_commands():
     work = begun({"gain": {"linear": "50 %", "angular": -1}}, "Command")
     assert work.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
 
 
-def test_a_weaker_side_rolls_its_share_and_the_other_all():
+def test_gain_of_one_side_does_not_affect_the_other():
     work = begun({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
     told = Twist(0.4, 0.0, 0.5)
     left, right = rims(work.command(told))
     assert (left, right) == pytest.approx((0.8 * rims(told)[0], rims(told)[1]))
 
 
-def test_speeds_are_cut_and_keep_their_direction():
+def test_saturation_limits_speed_and_keeps_direction():
     work = begun({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
     assert work.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
     assert work.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
 
 
-def test_a_saturated_side_rolls_no_faster_than_its_limit_either_way():
+def test_saturated_side_is_limited_forward_and_backward():
     work = begun({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
     for told, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
         assert rims(work.command(Twist(*told))) == pytest.approx(expected)
 
 
-def test_accelerations_are_limited_from_one_beat_to_the_next():
+def test_acceleration_is_limited_between_beats():
     now = Hand()
     work = begun({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
     work.command(Twist())
@@ -51,7 +51,7 @@ def test_accelerations_are_limited_from_one_beat_to_the_next():
     assert [speed.wz for speed in speeds] == pytest.approx(np.minimum(2.0, 0.05 * np.arange(1, 31)))
 
 
-def test_wheels_that_slip_mislead_every_odometry_of_theirs_each_by_its_own_sum():
+def test_wheel_slip_affects_each_odometry_sensor_separately():
     work = begun({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
     assert work.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
     for k in range(5):
@@ -62,13 +62,13 @@ def test_wheels_that_slip_mislead_every_odometry_of_theirs_each_by_its_own_sum()
 
 
 @pytest.mark.parametrize("word", ["gain", "saturation"])
-def test_sides_are_those_of_wheels(word):
+def test_left_and_right_are_valid_only_for_differential_wheels(word):
     assert unsuitable_key({word: {"left": 0.5}}, "Command")[0] == "left"
     assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
     assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
 
 
-def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
+def test_battery_limit_falls_linearly_and_keeps_the_curvature_of_commands():
     now = Hand()
     work = begun({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
     told, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}

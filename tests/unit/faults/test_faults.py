@@ -26,19 +26,19 @@ def test_sensor_that_is_off_publishes_nothing():
     assert begun({"off": {}}).reading(scan([1.0])) is None
 
 
-def test_dropout_loses_the_share_of_messages_it_says():
+def test_dropout_loses_the_given_share_of_messages():
     fault = begun({"dropout": {"probability": "30 %"}})
     lost = sum(fault.reading(scan([1.0])) is None for _ in range(4000))
     assert lost / 4000 == pytest.approx(0.3, abs=0.03)
 
 
-def test_beam_dropout_blinds_the_share_of_beams_it_says_and_leaves_the_rest():
+def test_beam_dropout_loses_the_given_share_of_beams():
     seen = begun({"beam_dropout": {"probability": 0.4}}).reading(scan(np.full(4000, 2.0)))
     assert np.isnan(seen.ranges).mean() == pytest.approx(0.4, abs=0.035)
     assert set(seen.ranges[~np.isnan(seen.ranges)]) == {2.0}
 
 
-def test_noise_has_the_standard_deviation_it_says_and_no_bias():
+def test_noise_has_the_given_standard_deviation_and_no_bias():
     seen = begun({"noise": {"std": "10 cm"}}).reading(scan(np.full(10_000, 5.0))).ranges
     assert seen.std() == pytest.approx(0.1, rel=0.04)
     assert seen.mean() == pytest.approx(5.0, abs=0.005)
@@ -53,21 +53,21 @@ def test_noise_keeps_beams_without_a_hit_and_the_range_of_the_sensor():
     assert finite.max() <= 12.0
 
 
-def test_a_fault_never_changes_the_reading_it_was_handed():
+def test_fault_does_not_modify_its_input():
     original = scan(np.full(100, 2.0))
     begun({"noise": {"std": 1.0}}).reading(original)
     begun({"beam_dropout": {"probability": 1.0}}).reading(original)
     assert (original.ranges == 2.0).all()
 
 
-def test_a_linear_bias_scales_the_reported_way():
+def test_linear_bias_scales_the_reported_distance():
     fault = begun({"bias": {"linear_scale": 1.1}})
     reported = [fault.reading(odometry) for odometry in straight(2.0)]
     assert reported[-1].pose.x == pytest.approx(2.2)
     assert reported[-1].twist.vx == pytest.approx(0.55)
 
 
-def test_a_turn_for_each_meter_bends_the_reported_way_into_an_arc():
+def test_turn_per_meter_bends_the_reported_path_into_an_arc():
     fault = begun({"bias": {"turn_per_metre": 0.5}})
     end = [fault.reading(odometry) for odometry in straight(2.0, 2000)][-1].pose
     assert end.yaw == pytest.approx(1.0)
@@ -80,7 +80,7 @@ def test_slip_reduces_the_true_distance():
     assert [fault.reading(odometry) for odometry in straight(3.0)][-1].pose.x == pytest.approx(4.0)
 
 
-def test_slip_on_one_side_turns_the_robot_without_its_odometry_noticing():
+def test_slip_on_one_side_turns_the_robot_but_not_its_odometry():
     fault = begun({"slip": {"left": 0.5}}, separation=0.4)
     on_the_ground = fault.command(Twist(1.0, 0, 0))
     # left wheel at half speed: v = (0.5 + 1) / 2, w = (1 - 0.5) / 0.4
@@ -89,7 +89,7 @@ def test_slip_on_one_side_turns_the_robot_without_its_odometry_noticing():
     assert reported == pytest.approx((1.0, 0, 0))
 
 
-def test_when_an_odometry_fault_is_over_its_error_stays_and_new_steps_are_true():
+def test_error_of_an_odometry_fault_remains_after_its_end_without_growing():
     fault = begun({"bias": {"linear_scale": 2.0}})
     way = straight(2.0)
     for odometry in way[:51]:

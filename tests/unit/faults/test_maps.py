@@ -29,7 +29,7 @@ def test_shifted_map_moves_every_point():
     assert value(moved, 2.25, 3.25) == UNKNOWN
 
 
-def test_an_outdated_map_shows_nothing_in_what_is_missing_and_walls_in_what_is_extra():
+def test_outdated_map_has_free_missing_areas_and_occupied_extra_areas():
     spec = {"missing": [[[1.8, 2.8], [2.7, 2.8], [2.7, 3.7], [1.8, 3.7]]], "extra": [[[5, 5], [7, 5], [7, 6], [5, 6]]]}
     before = grid()
     shown = begun({"outdated": spec}, "Map").map(before)

@@ -20,7 +20,7 @@ def test_camera_noise_has_the_given_strength_and_stays_in_range():
     assert np.isinf(begun({"noise": {"std": 1.0}}, "Image").reading(image([[np.inf]])).depth).all()
 
 
-def test_a_noisy_imu_spreads_each_axis_by_what_is_said():
+def test_imu_noise_has_the_given_standard_deviation_on_each_axis():
     work = begun({"noise": {"gyro": "0.05 rad/s", "accelerometer": 0.3}}, "Imu")
     got = [work.reading(imu()) for _ in range(4000)]
     turning, pushing = (np.array([getattr(one, name) for one in got]) for name in
@@ -42,19 +42,19 @@ def test_noise_of_odometry_after_a_meter_does_not_depend_on_its_rate(steps):
     assert np.mean(ends) == pytest.approx(1.0, abs=0.01)
 
 
-def test_noise_of_odometry_that_stands_is_none():
+def test_stationary_odometry_has_no_noise():
     work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
     assert {work.reading(odometry(Pose2(1, 2), 6 * k)).pose for k in range(50)} == {Pose2(1, 2)}
 
 
-def test_a_noisy_odometry_reports_the_velocity_of_the_way_that_it_reports():
+def test_noisy_odometry_reports_the_velocity_of_its_reported_path():
     work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
     before = work.reading(odometry(Pose2(0, 0), 0, Twist(0.5)))
     after = work.reading(odometry(Pose2(0.0125, 0), 6, Twist(0.5)))
     assert after.twist.vx == pytest.approx((after.pose.x - before.pose.x) * 40)
 
 
-def test_every_noisy_belief_is_off_by_another_draw_and_its_odometry_is_not():
+def test_belief_noise_is_independent_and_keeps_the_odometry():
     work = begun({"noise": {"linear": "10 cm", "angular": "2 deg"}}, "Belief")
     told = [work.belief(belief(Pose2(3, 4, 0.5), Pose2(1, 0, 0.1))) for _ in range(3000)]
     poses = np.array([one.pose for one in told])
@@ -62,7 +62,7 @@ def test_every_noisy_belief_is_off_by_another_draw_and_its_odometry_is_not():
     assert told[7].map_from_odom.compose(Pose2(1, 0, 0.1)) == pytest.approx(told[7].pose)
 
 
-def test_a_bias_is_added_to_what_is_measured_and_to_nothing_else():
+def test_bias_is_added_to_finite_measurements_only():
     assert begun({"bias": {"range": "-20 cm"}}, "Scan").reading(scan([1.0, np.inf, np.nan, 0.2])).ranges == (
         pytest.approx([0.8, np.inf, np.nan, -np.inf], nan_ok=True)
     )
@@ -87,7 +87,7 @@ def test_scaled_odometry_drives_and_turns_by_the_factor():
     assert told.twist == pytest.approx((0.55, 0, 0.22))
 
 
-def test_a_drift_grows_with_the_time_since_it_began():
+def test_drift_grows_with_the_time_since_its_start():
     now = Hand()
     now.tick = 480
     gyro, lidar = begun({"drift": {"gyro": 0.01}}, "Imu", now), begun({"drift": {"range": "5 cm/s"}}, "Scan", now)
@@ -97,7 +97,7 @@ def test_a_drift_grows_with_the_time_since_it_began():
         assert lidar.reading(scan([2.0], tick)).ranges == pytest.approx([2.0 + 0.05 * seconds])
 
 
-def test_odometry_that_drifts_drives_while_the_robot_stands_and_keeps_the_way_when_it_is_over():
+def test_odometry_drifts_at_standstill_and_keeps_the_drift_after_the_fault():
     work = begun({"drift": {"linear": "10 cm/s"}}, "Odometry")
     for tick in range(0, 481, 6):
         told = work.reading(odometry(tick=tick))
@@ -107,7 +107,7 @@ def test_odometry_that_drifts_drives_while_the_robot_stands_and_keeps_the_way_wh
     assert rest.reading(odometry(tick=720)).pose == pytest.approx((0.2, 0, 0))
 
 
-def test_a_belief_that_drifts_slides_along_the_heading_of_when_it_began():
+def test_belief_drifts_along_the_heading_at_the_start_of_the_fault():
     now = Hand()
     work = begun({"drift": {"linear": "10 cm/s", "angular": 0.0}}, "Belief", now)
     work.belief(belief(Pose2(1, 1, math.pi / 2), Pose2(0, 0)))

@@ -21,11 +21,11 @@ def heard(fault: dict, ticks: int, period: int = 24, until: int | None = None) -
     return got
 
 
-def test_a_fixed_delay_puts_every_message_off_by_the_same():
+def test_fixed_delay_is_equal_for_every_message():
     assert heard({"delay": {"latency": "0.2 s"}}, 200) == [(48 + 24 * k, 24 * k) for k in range(7)]
 
 
-def test_a_random_delay_is_uniform_and_never_changes_the_order():
+def test_random_delay_keeps_the_order_of_messages():
     got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
     assert [taken for _, taken in got] == [24 * k for k in range(len(got))]
     arrived = np.array([at for at, _ in got])
@@ -37,7 +37,7 @@ def test_a_random_delay_is_uniform_and_never_changes_the_order():
     assert late.mean() > 0.6
 
 
-def test_messages_that_come_seldom_are_delayed_uniformly():
+def test_rare_messages_have_a_uniform_delay():
     got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
     late = np.array([(at - taken) / 240 for at, taken in got])
     assert np.quantile(late, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
@@ -50,7 +50,7 @@ def test_delayed_messages_arrive_before_newer_ones():
     ]
 
 
-def test_only_the_newest_of_late_commands_counts():
+def test_only_the_newest_delayed_command_is_used():
     now = Hand()
     work = begun({"delay": {"latency": "50 ms"}}, "Command", now)
     for now.tick in range(0, 12, 3):
@@ -61,17 +61,17 @@ def test_only_the_newest_of_late_commands_counts():
 
 
 @pytest.mark.parametrize(("rate", "every"), [("5 Hz", 48), ("2 Hz", 120)])
-def test_a_slow_sensor_has_the_rate_that_is_said(rate, every):
+def test_slow_sensor_has_the_given_rate(rate, every):
     assert [at for at, _ in heard({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, every))
 
 
-def test_a_rate_that_does_not_divide_the_sensors_own_is_kept_on_average():
+def test_rate_that_does_not_divide_that_of_the_sensor_holds_on_average():
     got = [at for at, _ in heard({"slow": {"rate": "3 Hz"}}, 2400)]
     assert len(got) == 30
     assert set(np.diff(got)) == {72, 96}
 
 
-def test_slow_is_slower_than_the_sensor():
+def test_slow_rate_must_be_below_that_of_the_sensor():
     assert unsuitable_key({"slow": {"rate": 10}}, "Scan", rate=10.0)[0] == "rate"
     assert unsuitable_key({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
 
@@ -104,13 +104,13 @@ def test_a_stuck_sensor_repeats_its_first_message_with_fresh_stamps(kind, first,
     np.testing.assert_array_equal(getattr(told, name), getattr(first, name))
 
 
-def test_a_stuck_command_is_kept_and_stuck_wheels_do_not_turn():
+def test_stuck_command_is_repeated_and_stuck_wheels_do_not_turn():
     command, wheels = begun({"stuck": {}}, "Command"), begun({"stuck": {}}, "Wheels")
     assert [command.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist(0.1)] * 3
     assert [wheels.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist()] * 3
 
 
-def test_a_localizer_that_is_off_leaves_the_robot_to_its_odometry():
+def test_disabled_localizer_leaves_only_odometry():
     work = begun({"off": {}}, "Belief")
     work.belief(belief(Pose2(5, 5), Pose2(1, 0)))
     told = work.belief(belief(Pose2(7, 6), Pose2(2, 0)))
@@ -118,13 +118,13 @@ def test_a_localizer_that_is_off_leaves_the_robot_to_its_odometry():
     assert told.map_from_odom == pytest.approx((4, 5, 0))
 
 
-def test_a_localizer_that_is_stuck_keeps_the_robot_at_one_place():
+def test_stuck_localizer_repeats_its_first_belief():
     work, first = begun({"stuck": {}}, "Belief"), belief(Pose2(5, 5), Pose2(1, 0))
     assert work.belief(first) is first
     assert work.belief(belief(Pose2(7, 6), Pose2(2, 0))) is first
 
 
-def test_a_belief_jumps_in_the_robots_own_frame_and_then_moves_as_the_map_lies_now():
+def test_belief_jumps_in_the_robot_frame_and_keeps_the_offset_of_the_map():
     work = begun({"jump": {"x": 1, "yaw": "90 deg"}}, "Belief")
     told = work.belief(belief(Pose2(2, 2, np.pi / 2), Pose2(0, 0)))
     assert told.pose == pytest.approx((2, 3, -np.pi), abs=1e-9) or told.pose == pytest.approx((2, 3, np.pi))
@@ -147,7 +147,7 @@ def corrections(fault: dict, ticks: int, until: int | None = None) -> list[float
     return told
 
 
-def test_corrections_of_the_localizer_come_late_in_order_and_are_carried_on_by_odometry():
+def test_delayed_localizer_corrections_are_extrapolated_by_odometry():
     told = corrections({"delay": {"latency": "50 ms"}}, 60)
     assert told == pytest.approx([max(0, tick - 12) for tick in range(60)])
     over = corrections({"delay": {"latency": "50 ms"}}, 60, until=30)
@@ -155,7 +155,7 @@ def test_corrections_of_the_localizer_come_late_in_order_and_are_carried_on_by_o
     assert over[41:] == pytest.approx(list(range(41, 60)))
 
 
-def test_corrections_that_come_seldom_or_not_stay_what_they_were():
+def test_last_correction_is_kept_until_the_next_one():
     assert corrections({"slow": {"rate": "10 Hz"}}, 60) == pytest.approx([24 * (tick // 24) for tick in range(60)])
     gappy = corrections({"intermittent": {"up": "0.1 s", "down": "0.1 s"}}, 2400)
     assert all(gappy[k] in (k, gappy[k - 1]) for k in range(1, 2400))

@@ -43,14 +43,14 @@ SPEED = ExpectedFailure("NAV-1", ("speed",))
         (None, (PASS, PASS), Outcome.PASSED, ""),
     ],
 )
-def test_only_what_was_expected_to_fail_may_and_must(
+def test_exactly_the_expected_criteria_must_fail(
     expected: ExpectedFailure | None, statuses: tuple[Status, Status], came_out: Outcome, told: str
 ) -> None:
     verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
     assert judged(expected, *verdicts) == (came_out, told)
 
 
-def test_all_that_is_named_must_fail() -> None:
+def test_all_named_criteria_must_fail() -> None:
     both = ExpectedFailure("NAV-1", ("speed", "clearance"))
     assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance passed")
 
@@ -67,14 +67,14 @@ def test_a_warning_is_no_failure_to_expect() -> None:
     assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
 
 
-def test_a_log_that_was_cut_off_is_never_as_expected() -> None:
+def test_truncated_log_never_fails_as_expected() -> None:
     assert judged(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), whole=False) == (Outcome.FAILED, "")
 
 
 @pytest.mark.parametrize(
     ("ids", "name"), [((), "expected"), (("speed",), "expected"), (("expected", "speed"), "expected#2")]
 )
-def test_the_verdict_about_the_expectation_has_a_name_of_its_own(ids: tuple[str, ...], name: str) -> None:
+def test_verdict_on_the_expectation_has_a_unique_name(ids: tuple[str, ...], name: str) -> None:
     verdicts = [verdict(each, FAIL) for each in ids]
     _, about_it = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
     assert about_it is not None

@@ -60,7 +60,7 @@ EVEN = np.arange(0, 4.0001, 1 / 40)
     ],
     ids=["a late second sample", "lost samples", "jitter", "30 Hz"],
 )
-def test_sparc_and_ldlj_do_not_depend_on_how_even_the_samples_are(times):
+def test_smoothness_does_not_depend_on_the_spacing_of_samples(times):
     even, uneven = (result(drive(each, wobble(each)), {"collisions": {}}).metrics for each in (EVEN, times))
     assert uneven["sparc"] == pytest.approx(even["sparc"], abs=0.03)
     assert uneven["mean_jerk"] == pytest.approx(even["mean_jerk"], rel=0.5)
@@ -68,7 +68,7 @@ def test_sparc_and_ldlj_do_not_depend_on_how_even_the_samples_are(times):
     assert result(drive(times, wobble(times)), bound).verdicts[0].status is Status.FAIL
 
 
-def test_a_first_gap_of_a_quarter_second_does_not_make_a_drive_smooth():
+def test_initial_gap_of_a_quarter_second_does_not_hide_oscillation():
     times = np.concatenate(([0.0], EVEN[11:]))
     rough = drive(times, wobble(times))
     found = result(rough, {"smoothness": {"min_sparc": -2}})
@@ -82,7 +82,7 @@ def test_smoothness_of_a_few_samples_is_never_an_error(count):
     assert found.verdicts[0].status is not Status.ERROR
 
 
-def test_smoothness_is_not_judged_by_too_rare_samples():
+def test_smoothness_is_inconclusive_with_sparse_samples():
     times = np.arange(0, 4.0001, 0.1)
     found = result(drive(times, wobble(times)), {"smoothness": {"min_sparc": -9}})
     (finding,) = found.verdicts[0].findings
@@ -105,7 +105,7 @@ def test_criteria_judge_uneven_samples(name):
     assert found.outcome is Outcome.PASSED, found
 
 
-def test_a_window_is_one_of_time_not_of_samples():
+def test_time_windows_do_not_depend_on_sample_counts():
     """Of the samples at 0, 0.1, 0.2, 1.0 and 1.1 s, the fourth is 1 s ahead and not 0.3 s."""
     times = [0, 0.1, 0.2, 1.0, 1.1]
     trace = drive(times, [0.1, 0.1, 0.1, 0.9, 0.1])
@@ -115,7 +115,7 @@ def test_a_window_is_one_of_time_not_of_samples():
         assert verdict.status is status
 
 
-def test_a_metric_that_no_one_asked_for_does_not_break_a_run():
+def test_unused_undefined_metric_is_no_error():
     times = np.delete(EVEN, range(20, 50))
     found = result(drive(times, wobble(times)), {"speed": {"max": 1.0}})
     assert found.outcome is Outcome.PASSED
@@ -123,7 +123,7 @@ def test_a_metric_that_no_one_asked_for_does_not_break_a_run():
     assert found.metrics["max_speed"] is not None
 
 
-def test_a_belief_that_is_not_finite_breaks_only_what_needs_it_in_the_log_of_another_recorder():
+def test_non_finite_belief_in_a_third_party_log_affects_only_its_criteria():
     trace = drive(EVEN, wobble(EVEN))
     belief = np.full((1, 9), np.nan)
     trace = replace(trace, belief=Samples(np.array([5]), belief))
@@ -174,7 +174,7 @@ def test_gaps_are_named_by_evidence():
 
 @pytest.mark.parametrize("signal", ["truth", "clearance", "belief"])
 @pytest.mark.parametrize("order", [[0, 2, 1, 3], [0, 1, 1, 3]])
-def test_a_log_of_simscen_whose_samples_do_not_rise_is_an_error(signal, order):
+def test_unsorted_samples_in_a_simscen_log_are_an_error(signal, order):
     trace = drive(EVEN[:4], [0.0] * 4)
     trace = replace(trace, belief=Samples(trace.truth.ticks, np.zeros((4, 9))))
     check_recorded_signals(trace)

@@ -110,7 +110,7 @@ def test_file_of_another_type_is_reported(
     assert problem(path) == expected
 
 
-def test_a_file_of_two_logs_is_refused(tmp_path: Path, log: Path) -> None:
+def test_concatenated_logs_are_refused(tmp_path: Path, log: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(2 * log.read_bytes())
     told = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
@@ -157,7 +157,7 @@ def test_log_of_another_recorder_is_reported(tmp_path: Path) -> None:
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1), bit=st.integers(0, 7))
-def test_a_flipped_bit_is_noticed(tmp_path: Path, log: Path, place: float, bit: int) -> None:
+def test_flipped_bit_is_detected(tmp_path: Path, log: Path, place: float, bit: int) -> None:
     data = bytearray(log.read_bytes())
     (summary,) = struct.unpack_from("<Q", data, len(data) - 28)  # the index after it is not read
     data[int(place * (summary - 1))] ^= 1 << bit
@@ -168,7 +168,7 @@ def test_a_flipped_bit_is_noticed(tmp_path: Path, log: Path, place: float, bit: 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(kept=st.floats(0, 1))
-def test_a_log_cut_anywhere_is_read_as_far_as_it_goes_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
+def test_truncated_log_is_read_up_to_its_end_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
     data = log.read_bytes()
     path = tmp_path / "cut.partial.mcap"
     path.write_bytes(data[: int(kept * len(data))])

@@ -88,7 +88,7 @@ def judged(read: Log):
     return judge_run(RunKey("a", 7), "a", entries, read.trace, read.header.case, coverage=read.coverage)
 
 
-def test_a_log_that_was_only_copied_passes(log: Path, tmp_path: Path) -> None:
+def test_copied_log_passes(log: Path, tmp_path: Path) -> None:
     for read in (read_log(log), read_log(edited(log, tmp_path / "copy.mcap"))):
         assert not read.coverage.missing and not read.coverage.partial
         assert judged(read).outcome is Outcome.PASSED
@@ -116,7 +116,7 @@ def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path
     assert " recorded messages" in told
 
 
-def test_a_log_without_counts_is_not_passed(log: Path, tmp_path: Path) -> None:
+def test_log_without_message_counts_does_not_pass(log: Path, tmp_path: Path) -> None:
     read = read_log(edited(log, tmp_path / "edited.mcap", counts=False))
     assert set(read.coverage.partial) == set(Evidence)
     assert {verdict.status for verdict in judged(read).verdicts} == {Status.INCONCLUSIVE}
@@ -172,7 +172,7 @@ class Parts:
         return path
 
 
-def test_the_channels_of_a_topic_are_counted_together(log: Path, tmp_path: Path) -> None:
+def test_message_counts_are_summed_over_channels_of_a_topic(log: Path, tmp_path: Path) -> None:
     read = read_log(Parts(log).write(tmp_path / "split.mcap", channels_per_topic=3))
     assert judged(read).outcome is Outcome.PASSED
 
@@ -222,7 +222,7 @@ REFUSED: dict[str, tuple[Edit, str]] = {
 
 
 @pytest.mark.parametrize("edit", REFUSED)
-def test_a_log_that_contradicts_itself_is_refused(log: Path, tmp_path: Path, edit: str) -> None:
+def test_inconsistent_log_is_refused(log: Path, tmp_path: Path, edit: str) -> None:
     change, message = REFUSED[edit]
     parts = Parts(log)
     change(parts)
@@ -251,6 +251,6 @@ def test_all_robots_of_a_log_are_listed() -> None:
 
 
 @pytest.mark.parametrize("robots", ['["a", "a"]', '{"a": 1}', '"a"', "[[]]", "[1, 2]"])
-def test_the_list_of_robots_has_distinct_names(robots: str) -> None:
+def test_duplicate_robot_names_are_refused(robots: str) -> None:
     with pytest.raises(ValueError, match="its list of robots is"):
         described(robots)

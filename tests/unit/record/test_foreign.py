@@ -68,7 +68,7 @@ def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> No
     }  # fmt: skip
 
 
-def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_be(
+def test_missing_ground_truth_is_reported_with_possible_topics(
     read: Callable[..., ForeignLog],
 ) -> None:
     log = read(drive(), ForeignLogOptions())
@@ -79,7 +79,7 @@ def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_
     assert "no topic /vicon" in read(drive(), ForeignLogOptions(truth="/vicon")).coverage.missing[Evidence.TRUTH]
 
 
-def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> None:
+def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[..., ForeignLog]) -> None:
     """map ← odom holds until it is told anew, odom ← base moves, base ← marker is static."""
     said = drive()
     for k in range(201):
@@ -98,7 +98,7 @@ def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> N
     assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
 
 
-def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
+def test_ground_truth_in_another_frame_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
     log = read(drive(mocap="vicon"))
     assert "frame `vicon`, the map frame is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
     assert Evidence.TRUTH not in log.coverage.missing
@@ -106,7 +106,7 @@ def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callab
     assert Evidence.ALIGNMENT not in same.coverage.missing
 
 
-def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+def test_gap_in_the_ground_truth_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
     gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
     log = read([one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]])
     assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 3.9")
@@ -114,12 +114,12 @@ def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog
     assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 0.00 s to 6.0")
 
 
-def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+def test_belief_that_starts_after_a_meter_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
     log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
 
 
-def test_twists_that_were_never_set_are_not_a_standstill(read: Callable[..., ForeignLog]) -> None:
+def test_velocity_is_computed_from_poses_if_all_twists_are_zero(read: Callable[..., ForeignLog]) -> None:
     said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
             for k in range(201)]  # fmt: skip
     log = read(said, ForeignLogOptions(truth="/gps"))
@@ -130,7 +130,7 @@ def test_twists_that_were_never_set_are_not_a_standstill(read: Callable[..., For
 
 
 @pytest.mark.parametrize("size", [0.2, 0.5, 0.9, 0.995])
-def test_a_log_that_breaks_off_has_no_end(tmp_path: Path, size: float) -> None:
+def test_truncated_log_has_no_end(tmp_path: Path, size: float) -> None:
     file = write_mcap(tmp_path / "a.mcap", drive(), **UNINDEXED)
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * size)])
@@ -157,7 +157,7 @@ def test_messages_that_are_not_cdr_are_ignored_with_a_note(refused: Callable[...
     assert "/mocap is encoded as json, not as CDR" in refused(drive(), encoding="json")
 
 
-def test_messages_that_do_not_fit_their_type_are_refused(refused: Callable[..., str]) -> None:
+def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[..., str]) -> None:
     only = [one for one in drive() if one.topic == "/mocap"]
     cut = refused(only, change=lambda data: data[:40])
     assert "message 1 of /mocap cannot be read as geometry_msgs/msg/PoseStamped" in cut
@@ -183,7 +183,7 @@ def test_big_endian_messages_are_read(tmp_path: Path) -> None:
     assert np.array_equal(log.trace.truth.values, little.trace.truth.values)
 
 
-def test_a_log_of_none_of_the_topics_is_refused_with_those_it_has(refused: Callable[..., str]) -> None:
+def test_log_without_known_topics_is_refused_with_a_list_of_its_topics(refused: Callable[..., str]) -> None:
     told = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
     assert told.startswith("SC804 it has no messages that can be judged (its topics: /robot1/amcl_pose, ")
     other = refused([], ForeignLogOptions())
@@ -217,7 +217,7 @@ def test_action_status_gives_goal_results(read: Callable[..., ForeignLog]) -> No
     assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
 
 
-def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_for_a_bag_without_rosbags_states_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(InvalidInput) as raised:

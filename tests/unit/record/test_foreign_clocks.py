@@ -23,7 +23,7 @@ from simscen.record.foreign.read import ForeignLog
 from simscen.record.foreign.timebase import find_clock_step
 
 
-def test_times_are_those_of_the_headers(read: Callable[..., ForeignLog]) -> None:
+def test_times_are_taken_from_message_headers(read: Callable[..., ForeignLog]) -> None:
     """AMCL's pose is logged 80 ms after the truth of the same moment; at 0.5 m/s that would be 4 cm of error."""
     log = read(drive(off=0.0))
     error = log.trace.belief.values[:, 0] - np.interp(
@@ -100,14 +100,14 @@ def with_busy_start(step: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return logged, stamps + np.where(stamps >= 5 * SECOND, step, 0)
 
 
-def test_a_recorder_that_catches_up_after_a_busy_start_is_no_clock_that_was_set() -> None:
+def test_busy_start_of_the_recorder_is_not_a_clock_step() -> None:
     assert find_clock_step(*with_busy_start()) is None
     found = find_clock_step(*with_busy_start(round(0.3 * SECOND)))
     assert found is not None
     assert found[1] == pytest.approx(0.3 * SECOND, abs=0.02 * SECOND)
 
 
-def test_a_log_is_judged_from_when_the_recorder_has_subscribed_to_scans(read: Callable[..., ForeignLog]) -> None:
+def test_log_is_judged_from_the_first_recorded_scan(read: Callable[..., ForeignLog]) -> None:
     late = [one for one in drive() if one.topic != "/scan" or one.time > BEGIN + SECOND]
     log = read(late)
     assert log.notes == ["/scan is recorded 1.0 s after the first message; the log is judged from then on"]
@@ -153,7 +153,7 @@ def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], rea
     assert len(read(said, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
 
-def test_stamps_that_were_never_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
+def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
     said = [one for one in drive() if one.topic != "/mocap"]
     said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
     log = read(said)

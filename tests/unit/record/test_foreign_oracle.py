@@ -63,7 +63,7 @@ def disguised(own: Path) -> Path:
     return file
 
 
-def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) -> None:
+def test_signals_are_bit_identical(own: Path, disguised: Path) -> None:
     """But for the normalized quaternions' last one; ticks are found exactly."""
     assert is_simscen_log(own) and not is_simscen_log(disguised)
     ours, theirs = read_log(own).trace, read_foreign_log(disguised, TRUTH).trace
@@ -85,7 +85,7 @@ def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) ->
         {"always": {"signal": "turn_rate", "op": "<=", "value": 3.0}},
     ],
 )
-def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, object]) -> None:
+def test_verdicts_and_margins_are_equal(own: Path, disguised: Path, text: dict[str, object]) -> None:
     entry = AnyCriterion.model_validate(text)
     log, foreign = read_log(own), read_foreign_log(disguised, TRUTH)
     (mine,) = judge([entry], log.trace, log.header.case)

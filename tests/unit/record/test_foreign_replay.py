@@ -56,7 +56,7 @@ def mounted() -> Said:
 
 
 @pytest.mark.parametrize("write", [write_mcap, write_bag])
-def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
+def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
     write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
     read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
@@ -65,7 +65,7 @@ def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Call
     assert read.sensors.mounts["laser"].x == pytest.approx(0.2)
 
 
-def test_a_page_is_made_with_criteria_and_without(simscen, tmp_path: Path) -> None:
+def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Path) -> None:
     log = tmp_path / "monday.mcap"
     write_mcap(log, [a_map(), mounted(), *drive(2.0)])
     ended = simscen("replay", str(log), "--truth", "/mocap")

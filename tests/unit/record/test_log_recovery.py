@@ -44,7 +44,7 @@ def whole(tmp_path: Path) -> Path:
     return path
 
 
-def test_71_a_log_cut_anywhere_opens_in_a_reader_that_begins_with_the_index(tmp_path: Path, whole: Path) -> None:
+def test_71_log_truncated_anywhere_opens_in_an_indexed_reader(tmp_path: Path, whole: Path) -> None:
     expected, size = messages(whole), whole.stat().st_size
     for kept in (0.9, 0.7, 0.31):
         cut = tmp_path / "cut.partial.mcap"
@@ -81,7 +81,7 @@ def test_a_killed_run_loses_at_most_one_simulated_second(tmp_path: Path, seconds
     assert CLOCK.ticks(seconds) - log_of_killed.trace.end <= CLOCK.ticks(1.0)
 
 
-def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path) -> None:
+def test_aborted_run_leaves_a_readable_log(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
         for moment in moments(1.0):
             recorder.append(moment)
@@ -94,7 +94,7 @@ def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
-def test_file_that_is_no_log_is_unchanged(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_a_log_is_unchanged(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.partial.mcap"
     path.write_bytes(content)
     with pytest.raises(InvalidInput):

@@ -42,7 +42,7 @@ def test_queued_messages_are_written_once_in_order(ticks: int) -> None:
     assert told == [(name, moment.tick) for moment in SOME for name in "ab"]
 
 
-def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
+def test_messages_wait_at_most_for_the_given_ticks() -> None:
     told: list[tuple[str, int]] = []
     log = MomentBuffer(48).sink(Heard("", told))
     for moment in SOME:
@@ -50,7 +50,7 @@ def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
         assert moment.tick - told[-1][1] <= 48
 
 
-def test_without_ticks_nothing_waits() -> None:
+def test_messages_are_written_immediately_with_a_delay_of_zero() -> None:
     told: list[tuple[str, int]] = []
     log = MomentBuffer(0).sink(Heard("", told))
     for moment in SOME:

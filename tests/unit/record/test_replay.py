@@ -57,14 +57,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_replayed_log_gives_the_very_same_trace(tmp_path: Path, seed: int) -> None:
+def test_replayed_log_gives_a_bit_identical_trace(tmp_path: Path, seed: int) -> None:
     trace = recorded(tmp_path / "run.mcap", list(moments(2.0, seed)), 481)
     assert_same(trace, read_log(tmp_path / "run.mcap").trace)
 
 
 @settings(max_examples=50, deadline=None)
 @given(run=runs, rest=st.integers(0, 10**7))
-def test_any_moments_are_replayed_to_the_last_bit(
+def test_any_moments_are_replayed_exactly(
     tmp_path_factory: pytest.TempPathFactory, run: list[Moment], rest: int
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "run.mcap"
@@ -72,7 +72,7 @@ def test_any_moments_are_replayed_to_the_last_bit(
     assert_same(recorded(path, run, end), read_log(path).trace)
 
 
-def test_a_log_knows_how_its_run_was_ordered(log: Path) -> None:
+def test_log_contains_the_case_and_facts_of_its_run(log: Path) -> None:
     read, given_ = read_log(log), about()
     assert read.complete
     assert read.result == RESULT

@@ -112,7 +112,7 @@ def test_zones_are_published_again_when_one_is_switched() -> None:
     assert third - second == {("speed zones", ""), ("speed zones", "ward: 0.5 m/s")}
 
 
-def test_a_mask_is_drawn_as_triangles_where_its_cells_are() -> None:
+def test_mask_is_drawn_as_triangles_over_its_cells() -> None:
     ((_, markers),) = said("/simscen/scene", (0, []))
     (mask,) = (marker for marker in markers if marker.type == 11)
     assert (mask.pose.position.x, mask.pose.position.y) == (1.0, 1.0)
@@ -131,7 +131,7 @@ def test_frames_of_several_robots_are_in_one_tree(tmp_path: Path) -> None:
         assert parents[f"{front}lidar"] == parents[f"{front}camera"] == f"{front}base_link"
 
 
-def test_mounts_and_scans_of_several_robots_are_called_as_their_stacks_call_them(tmp_path: Path) -> None:
+def test_mounts_and_scans_of_several_robots_are_read_without_their_prefix(tmp_path: Path) -> None:
     for log in read_log(several(tmp_path), with_sensors=True).robots.values():
         assert set(log.header.frames) == {"camera", "lidar", "rear lidar"}
         assert set(log.trace.objects) == {"cart", "a box"}

@@ -56,7 +56,7 @@ def log_and_trace(moments: list[Moment]) -> tuple[bytes, Trace]:
 
 @pytest.mark.parametrize("pauses", [0.0, 0.02, 0.7, 1.0])
 @pytest.mark.parametrize("stays", [{}, STAYS], ids=["all move", "some stay"])
-def test_a_run_is_written_as_if_each_pose_had_been_looked_at(stays: dict[str, Pose3], pauses: float) -> None:
+def test_precomputed_poses_give_the_same_log_as_queried_poses(stays: dict[str, Pose3], pauses: float) -> None:
     late = predicted(("cart 1", "cart 2", "cart 3"), stays, pauses, seed=3)
     late += predicted(("cart 1", "cart 3"), stays, pauses, seed=4, begin=late[-1].tick + 10 * EVERY)
     at_once = [replace(m, sample=m.truth and m.truth._replace(objects=dict(m.truth.objects))) for m in late]

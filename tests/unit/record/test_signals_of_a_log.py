@@ -25,7 +25,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Trace, Trace]:
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-def test_a_signal_is_the_same_from_the_run_and_from_its_log(name: str, both: tuple[Trace, Trace]) -> None:
+def test_signal_of_a_run_equals_that_of_its_log(name: str, both: tuple[Trace, Trace]) -> None:
     of = {key: OF[key] for key in SIGNALS[name].required_arguments[:1]}
     live, replayed = (_bits(name, trace, of) for trace in both)
     assert live == replayed

@@ -48,7 +48,7 @@ def test_each_of_several_robots_has_its_own_stack_and_lines(tmp_path: Path) -> N
     assert robots["b"].sensors.stack_lines() == [(24, line) for line in LINES]
 
 
-def test_a_log_with_two_descriptions_of_the_stack_is_refused(tmp_path: Path) -> None:
+def test_log_with_two_stack_records_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, CLOCK, about()) as recorder:
         for moment in moments(0.2):

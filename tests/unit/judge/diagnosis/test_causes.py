@@ -7,7 +7,7 @@ from simscen.judge.failure_causes import explain_failures
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 
-def test_only_failures_are_explained_and_before_their_own_details():
+def test_only_failures_have_causes_listed_before_their_details():
     trace = synthetic_trace({**STANDS, "events": by("gust", 9)})
     failed = Finding(Status.FAIL, "speed", "2", "≤ 1", tick=2400, detail=("own",))
     findings = (failed, Finding(Status.PASS, "speed", "0", "≤ 1", tick=2400), Finding(Status.FAIL, "speed", "2", "≤ 1"))

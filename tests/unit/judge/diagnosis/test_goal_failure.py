@@ -26,7 +26,7 @@ def test_touched_object_is_named():
     assert line == "why: crate (spawned by event `crate falls` at t = 1.00 s) was 0.20 m from the robot"
 
 
-def test_the_gap_that_is_too_narrow_is_named_with_the_world_that_leaves_no_way():
+def test_unreachable_goal_names_the_passage_that_is_too_narrow():
     gap = ["study", [5, 0.15], [5, -0.15], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith(
@@ -43,7 +43,7 @@ def test_current_contact_is_named_with_its_start():
     assert why("stuck", [[6, "collision.started", "sill", {}]], at=5) == []
 
 
-def test_only_a_goal_that_is_still_wanted_has_something_in_its_way():
+def test_blocking_object_is_reported_only_for_an_active_goal():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     assert why("stuck", crate, at=9)
     reached = [[0, "goal.accepted", "study"], [8, "goal.reached", "study"]]
@@ -52,7 +52,7 @@ def test_only_a_goal_that_is_still_wanted_has_something_in_its_way():
     assert causes("goals_reached", 1920, built, synthetic_case(CASE)) == []
 
 
-def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
+def test_blocking_object_is_reported_after_the_goal_has_failed():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     failed = [[0, "goal.accepted", "study"], [8, "goal.failed", "study", {}], *crate]
     built = synthetic_trace({**STANDS, "events": failed})
@@ -91,7 +91,7 @@ def test_object_beyond_thirty_centimeters_is_not_reported():
         ([[8, "goal.failed", "study"]], 8, True),
     ],
 )
-def test_a_goal_is_wanted_from_when_it_was_accepted_until_it_was_reached_or_given_up(events, at, wanted):
+def test_goal_is_active_from_acceptance_to_its_result(events, at, wanted):
     built = synthetic_trace({**STANDS, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
     assert bool(causes("stuck", round(at * 240), built, synthetic_case(CASE))) is wanted
 
@@ -103,7 +103,7 @@ def test_object_on_an_earlier_goal_is_not_a_cause():
     assert causes("stuck", 2400, built, synthetic_case({**CASE, "goals": goals})) == []
 
 
-def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
+def test_passage_as_wide_as_the_robot_is_not_too_narrow():
     gap = ["study", [5, 0.2], [5, -0.2], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith("path to goal study for a robot 0.40 m wide")
@@ -133,7 +133,7 @@ def test_reason_for_waiting_of_the_stack_is_named():
     assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []
 
 
-def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried():
+def test_message_of_the_stack_is_quoted_only_without_another_cause():
     said = {"error_name": "PATIENCE_EXCEEDED", "message": "no room to turn"}
     given_up = [[0, "goal.accepted", "study"], [5, "recovery.started", "spin", {}], [6, "recovery.started", "wait", {}]]
     given_up.append([8, "goal.failed", "study", said])

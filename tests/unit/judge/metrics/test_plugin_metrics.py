@@ -55,19 +55,19 @@ def test_a_number_is_added(number: float) -> None:
 
 
 @pytest.mark.parametrize("answer", ["nothing to measure", MissingEvidence("nothing to measure")])
-def test_a_reason_is_added_where_there_is_no_number(answer: object) -> None:
+def test_reason_is_added_instead_of_a_number(answer: object) -> None:
     found = added(Measured(answer))
     assert found.values == {"spl": 1.0, "mine": None}
     assert found.undefined == {"ldlj": "no motion", "mine": "nothing to measure"}
 
 
 @pytest.mark.parametrize("answer", [True, math.nan, math.inf, -math.inf, None, "", [1.0], 1j])
-def test_anything_else_makes_the_run_an_error(answer: object) -> None:
+def test_invalid_metric_makes_the_run_an_error(answer: object) -> None:
     with pytest.raises(InvalidTrace, match=r"metric mine is not a finite number: .*\(my-package 1\.0\)"):
         added(Measured(answer))
 
 
-def test_an_exception_makes_the_run_an_error() -> None:
+def test_exception_in_a_metric_makes_the_run_an_error() -> None:
     with pytest.raises(InvalidTrace, match=r"metric mine: KeyError: 'x' \(my-package 1\.0\)"):
         added(Measured(KeyError("x")))
 
@@ -89,7 +89,7 @@ def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRA
 
 
 @pytest.mark.parametrize("zone", ZONES)
-def test_a_zone_begins_with_its_first_distance_and_ends_before_its_last(monkeypatch: Any, zone: str) -> None:
+def test_zone_includes_its_lower_limit_and_excludes_its_upper(monkeypatch: Any, zone: str) -> None:
     low, high = ZONES[zone]
     assert zones(monkeypatch, [low])[f"intrusion_{zone}"] == 1.0
     assert zones(monkeypatch, [high])[f"intrusion_{zone}"] == 0.0
@@ -103,7 +103,7 @@ def test_contact_with_a_person_is_zero_distance(monkeypatch: pytest.MonkeyPatch)
     )
 
 
-def test_a_run_of_one_tick_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_of_one_tick_is_entirely_in_a_zone(monkeypatch: pytest.MonkeyPatch) -> None:
     first = TRACE.truth
     short = replace(TRACE, truth=replace(first, ticks=first.ticks[:1], values=first.values[:1]), end=1)
     assert zones(monkeypatch, [0.1], short)["intrusion_intimate"] == 1.0
