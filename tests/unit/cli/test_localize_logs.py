@@ -16,7 +16,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Said, T, header, pose, write_bag, write_mcap
+from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Message, T, header, pose, write_bag, write_mcap
 from recorded_drives import drive, ranges_at, write_map
 
 from simscen.core.geometry import Pose2
@@ -47,17 +47,17 @@ def said(
     stamp: Callable[[int], int] = lambda time: time,
     frame: str = "laser",
     every: int = 1,
-) -> list[Said]:
+) -> list[Message]:
     """The drive as messages: /odom, /scan by a lidar at `mount` (x, yaw, roll) on the base, and /gt of the truth."""
     forward, turned, roll = mount
-    found = [Said("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
+    found = [Message("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
     for t, (x, y, yaw), odom in drive()[::every]:
         time = BEGIN + round(t * SECOND)
-        found.append(Said("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
-        found.append(Said("/gt", time + LATENCY, posed(stamp(time), (x, y, yaw))))
+        found.append(Message("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
+        found.append(Message("/gt", time + LATENCY, posed(stamp(time), (x, y, yaw))))
         at = (x + forward * math.cos(yaw), y + forward * math.sin(yaw), yaw + turned)
         ranges = ranges_at(*at)
-        found.append(Said("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
+        found.append(Message("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
     return found
 
 
@@ -123,15 +123,15 @@ def link(child: str, parent: str, time: int, at: Pose2) -> Any:
     return T["tf2_msgs/msg/TFMessage"](transforms=[one])
 
 
-def told_by_tf() -> Iterable[Said]:
+def told_by_tf() -> Iterable[Message]:
     """The same drive by a robot that has neither /odom nor /gt: map → odom → base_link."""
     for message in said():
         if message.topic in ("/tf_static", "/scan"):
             yield message
     for t, there, odom in drive():
         time, at = BEGIN + round(t * SECOND), Pose2(*odom)
-        yield Said("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*there).compose(at.inverse())))
-        yield Said("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
+        yield Message("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*there).compose(at.inverse())))
+        yield Message("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
 
 
 def test_odometry_and_reference_can_be_tf_frames(simscen, tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> No
     time = BEGIN + round(t * SECOND)
     where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*there), covariance=np.zeros(36))
     output = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
-    write_bag(tmp_path / "output", [*without, Said("/initialpose", time + LATENCY, output)])
+    write_bag(tmp_path / "output", [*without, Message("/initialpose", time + LATENCY, output)])
     write_bag(tmp_path / "untold", without)
     ended = simscen("localize", "output", *GIVEN, "--json")
     x, y, _ = drive()[-1][1]
@@ -185,7 +185,7 @@ Layout = tuple[float, float, int]
 DEGREE, SIDE = math.pi / 180, math.pi / 2
 
 
-def rescanned(layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges) -> list[Said]:
+def rescanned(layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges) -> list[Message]:
     """The drive with another lidar, which sees the room anew from each place."""
     first, step, count = layout
     angles, found, places = first + step * np.arange(count), [], iter(drive())
@@ -310,7 +310,7 @@ def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
     ids=["angles that are not numbers", "angles that are all the same", "another type", "another topic"],
 )
 def test_missing_scans_are_reported_with_the_existing_topics(
-    simscen, tmp_path: Path, change: Callable[[Said], Said], expected_text: str
+    simscen, tmp_path: Path, change: Callable[[Message], Message], expected_text: str
 ) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in said(every=15)])

@@ -23,11 +23,11 @@ def event(at, happened=True, what="spawned pallet", entry=0):
     ]
 
 
-def fault(begins, touches=None, ends=None, touched=0, entry=0):
-    told = [[begins, "fault.started", "lidar.off", {"entry": entry, "sensor": "lidar"}]]
-    told += [[touches, "fault.took_effect", "lidar.off", {"entry": entry}]] if touches is not None else []
-    told += [[ends, "fault.ended", "lidar.off", {"entry": entry, "touched": touched}]] if ends is not None else []
-    return told
+def fault(start, effect=None, end=None, touched=0, entry=0):
+    events = [[start, "fault.started", "lidar.off", {"entry": entry, "sensor": "lidar"}]]
+    events += [[effect, "fault.took_effect", "lidar.off", {"entry": entry}]] if effect is not None else []
+    events += [[end, "fault.ended", "lidar.off", {"entry": entry, "touched": touched}]] if end is not None else []
+    return events
 
 
 def judged(events, *ordered, **changes):
@@ -77,9 +77,9 @@ def test_entry_without_effect_fails_the_run_at_its_line(ordered, events, why, ti
     assert result.lines == (ordered["line"], 20)
     (finding,) = verdict.findings
     assert (finding.detail, finding.tick) == ((why,), tick)
-    (told,) = json.loads(to_json(result))["verdicts"][0]["findings"]
-    assert told["message"].startswith(f"disturbance did not happen: {ordered['name']} (when time: 3 s)")
-    assert "expected" not in told["message"]
+    (data,) = json.loads(to_json(result))["verdicts"][0]["findings"]
+    assert data["message"].startswith(f"disturbance did not happen: {ordered['name']} (when time: 3 s)")
+    assert "expected" not in data["message"]
 
 
 @pytest.mark.parametrize("ordered", [EVENT, FAULT])

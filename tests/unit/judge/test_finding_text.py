@@ -65,22 +65,22 @@ def test_pose_and_duration_at_a_goal_are_never_the_tightest_bound():
     waited = Finding(Status.PASS, "goal dock wait", "", "≥ 3.00 s", 0.0, "s", 3.0)
     within = Finding(Status.PASS, "goal dock time", "", "≤ 20.00 s", 15.0, "s", 5.0)
     assert tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
-    told = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
-    assert told == "g: goal dock time +15.00 s, 75 % of its limit"
+    text = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
+    assert text == "g: goal dock time +15.00 s, 75 % of its limit"
 
 
 @pytest.mark.parametrize(
-    ("finding", "told"),
+    ("finding", "text"),
     [
         (Finding(Status.PASS, "own", "", "≤ 0.00 m/s", 0.2, "m/s", -0.2), "own +0.20 m/s"),
         (Finding(Status.PASS, "own", "", "≥ 0.10 m", 0.3, "m", 0.4), "own +0.30 m, 300 % of its limit"),
         (Finding(Status.PASS, "own", "", "in the yard", 0.3, "m"), "own +0.30 m"),
         (Finding(Status.PASS, "own", "", "≥ 0.10 m", float("inf"), "m", float("inf")), ""),
     ],
-    ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
+    ids=["limit zero", "at least", "without a measured text", "infinite"],
 )
-def test_margin_is_reported_as_a_share_if_possible(finding, told):
-    assert tightest_margin([verdict(finding, "own", "own")]) == told
+def test_margin_is_reported_as_a_share_if_possible(finding, text):
+    assert tightest_margin([verdict(finding, "own", "own")]) == text
 
 
 def bound(limit, margin, value):

@@ -1,4 +1,4 @@
-"""Claims about a pass rate, against scipy, exact enumeration, and simulated studies."""
+"""Tests of pass-rate claims against scipy, exact enumeration, and simulated studies."""
 
 import math
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ def test_clopper_pearson_limits_equal_those_of_scipy(passed: int, confidence: fl
 
 
 @pytest.mark.parametrize(("rate", "confidence", "runs"), [(0.95, 0.95, 59), (0.99, 0.95, 299), (0.9, 0.9, 22)])
-def test_smallest_number_of_runs_equals_that_of_the_zero_failure_test(rate: float, confidence: float, runs: int) -> None:
+def test_fewest_runs_equal_those_of_the_zero_failure_test(rate: float, confidence: float, runs: int) -> None:
     assert fewest_runs(rate, confidence) == runs
     assert 1 - rate**runs >= confidence > 1 - rate ** (runs - 1)
     fixed = claim(min=rate, confidence=confidence)
@@ -148,7 +148,7 @@ def test_a_crash_of_the_stack_is_a_failure_and_any_other_error_blocks_the_claim(
 
 
 @pytest.mark.parametrize(
-    ("fields", "told"),
+    ("fields", "message"),
     [
         ({"method": "sprt"}, "`sprt` needs a `target`"),
         ({"method": "sprt", "target": 0.9}, "must be greater than `min`"),
@@ -159,8 +159,8 @@ def test_a_crash_of_the_stack_is_a_failure_and_any_other_error_blocks_the_claim(
         ({"confidence": 1.0}, "less than or equal to 0.999999"),
     ],
 )
-def test_contradictory_claims_are_refused(fields: dict[str, object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_contradictory_claims_are_refused(fields: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         claim(**fields)
 
 

@@ -1,4 +1,4 @@
-"""result.json to the byte."""
+"""Tests of the exact content of result.json."""
 
 import json
 import math

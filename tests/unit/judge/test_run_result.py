@@ -16,9 +16,9 @@ TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "event
 
 def conclude(trace, *criteria):
     built, case = synthetic_trace(trace), synthetic_case({})
-    asked = [AnyCriterion.model_validate(words) for words in criteria]
+    entries = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
-    return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
+    return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", entries, built, case, lines)
 
 
 def test_result_is_unchanged_after_writing_and_reading(tmp_path):
@@ -113,9 +113,9 @@ def test_other_content_is_refused(text):
 
 def expecting(trace, *criteria, lines=(10,)):
     built, case = synthetic_trace(trace), synthetic_case({})
-    asked = [AnyCriterion.model_validate(words) for words in criteria]
+    entries = [AnyCriterion.model_validate(words) for words in criteria]
     expected = ExpectedFailure("NAV-1", (), 30)
-    return judge_run(RunKey("a/b", 7), "a/b.scenario.yaml", asked, built, case, lines, expected=expected)
+    return judge_run(RunKey("a/b", 7), "a/b.scenario.yaml", entries, built, case, lines, expected=expected)
 
 
 def test_verdict_on_an_expected_failure_is_last_and_has_its_line():

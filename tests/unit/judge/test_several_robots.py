@@ -1,4 +1,4 @@
-"""The combined result of several robots."""
+"""Tests of the combined result of several robots."""
 
 from typing import Any
 

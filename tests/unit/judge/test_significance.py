@@ -1,4 +1,4 @@
-"""Significant changes, against scipy and the definition of Holm's correction."""
+"""Tests of significant changes, against scipy and the definition of Holm's correction."""
 
 import pytest
 from scipy.stats import binomtest, wilcoxon

@@ -1,4 +1,4 @@
-"""Evaluation of studies, against scipy and counting by hand."""
+"""Tests of the evaluation of studies, against scipy and counting by hand."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -15,7 +15,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
-from moments import CASE, CLOCK, about, moments
+from moments import CASE, CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
@@ -29,9 +29,9 @@ HERE = Path(__file__).parent
 
 
 def recorded(path: Path, seconds: float) -> Trace:
-    """A whole log, and the trace of its moments."""
+    """Write a complete log, and return the trace of its moments."""
     builder, end = TraceBuilder(CLOCK), CLOCK.ticks(seconds)
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(seconds):
             recorder.append(moment)
             builder.append(moment)
@@ -47,14 +47,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def killed(folder: Path, seconds: float) -> Path:
-    """The log of a process that a SIGKILL ended after so many simulated seconds."""
+    """Return the log of a process killed by SIGKILL after this simulated time."""
     code = f"""if True:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
-        from moments import CLOCK, about, moments
+        from moments import CLOCK, sample_header, moments
         from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer
         from simscen.record.recorder import Recorder
-        recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
+        recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, sample_header())
         log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
         for moment in moments({seconds}):
             log.append(moment)
@@ -113,12 +113,12 @@ def test_file_of_another_type_is_reported(
 def test_concatenated_logs_are_refused(tmp_path: Path, log: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(2 * log.read_bytes())
-    told = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
-    assert problem(path) == told
+    message = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
+    assert problem(path) == message
 
 
 def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
-    """A bag with one chunk, which holds one message."""
+    """Write a log with one chunk that contains one message."""
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression)
         writer.start("ros2", "rosbag2")

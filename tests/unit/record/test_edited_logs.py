@@ -9,7 +9,7 @@ import pytest
 from mcap import records
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from moments import CLOCK, about, moments
+from moments import CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry.kinematics import Twist
@@ -41,7 +41,7 @@ CRITERIA = [
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "run.mcap"
     end = CLOCK.ticks(SECONDS)
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(SECONDS, beams=8, particles=4):
             recorder.append(moment)
         ended = Event(end, EventKind.RUN_ENDED, "time limit")
@@ -51,16 +51,16 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def edited(log: Path, path: Path, keep: Keep = lambda *_: True, counts: bool = True, backwards: bool = False) -> Path:
-    """A copy, written by the mcap library, with the messages to keep (by topic and seconds)."""
+    """Write a copy with the mcap library that contains only the messages to keep (by topic and seconds)."""
     with log.open("rb") as source, path.open("wb") as target:
         reader, writer = make_reader(source), Writer(target)
         summary = reader.get_summary()
         assert summary is not None
-        writer.start("ros2", "somebody")
+        writer.start("ros2", "other recorder")
         schemas = {one.id: writer.register_schema(one.name, one.encoding, one.data) for one in summary.schemas.values()}
         notes = list(reader.iter_metadata())
-        (about_run,) = [note for note in notes if note.name == "simscen"]
-        writer.add_metadata(about_run.name, about_run.metadata)
+        (run_record,) = [note for note in notes if note.name == "simscen"]
+        writer.add_metadata(run_record.name, run_record.metadata)
         for file in reader.iter_attachments():
             writer.add_attachment(0, 0, file.name, file.media_type, file.data)
         channels: dict[str, int] = {}
@@ -112,8 +112,8 @@ def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path
     statuses = {verdict.id: verdict.status for verdict in result.verdicts}
     assert {name for name, status in statuses.items() if status is Status.INCONCLUSIVE} == affected
     assert result.outcome is Outcome.FAILED
-    told = " ".join([*read.coverage.missing.values(), *read.coverage.partial.values()])
-    assert " recorded messages" in told
+    reasons = " ".join([*read.coverage.missing.values(), *read.coverage.partial.values()])
+    assert " recorded messages" in reasons
 
 
 def test_log_without_message_counts_does_not_pass(log: Path, tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ class Parts:
         """Write a log, with the messages of each topic spread over several channels in turn."""
         with path.open("wb") as target:
             writer = Writer(target)
-            writer.start("ros2", "somebody")
+            writer.start("ros2", "other recorder")
             for name, record in self.metadata:
                 writer.add_metadata(name, record)
             for name, data in self.attachments:
@@ -233,14 +233,14 @@ def test_inconsistent_log_is_refused(log: Path, tmp_path: Path, edit: str) -> No
 def described(robots: str) -> LogContents:
     """Return the contents of a log with this list of robots, and the cases of robots a and b."""
     contents = LogContents()
-    contents.add(records.Metadata("simscen", about_run("a", robots)))
+    contents.add(records.Metadata("simscen", run_record("a", robots)))
     for name in ("a", "b"):
-        case = case_to_json(about().case).encode()
+        case = case_to_json(sample_header().case).encode()
         contents.add(records.Attachment(0, 0, f"{name}/case.json", "application/json", case))
     return contents
 
 
-def about_run(name: str, robots: str) -> Record:
+def run_record(name: str, robots: str) -> Record:
     return {"format": "1", "scenario": name, "seed": "1", "tick_rate": "240", "robots": robots}
 
 

@@ -1,4 +1,4 @@
-"""Events as JSON and as lines."""
+"""Tests of events as JSON and as lines of text."""
 
 from simscen.core.records.events import Event
 from simscen.record.messages import event_text

@@ -13,7 +13,7 @@ from foreign_logs import (
     BEGIN,
     SECOND,
     SPEED,
-    Said,
+    Message,
     drive,
     stamped_pose,
     statuses,
@@ -37,7 +37,7 @@ STATUS = "/navigate_to_pose/_action/status"
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
+    """Result of a command."""
 
     code: int
     out: str
@@ -48,7 +48,7 @@ class Ended(NamedTuple):
 def simscen(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Callable[..., Ended]:
-    """Runs `simscen judge ARGUMENTS` in a fresh folder."""
+    """Return a function that runs `simscen judge ARGUMENTS` in a fresh folder."""
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str) -> Ended:
@@ -63,7 +63,7 @@ def simscen(
 
 @pytest.fixture
 def limits(tmp_path: Path) -> Callable[..., str]:
-    """Writes a file of criteria."""
+    """Return a function that writes a criteria file."""
 
     def write(*criteria: str, more: str = "") -> str:
         (tmp_path / "limits.yaml").write_text(more + "pass:\n" + "".join(f"  - {one}\n" for one in criteria))
@@ -73,7 +73,7 @@ def limits(tmp_path: Path) -> Callable[..., str]:
 
 
 def _examples() -> list[Any]:
-    """The example of each criterion, from its docstring, as plain data."""
+    """Return the example of each criterion, from its docstring, as plain data."""
     examples = []
     for name, field in AnyCriterion.model_fields.items():
         if name in AnyCriterion.modifiers or name == "then":
@@ -91,7 +91,7 @@ def _examples() -> list[Any]:
 
 @pytest.mark.parametrize("example", _examples())
 def test_no_criterion_passes_without_its_evidence(tmp_path: Path, example: dict[str, Any]) -> None:
-    """Not even with a truth and goals, when any one kind of evidence is taken away."""
+    """The log has the ground truth and goals, but lacks one kind of evidence."""
     entry = AnyCriterion.model_validate(example)
     goals = (Goal("shelf", Pose2(SPEED * 10, 0.0)),)
     case = Case(Pose2(0.0, 0.0), goals, {"shelf": SPEED * 10}, {"aisle": ((50, 50), (51, 50), (51, 51))})
@@ -137,8 +137,8 @@ def test_judging_a_log_imports_no_engine(limits, tmp_path: Path) -> None:
 def test_filter_masks_of_a_criteria_file_are_used(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     (tmp_path / "slow.pgm").write_bytes(b"P5\n20 2\n255\n" + b"\x1e" * 40)
-    said = "image: slow.pgm\nmode: raw\nresolution: 1\norigin: [-5, -1, 0]\n"
-    (tmp_path / "slow.yaml").write_text(f"{said}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    yaml = "image: slow.pgm\nmode: raw\nresolution: 1\norigin: [-5, -1, 0]\n"
+    (tmp_path / "slow.yaml").write_text(f"{yaml}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
     file = limits("speed: {mask: {file: slow.yaml, type: absolute, multiplier: 0.01}}")
     ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
     assert ended.code == 1
@@ -189,12 +189,12 @@ def test_a_folder_of_old_logs_gives_a_table_of_margins(simscen, limits, tmp_path
 
 
 def test_goals_are_judged_by_action_status_and_ground_truth(simscen, limits, tmp_path: Path) -> None:
-    said = [
+    messages = [
         *drive(),
-        Said(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
-        Said(STATUS, BEGIN + 10 * SECOND, statuses((1, BEGIN + SECOND, 4))),
+        Message(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
+        Message(STATUS, BEGIN + 10 * SECOND, statuses((1, BEGIN + SECOND, 4))),
     ]
-    write_mcap(tmp_path / "drive.mcap", said)
+    write_mcap(tmp_path / "drive.mcap", messages)
     goals = "goals: [{name: shelf, pose: {x: 5, y: 0}, xy_tolerance: 0.3 m}]\n"
     file = limits("goals_reached: {}", "result: {status: SUCCEEDED}", "time_to_goal: {max: 10 s}", more=goals)
     assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
@@ -242,8 +242,8 @@ def test_unusual_logs_are_noted_and_truncated_logs_pass_nothing(simscen, limits,
 
 def test_gap_in_the_ground_truth_makes_a_pass_but_no_failure_inconclusive(simscen, limits, tmp_path: Path) -> None:
     gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
-    said = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
-    write_mcap(tmp_path / "drive.mcap", said)
+    messages = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
+    write_mcap(tmp_path / "drive.mcap", messages)
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
     assert "so far, but /mocap has no message from t = " in ended.out
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 0.1 m/s}"), "--truth", "/mocap")
@@ -290,8 +290,9 @@ def test_metrics_without_evidence_are_null_in_the_result(simscen, limits, tmp_pa
 
 
 def test_nan_in_the_ground_truth_is_an_error(simscen, limits, tmp_path: Path) -> None:
-    said = [*drive(2.0), Said("/mocap", BEGIN + 3 * SECOND, stamped_pose(BEGIN + 3 * SECOND, "map", float("nan")))]
-    write_mcap(tmp_path / "drive.mcap", said)
+    end = BEGIN + 3 * SECOND
+    messages = [*drive(2.0), Message("/mocap", end, stamped_pose(end, "map", float("nan")))]
+    write_mcap(tmp_path / "drive.mcap", messages)
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
     assert ended.code == 3
     assert "is not finite at t = " in ended.out

@@ -34,7 +34,7 @@ TRUTH = ForeignLogOptions(truth="/ground_truth/odom", tick_rate=240)
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The log of a short drive."""
+    """Return the log of a short drive."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "a.scenario.yaml").write_text(SCENARIO)
     simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), 1, log=folder / "run.mcap")
@@ -43,11 +43,11 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def disguised(own: Path) -> Path:
-    """Its messages alone, written by the mcap library."""
+    """Return a log with the same messages, without metadata, written by the mcap library."""
     file = own.with_name("disguised.mcap")
     with open_log(own) as source, file.open("wb") as stream:
         writer = Writer(stream)
-        writer.start("ros2", "somebody")
+        writer.start("ros2", "other recorder")
         schemas, channels = {}, {}
         for record in RecordReader(source):
             match record:
@@ -64,7 +64,7 @@ def disguised(own: Path) -> Path:
 
 
 def test_signals_are_bit_identical(own: Path, disguised: Path) -> None:
-    """But for the normalized quaternions' last one; ticks are found exactly."""
+    """Headings may differ by rounding of normalized quaternions."""
     assert is_simscen_log(own) and not is_simscen_log(disguised)
     ours, theirs = read_log(own).trace, read_foreign_log(disguised, TRUTH).trace
     for name in ("truth", "velocity", "belief", "odometry", "command"):

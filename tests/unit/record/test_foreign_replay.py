@@ -1,4 +1,4 @@
-"""Tests of the replay page of logs of real robots."""
+"""Tests of replay pages for logs of real robots."""
 
 import sys
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import BEGIN, Said, T, drive, header, link, write_bag, write_mcap
+from foreign_logs import BEGIN, Message, T, drive, header, link, write_bag, write_mcap
 
 from simscen.cli.main import main
 from simscen.record.foreign.options import ForeignLogOptions
@@ -36,7 +36,7 @@ def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch)
     return call
 
 
-def a_map() -> Said:
+def a_map() -> Message:
     info = T["nav_msgs/msg/MapMetaData"](
         map_load_time=header(BEGIN, "").stamp,
         resolution=0.1,
@@ -48,11 +48,11 @@ def a_map() -> Said:
         ),
     )
     cells = np.array([0, 100, -1] * 4, dtype=np.int8)
-    return Said("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
+    return Message("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
 
 
-def mounted() -> Said:
-    return Said("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
+def mounted() -> Message:
+    return Message("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
 
 
 @pytest.mark.parametrize("write", [write_mcap, write_bag])

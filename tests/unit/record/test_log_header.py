@@ -5,7 +5,7 @@ import json
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from moments import CASE, about
+from moments import CASE, sample_header
 
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
@@ -40,7 +40,7 @@ def test_invalid_cases_are_refused() -> None:
 
 
 def test_facts_of_a_run_have_their_own_metadata_namespace() -> None:
-    facts = log_header.run_metadata(about(), Clock(240))
+    facts = log_header.run_metadata(sample_header(), Clock(240))
     assert facts["seed"] == "7"
     assert log_header.extra_facts(facts) == {"simscen": "0.1.0"}
 

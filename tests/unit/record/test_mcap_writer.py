@@ -1,4 +1,4 @@
-"""The files are sound MCAP: the mcap library reads them in every way it has, checksums included."""
+"""Tests that the mcap library reads the written files in every way, with checksums."""
 
 import io
 import random
@@ -35,7 +35,7 @@ def ours() -> bytes:
 
 
 def theirs() -> bytes:
-    """The same calls on the library's own writer."""
+    """Make the same calls on the writer of the mcap library."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=1 << 16, compression=CompressionType.ZSTD)
     writer.start("ros2", "simscen")
@@ -101,12 +101,12 @@ def test_message_larger_than_a_chunk_closes_the_current_chunk() -> None:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen", chunk_size=1000)
     channel = writer.channel("/t", TEXT, {})
-    said = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
-    for time, data in enumerate(said):
+    payloads = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
+    for time, data in enumerate(payloads):
         channel.write(time, data)
     writer.finish()
     reader = make_reader(io.BytesIO(stream.getvalue()), validate_crcs=True)
-    assert [message.data for _, _, message in reader.iter_messages()] == said
+    assert [message.data for _, _, message in reader.iter_messages()] == payloads
     summary = reader.get_summary()
     assert summary is not None
     assert [chunk.message_start_time for chunk in summary.chunk_indexes] == [0, 2, 3]
@@ -126,7 +126,7 @@ def test_the_same_calls_give_the_same_bytes() -> None:
 
 
 def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
-    """Also where a chunk ends among them, as it does here every few times, and where another is between them."""
+    """This holds also if a chunk ends, or another message is written, between them."""
     layouts = (topics.TRUTH, encode.odometry("map", "base")), (topics.CLEARANCE, encode.float64())
     pose, twist = Pose3(1.0, 2.0), Twist(0.5)
 

@@ -1,4 +1,4 @@
-"""Every packer writes the very bytes that rosbags writes for the same content, and reads them back."""
+"""Tests that packers write the same bytes as rosbags, and read them back."""
 
 from typing import Any
 
@@ -49,7 +49,7 @@ def ros_twist(twist: Twist) -> Any:
 
 
 def planar(row: Any) -> Pose3:
-    """As the packers turn headings: with numpy, whose sine may differ from the C library's in the last bit."""
+    """Return the pose with the orientation of numpy, as in the packers; the C library may round differently."""
     half = np.array([row[2]]) / 2
     return Pose3(float(row[0]), float(row[1]), 0.0, 0.0, 0.0, float(np.sin(half)[0]), float(np.cos(half)[0]))
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from moments import CASE, CLOCK, about, moments
+from moments import CASE, CLOCK, moments, sample_header
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from schemas_from_rosbags import humble
@@ -39,7 +39,7 @@ TOPICS = LATCHED | {
 
 def record(run: list[Moment], seed: int = 7) -> bytes:
     stream = io.BytesIO()
-    recorder = Recorder(stream, CLOCK, about(seed))
+    recorder = Recorder(stream, CLOCK, sample_header(seed))
     for moment in run:
         recorder.append(moment)
     recorder.close(480, "{}")
@@ -55,7 +55,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """All messages by topic, with their times, as rosbags decodes them."""
+    """Return all messages by topic, with their times, decoded by rosbags."""
     found: dict[str, list[tuple[int, Any]]] = {}
     with AnyReader([path], default_typestore=humble()) as reader:
         for connection, time, data in reader.messages():
@@ -129,7 +129,7 @@ def test_the_frames_form_one_tree_under_map(read: dict[str, list[tuple[int, Any]
 
 def test_logged_map_equals_that_of_the_robot(read: dict[str, list[tuple[int, Any]]]) -> None:
     ((time, message),) = read["/map"]
-    given = about().map
+    given = sample_header().map
     assert given is not None
     assert time == 0
     assert (message.info.height, message.info.width) == given.shape
@@ -183,7 +183,7 @@ def test_different_seeds_give_different_logs() -> None:
 
 
 def test_log_has_its_final_name_only_when_complete(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
+    with Recorder(tmp_path / "run.mcap", CLOCK, sample_header()) as recorder:
         recorder.append(RUN[0])
         assert [p.name for p in tmp_path.iterdir()] == ["run.partial.mcap"]
         recorder.close(0)
@@ -196,18 +196,18 @@ def test_a_full_disk_is_reported(tmp_path: Path) -> None:
         pytest.skip("this system has no /dev/full")
     (tmp_path / "run.partial.mcap").symlink_to(full)
     with pytest.raises(RunError, match=r"no space left writing .*run\.partial\.mcap") as caught:
-        Recorder(tmp_path / "run.mcap", CLOCK, about())
+        Recorder(tmp_path / "run.mcap", CLOCK, sample_header())
     assert caught.value.kind == "output"
 
 
 def test_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"cannot write .*: No such file"):
-        Recorder(tmp_path / "no" / "run.mcap", CLOCK, about())
+        Recorder(tmp_path / "no" / "run.mcap", CLOCK, sample_header())
 
 
 def test_external_stack_has_a_metadata_record() -> None:
     stream = io.BytesIO()
-    Recorder(stream, CLOCK, about(7)).close(0, stack={"name": "mine"})
+    Recorder(stream, CLOCK, sample_header(7)).close(0, stack={"name": "mine"})
     log = stream.getvalue()
     records = [(record.name, record.metadata) for record in make_reader(io.BytesIO(log)).iter_metadata()]
     assert records[1] == ("simscen.stack", {"name": "mine"})
@@ -217,7 +217,7 @@ def test_external_stack_has_a_metadata_record() -> None:
 
 
 def with_filter(run: list[Moment]) -> list[Moment]:
-    """The same run with a stack that filters the odometry: 1 m further ahead."""
+    """Return the same run with a stack whose filtered odometry is 1 m ahead."""
     found = []
     for moment in run:
         own = [each for each in moment.readings if isinstance(each, Odometry) and each.sensor == "wheels"]

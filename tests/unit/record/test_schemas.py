@@ -1,4 +1,4 @@
-"""The message definitions that ship are those of ROS 2 Humble."""
+"""Tests that the shipped message definitions are those of ROS 2 Humble."""
 
 import json
 

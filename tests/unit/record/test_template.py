@@ -1,4 +1,4 @@
-"""Templates align as CDR asks, and readers read what they wrote."""
+"""Tests of message templates: CDR alignment, packing, and reading."""
 
 import struct
 

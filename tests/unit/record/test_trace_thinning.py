@@ -32,7 +32,7 @@ def test_stationary_objects_are_kept_once_a_second() -> None:
 def test_each_stationary_object_is_kept_one_second_after_its_last_sample() -> None:
     thinning, box, both = Thinning(240), {"box": Pose3()}, {"box": Pose3(), "cart": Pose3()}
     seen = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
-    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, things))) for tick, things in seen}
+    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, objects))) for tick, objects in seen}
     expected = {0: {"box"}, 6: {"cart"}, 240: {"box"}, 246: {"cart"}, 480: {"box"}, 486: {"cart"}}
     assert {tick: names for tick, names in kept.items() if names} == expected
 

@@ -1,10 +1,10 @@
 """Tests of the diagnosis of localization errors."""
 
-from diagnosis_cases import GOAL, by, slip, why
+from diagnosis_cases import GOAL, slip, why, with_event
 
 
 def test_kidnapping_explains_a_localization_error():
-    events = by("carried off", 6, [6, "robot.placed", "", {}])
+    events = with_event("carried off", 6, [6, "robot.placed", "", {}])
     far = {"belief": {"offset": [2.0, 0, 0]}}
     case = {"goals": [GOAL]}
     assert why("goals_reached", events, case=case, **far) == [
@@ -49,7 +49,7 @@ def test_error_of_half_a_meter_counts_as_lost():
 
 def test_events_up_to_the_failure_tick_count():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [2, 0, 0]}}
-    events = by("carried off", 6, [6, "robot.placed", "", {}])
+    events = with_event("carried off", 6, [6, "robot.placed", "", {}])
     assert why("localization_error", events, at=6, **lost) == [
         "why: event `carried off` had moved the robot elsewhere 0.00 s before"
     ]

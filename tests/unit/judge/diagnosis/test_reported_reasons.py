@@ -1,4 +1,4 @@
-"""What the stack itself reported about a goal, up to the tick of the failure, this tick included."""
+"""Tests of reasons that the stack reported about a goal, up to and including the tick of the failure."""
 
 import pytest
 
@@ -10,7 +10,7 @@ SECOND = 240
 
 
 def recorded(*events):
-    """A run of 10 s with these events, and the outcome of its goal `study`, accepted at 2 s."""
+    """Return a run of 10 s with these events, and the outcome of its goal `study`, accepted at 2 s."""
     accepted = [2, "goal.accepted", "study"]
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": [accepted, *events]})
     return trace, goal_outcomes(trace, synthetic_case({"goals": [{"name": "study", "pose": [9, 0, 0]}]}))[0]

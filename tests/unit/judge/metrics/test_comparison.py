@@ -71,7 +71,7 @@ def test_outcomes_are_counted_by_scenario_and_stack_with_separate_errors() -> No
 
 
 def test_differences_are_between_runs_with_the_same_scenario_and_seed() -> None:
-    """Means of all runs would differ by 100 s: only seed 1 ran with both."""
+    """Only seed 1 was run with both stacks; the means of all runs differ by 100 s."""
     one = against(run("ref", 1, time_to_goal=10.0), run("mine", 1, time_to_goal=12.0), run("mine", 2, time_to_goal=210))
     found = of(one, "time_to_goal")
     assert (found.pairs, found.baseline, found.value, found.difference) == (1, 10.0, 12.0, 2.0)
@@ -145,7 +145,7 @@ def test_every_compared_metric_exists() -> None:
 
 
 def test_expected_failures_are_compared_as_failures() -> None:
-    """A stack that fails as expected is not better than one that holds what was expected to fail."""
+    """A stack that fails as expected is not better than one that passes unexpectedly."""
     known = replace(run("ref", outcome=Outcome.FAILED), outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
     broken = Finding(Status.FAIL, "expected", "everything passed", "a failure: NAV-1")
     mended = replace(
@@ -163,7 +163,7 @@ def test_skipped_run_is_not_compared() -> None:
 
 
 def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
-    """Of the robots a and b; `b_time_to_goal` is b's."""
+    """Return a run of the robots a and b; `b_time_to_goal` is for robot b."""
     own = {f"{robot}/{name}": value for robot in "ba" for name, value in {**GOOD, "ape_trans_max": 0.1}.items()}
     own |= {name.replace("_", "/", 1): value for name, value in metrics.items()}
     return replace(run(stack, seed), metrics={"success": 1.0, **own})

@@ -1,4 +1,4 @@
-"""Metrics against closed forms, the authors' own numbers, evo and filterpy; bugs of other tools as cases."""
+"""Tests of metrics against closed forms, published values, evo, and filterpy; some cases are bugs of other tools."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,7 @@ def measured(words, case=None):
 
 
 def circle(radius, seconds=20, turns=1.0):
-    """Driven once around, at constant speed."""
+    """Return waypoints of full circles at constant speed."""
     count = round(seconds / STEP)
     angles = np.linspace(0, 2 * math.pi * turns, count + 1)
     return [[k * STEP, radius * math.cos(a), radius * math.sin(a), a + math.pi / 2] for k, a in enumerate(angles)]
@@ -57,7 +57,7 @@ def test_stationary_robot_has_no_smoothness_with_a_reason():
     assert measures.values["max_jerk"] == 0.0
 
 
-# -- the way
+# -- path
 
 
 def test_detour_that_doubles_the_path_halves_spl():
@@ -137,7 +137,7 @@ def test_points_nearer_than_30_cm_do_not_affect_curvature():
 
 
 def test_heading_change_across_pi_is_small():
-    """Arena's get_metrics.py does not wrap it, and adds yaw to meters in the norm of the way."""
+    """Arena's get_metrics.py does not wrap it, and adds yaw to meters in the path length."""
     truth = [[0, 0, 0, 3.1], [1, 0, 0, 3.2], [2, 0, 0, 3.1]]
     metrics = measured({"seconds": 2, "truth": truth})
     assert metrics["heading_change"] == pytest.approx(0.2)
@@ -145,7 +145,7 @@ def test_heading_change_across_pi_is_small():
 
 
 def test_irregularity_is_the_turning_beyond_the_first_plan_to_each_goal():
-    """A stub (`pass`) in HuNavSim."""
+    """HuNavSim leaves it unimplemented (`pass`)."""
     words = {"seconds": 20, "truth": circle(2), "events": [[1, "goal.accepted", "a"]]}
     bent = Path(np.array([[0, 0, 0.0], [1, 0, 3.0], [1, 1, -3.0], [2, 1, -3.0]]), 250)
     other = Path(np.array([[0, 0, 0.0], [1, 0, 1.0]]), 900)
@@ -193,19 +193,19 @@ def test_only_runs_with_one_goal_have_a_score():
 
 
 def test_spinning_to_the_right_is_not_stationary():
-    """HuNavSim's abs(r.angular_vel < 0.02) counts any turn to the right as standing."""
+    """HuNavSim's abs(r.angular_vel < 0.02) counts any turn to the right as stationary."""
     truth = [[0, 0, 0, 0], [2, 0, 0, -3], [6, 0, 0, -3]]
     assert measured({"seconds": 6, "truth": truth})["time_not_moving"] == pytest.approx(4.0, abs=0.026)
 
 
 @pytest.mark.parametrize(
-    ("speed", "turn", "stands"),
+    ("speed", "turn", "is_stationary"),
     [(0.009, 0.019, True), (0.01, 0.0, False), (-0.01, 0.0, False), (0.0, 0.02, False), (0.0, -0.02, False)],
 )
-def test_definition_of_not_moving(speed, turn, stands):
+def test_definition_of_not_moving(speed, turn, is_stationary):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace = replace(trace, velocity=Samples(trace.truth.ticks, np.tile([speed, 0.0, turn], (41, 1))))
-    assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)
+    assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if is_stationary else 0.0)
 
 
 def test_trapezoidal_speed_has_jerk_at_its_corners():

@@ -16,7 +16,7 @@ GOALS = {
     "shortest": dict.fromkeys(NAMES, 1.0),
 }
 TOUR = {"seconds": 12, "truth": [[0, 0, 0], [2, 1, 0], [3, 1, 0], [4, 2, 0], [5, 2, 0], [9, 3, 0], [12, 3, 0]]}
-TOLD = [
+EVENTS = [
     [1, "goal.accepted", "a"],
     [2, "goal.reached", "a"],
     [3, "goal.accepted", "b"],
@@ -31,30 +31,30 @@ def measures(events=(), case=GOALS, **words):
 
 
 def test_time_to_goal_is_from_first_acceptance_to_last_arrival():
-    found = measures(TOLD).values
+    found = measures(EVENTS).values
     assert (found["time_to_goal"], found["success"]) == (8.0, 1.0)
-    assert measures([TOLD[0], *TOLD[2:]]).values["time_to_goal"] == 8.0
-    assert measures([*TOLD[:3], *TOLD[4:]]).values["time_to_goal"] == 8.0
+    assert measures([EVENTS[0], *EVENTS[2:]]).values["time_to_goal"] == 8.0
+    assert measures([*EVENTS[:3], *EVENTS[4:]]).values["time_to_goal"] == 8.0
 
 
-@pytest.mark.parametrize("events", [[], TOLD[:5], TOLD[:2], [TOLD[1], TOLD[3], TOLD[5]]])
+@pytest.mark.parametrize("events", [[], EVENTS[:5], EVENTS[:2], [EVENTS[1], EVENTS[3], EVENTS[5]]])
 def test_time_to_goal_needs_an_acceptance_and_the_last_arrival(events):
     found = measures(events)
     assert found.values["time_to_goal"] is None
     assert found.undefined["time_to_goal"] == "the last goal was not reached"
-    assert measures([*TOLD], case={}).values["time_to_goal"] is None
+    assert measures([*EVENTS], case={}).values["time_to_goal"] is None
 
 
 def test_reaching_some_of_several_goals_is_no_success():
-    assert measures(TOLD[:4]).values["success"] == 0.0
+    assert measures(EVENTS[:4]).values["success"] == 0.0
 
 
 def test_preempted_goal_is_not_required():
     case = {**GOALS, "sent": [{"name": "d", "pose": [3, 0, 0]}]}
     last = [[9, "goal.canceled", "c", {"preempted_by": "d"}], [9, "goal.accepted", "d"], [11, "goal.reached", "d"]]
-    assert measures([*TOLD[:5], *last], case).values["time_to_goal"] == 10.0
+    assert measures([*EVENTS[:5], *last], case).values["time_to_goal"] == 10.0
     dropped = [[7, "goal.accepted", "c"], [7, "goal.canceled", "c", {"preempted_by": "d"}]]
-    before = [*TOLD[:3], [5, "goal.accepted", "d"], [6, "goal.reached", "d"]]
+    before = [*EVENTS[:3], [5, "goal.accepted", "d"], [6, "goal.reached", "d"]]
     assert measures([*before, *dropped], case).values["time_to_goal"] == 5.0
 
 
@@ -71,7 +71,7 @@ def test_soft_spl_needs_the_true_pose():
 
 
 def test_plans_for_new_goals_are_not_replans():
-    plans = [[k, "plan.made", "", {"reason": why}] for k, why in enumerate(("goal", "timer", "blocked", "worse"))]
+    plans = [[k, "plan.made", "", {"reason": reason}] for k, reason in enumerate(("goal", "timer", "blocked", "worse"))]
     assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] == 3.0
 
 

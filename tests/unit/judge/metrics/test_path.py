@@ -17,7 +17,7 @@ CORNER = [(5, 7), (6, 7), (6, 8)]
 
 
 def driven(points, events=(), plans=()):
-    """A trace whose robot is at one of the points (x, y) or (x, y, yaw) at each of its samples."""
+    """Return a trace with the robot at one of the points (x, y) or (x, y, yaw) at each of its samples."""
     poses = np.array([[*point, 0.0][:3] for point in points], dtype=np.float64)
     trace = synthetic_trace({"seconds": TICKS * (len(poses) - 1) / 240, "truth": [[0, 0, 0]], "events": list(events)})
     return replace(trace, truth=Samples(trace.truth.ticks, poses), plans=tuple(plans))
@@ -28,8 +28,8 @@ def shape(*points, **words):
     return path_metrics(trace, drive(trace))
 
 
-def placed(before):
-    """Set down elsewhere after the sample before this one."""
+def kidnapped(before):
+    """Return the event of a kidnapping between the sample before this one and this one."""
     return [[TICKS * (before - 1) / 240, "robot.placed"]]
 
 
@@ -75,18 +75,18 @@ def test_curvature_uses_points_at_least_30_cm_apart():
 
 
 def test_curvature_is_computed_for_each_path_segment():
-    carried = placed(3)
-    metrics = shape(*CORNER, (0, 0), (2, 0), (2, 2), events=carried)
+    kidnapping = kidnapped(3)
+    metrics = shape(*CORNER, (0, 0), (2, 0), (2, 2), events=kidnapping)
     assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
     assert metrics["norm_curvature"] == pytest.approx(4 * math.sqrt(2))
     assert metrics["aol"] == pytest.approx(math.pi / 6)
-    straight = shape(*CORNER, (0, 0), (2, 0), events=carried)
+    straight = shape(*CORNER, (0, 0), (2, 0), events=kidnapping)
     assert straight["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
     assert straight["aol"] == pytest.approx(math.pi / 2 / 4)
 
 
 def test_kidnapping_splits_the_path_into_segments():
-    trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*placed(3), *placed(5)])
+    trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*kidnapped(3), *kidnapped(5)])
     assert [leg.tolist() for leg in path_segments(trace, drive(trace))] == [
         [[5, 7], [6, 7], [6, 8]],
         [[0, 0], [2, 0]],
@@ -112,7 +112,7 @@ def test_path_metrics_need_the_true_pose():
 @pytest.mark.parametrize(("before", "turned"), [(1, 0.6), (2, 0.5), (3, 0.3), (4, 0.7)])
 def test_rotation_by_kidnapping_is_no_heading_change(before, turned):
     yaws = [(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3), (0, 0, 0.7)]
-    assert shape(*yaws, events=placed(before))["heading_change"] == pytest.approx(turned)
+    assert shape(*yaws, events=kidnapped(before))["heading_change"] == pytest.approx(turned)
 
 
 def test_kidnapping_before_the_first_sample_has_no_effect():
@@ -135,7 +135,7 @@ def test_irregularity_subtracts_the_first_plan_after_each_acceptance():
 
 
 def test_irregularity_is_undefined_without_a_plan_for_each_goal():
-    why = "there is no plan to each goal to compare with"
-    assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == why
+    reason = "there is no plan to each goal to compare with"
+    assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == reason
     twice = [accepted(0), accepted(2, "b")]
-    assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == why
+    assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == reason

@@ -1,4 +1,4 @@
-"""Pose errors in closed form."""
+"""Tests of pose errors in closed form."""
 
 from dataclasses import replace
 
@@ -10,12 +10,12 @@ from simscen.judge.metrics.trajectory import pose_metrics
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
-def located(ticks, true, told, believed):
-    """A trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
+def located(ticks, true, belief_ticks, believed):
+    """Return a trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
     trace = synthetic_trace({"seconds": max(ticks) / 240, "truth": [[0, 0, 0]]})
     beliefs = np.array([[*pose, 1, 0, 0, 1, 0, 1] for pose in believed], dtype=np.float64)
     truth = Samples(np.array(ticks), np.array(true, dtype=np.float64))
-    return replace(trace, truth=truth, belief=Samples(np.array(told), beliefs))
+    return replace(trace, truth=truth, belief=Samples(np.array(belief_ticks), beliefs))
 
 
 def test_relative_errors_are_over_consecutive_meters():
