@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from begun import Hand, begun, odometry, unsuitable_key
+from fault_effects import ManualClock, odometry, start, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -12,51 +12,51 @@ from simscen.model.robot import Differential, Omnidirectional
 WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
 
 
-def rims(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
+def wheel_speeds(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
     return motion.vx - separation / 2 * motion.wz, motion.vx + separation / 2 * motion.wz
 
 
 def test_gain_scales_commands():
-    work = begun({"gain": {"linear": "50 %", "angular": -1}}, "Command")
-    assert work.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
+    effect = start({"gain": {"linear": "50 %", "angular": -1}}, "Command")
+    assert effect.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
 
 
 def test_gain_of_one_side_does_not_affect_the_other():
-    work = begun({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
-    told = Twist(0.4, 0.0, 0.5)
-    left, right = rims(work.command(told))
-    assert (left, right) == pytest.approx((0.8 * rims(told)[0], rims(told)[1]))
+    effect = start({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
+    motion = Twist(0.4, 0.0, 0.5)
+    left, right = wheel_speeds(effect.command(motion))
+    assert (left, right) == pytest.approx((0.8 * wheel_speeds(motion)[0], wheel_speeds(motion)[1]))
 
 
 def test_saturation_limits_speed_and_keeps_direction():
-    work = begun({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
-    assert work.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
-    assert work.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
+    effect = start({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
+    assert effect.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
+    assert effect.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
 
 
 def test_saturated_side_is_limited_forward_and_backward():
-    work = begun({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
-    for told, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
-        assert rims(work.command(Twist(*told))) == pytest.approx(expected)
+    effect = start({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
+    for motion, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
+        assert wheel_speeds(effect.command(Twist(*motion))) == pytest.approx(expected)
 
 
 def test_acceleration_is_limited_between_beats():
-    now = Hand()
-    work = begun({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
-    work.command(Twist())
+    now = ManualClock()
+    effect = start({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
+    effect.command(Twist())
     speeds = []
     for now.tick in range(12, 361, 12):
-        speeds.append(work.command(Twist(0.6, 0.0, 2.0)))
+        speeds.append(effect.command(Twist(0.6, 0.0, 2.0)))
     assert [speed.vx for speed in speeds] == pytest.approx(np.minimum(0.6, 0.025 * np.arange(1, 31)))
     assert [speed.wz for speed in speeds] == pytest.approx(np.minimum(2.0, 0.05 * np.arange(1, 31)))
 
 
 def test_wheel_slip_affects_each_odometry_sensor_separately():
-    work = begun({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
-    assert work.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
+    effect = start({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
+    assert effect.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
     for k in range(5):
-        first = work.reading(odometry(Pose2(0.1 * k, 0), 6 * k))
-        other = work.reading(Odometry("other", 6 * k, Pose2(5 + 0.1 * k, 0), Twist()))
+        first = effect.reading(odometry(Pose2(0.1 * k, 0), 6 * k))
+        other = effect.reading(Odometry("other", 6 * k, Pose2(5 + 0.1 * k, 0), Twist()))
     assert first.pose.x == pytest.approx(0.8)
     assert other.pose.x == pytest.approx(5.8)
 
@@ -69,14 +69,14 @@ def test_left_and_right_are_valid_only_for_differential_wheels(word):
 
 
 def test_battery_limit_falls_linearly_and_keeps_the_curvature_of_commands():
-    now = Hand()
-    work = begun({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
-    told, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
+    now = ManualClock()
+    effect = start({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
+    motion, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
     for now.tick, most in limits.items():
-        assert work.command(told) == pytest.approx((most, 0.0, most / 2))
-    assert work.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
+        assert effect.command(motion) == pytest.approx((most, 0.0, most / 2))
+    assert effect.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
 
 
 def test_rising_battery_curve_is_refused():
     with pytest.raises(ValueError, match="a battery does not charge itself"):
-        begun({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")
+        start({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")
