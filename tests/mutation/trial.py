@@ -105,4 +105,4 @@ def _run_golden_cases(criteria: Sequence[str]) -> None:
     spec.loader.exec_module(module)
     for criterion, case in module.CASES:
         if not criteria or criterion in criteria:
-            module.test_a_criterion_answers_as_its_golden_case_says(criterion, case)
+            module.test_verdict_equals_that_of_the_golden_case(criterion, case)

@@ -16,7 +16,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Said, T, header, pose, write_bag, write_mcap
+from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Message, T, header, pose, write_bag, write_mcap
 from recorded_drives import drive, ranges_at, write_map
 
 from simscen.core.geometry import Pose2
@@ -47,17 +47,17 @@ def drive_log(
     stamp: Callable[[int], int] = lambda time: time,
     frame: str = "laser",
     every: int = 1,
-) -> list[Said]:
+) -> list[Message]:
     """Return the drive as messages: /odom, /scan of a lidar at `mount` (x, yaw, roll), and the true poses /gt."""
     forward, turned, roll = mount
-    found = [Said("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
+    found = [Message("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
     for t, (x, y, yaw), odom in drive()[::every]:
         time = BEGIN + round(t * SECOND)
-        found.append(Said("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
-        found.append(Said("/gt", time + LATENCY, stamped(stamp(time), (x, y, yaw))))
+        found.append(Message("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
+        found.append(Message("/gt", time + LATENCY, stamped(stamp(time), (x, y, yaw))))
         at = (x + forward * math.cos(yaw), y + forward * math.sin(yaw), yaw + turned)
         ranges = ranges_at(*at)
-        found.append(Said("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
+        found.append(Message("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
     return found
 
 
@@ -120,15 +120,15 @@ def link(child: str, parent: str, time: int, at: Pose2) -> Any:
     return T["tf2_msgs/msg/TFMessage"](transforms=[one])
 
 
-def tf_drive_log() -> Iterable[Said]:
+def tf_drive_log() -> Iterable[Message]:
     """Yield the drive with tf (map → odom → base_link) instead of /odom and /gt."""
     for message in drive_log():
         if message.topic in ("/tf_static", "/scan"):
             yield message
     for t, true_pose, odom in drive():
         time, at = BEGIN + round(t * SECOND), Pose2(*odom)
-        yield Said("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*true_pose).compose(at.inverse())))
-        yield Said("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
+        yield Message("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*true_pose).compose(at.inverse())))
+        yield Message("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
 
 
 def test_odometry_and_reference_can_be_tf_frames(simscen, tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> No
     time = BEGIN + round(t * SECOND)
     where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*true_pose), covariance=np.zeros(36))
     output = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
-    write_bag(tmp_path / "output", [*messages, Said("/initialpose", time + LATENCY, output)])
+    write_bag(tmp_path / "output", [*messages, Message("/initialpose", time + LATENCY, output)])
     write_bag(tmp_path / "without", messages)
     ended = simscen("localize", "output", *OPTIONS, "--json")
     x, y, _ = drive()[-1][1]
@@ -184,7 +184,7 @@ DEGREE, SIDE = math.pi / 180, math.pi / 2
 
 def log_with_layout(
     layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges
-) -> list[Said]:
+) -> list[Message]:
     """Return the drive with the scans of a lidar with another beam layout."""
     first, step, count = layout
     angles, found, poses = first + step * np.arange(count), [], iter(drive())
@@ -309,7 +309,7 @@ def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
     ids=["NaN angles", "equal angles", "another type", "another topic"],
 )
 def test_missing_scans_are_reported_with_the_existing_topics(
-    simscen, tmp_path: Path, change: Callable[[Said], Said], expected_text: str
+    simscen, tmp_path: Path, change: Callable[[Message], Message], expected_text: str
 ) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in drive_log(every=15)])

@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `begun.py`."""
+"""Make `fault_effects.py` importable in the tests of this folder."""
 
 import sys
 from pathlib import Path

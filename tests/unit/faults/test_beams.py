@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from begun import begun, image, scan, unsuitable_key
+from fault_effects import image, scan, start, unsuitable_key
 
 from simscen.faults.lidar_environment import MM_PER_HOUR
 from simscen.model.robot import Lidar
@@ -12,79 +12,79 @@ from simscen.model.robot import Lidar
 DEG = math.pi / 180
 
 
-def answered(sector: dict) -> list[int]:
-    """The directions in whole degrees from -180 to 179 that answer."""
-    ranges = begun({"sector": sector}, "Scan").reading(scan(np.full(360, 2.0))).ranges
+def visible_directions(sector: dict) -> list[int]:
+    """Return the directions in whole degrees from -180 to 179 that measure a range."""
+    ranges = start({"sector": sector}, "Scan").reading(scan(np.full(360, 2.0))).ranges
     return [k - 180 for k in range(360) if ranges[k] == 2.0]
 
 
-def test_a_sector_is_blind_from_its_first_direction_to_its_last():
-    assert answered({"from": "-30 deg", "to": "45 deg"}) == [*range(-180, -30), *range(46, 180)]
+def test_blind_sector_extends_from_its_first_to_its_last_direction():
+    assert visible_directions({"from": "-30 deg", "to": "45 deg"}) == [*range(-180, -30), *range(46, 180)]
 
 
-def test_a_sector_may_go_through_the_back():
-    assert answered({"from": "170 deg", "to": "-170 deg"}) == list(range(-169, 170))
-    assert answered({"from": "0 deg", "to": "360 deg"}) == []
+def test_blind_sector_can_cross_180_degrees():
+    assert visible_directions({"from": "170 deg", "to": "-170 deg"}) == list(range(-169, 170))
+    assert visible_directions({"from": "0 deg", "to": "360 deg"}) == []
 
 
 def test_sector_without_width_is_refused():
     assert unsuitable_key({"sector": {"from": 1, "to": 1}}, "Scan")[0] == "to"
 
 
-def test_beyond_its_limit_a_lidar_sees_nothing_and_thinks_that_nothing_is_there():
-    told = begun({"range_limit": {"max": 3}}, "Scan").reading(scan([1.0, 3.0, 3.01, np.inf, np.nan])).ranges
-    assert told == pytest.approx([1.0, 3.0, np.inf, np.inf, np.nan], nan_ok=True)
-    assert begun({"range_limit": {"max": 3}}, "Image").reading(image([[2.0, 4.0]])).depth.tolist() == [[2.0, np.inf]]
+def test_ranges_beyond_the_limit_become_infinite():
+    measured = start({"range_limit": {"max": 3}}, "Scan").reading(scan([1.0, 3.0, 3.01, np.inf, np.nan])).ranges
+    assert measured == pytest.approx([1.0, 3.0, np.inf, np.inf, np.nan], nan_ok=True)
+    assert start({"range_limit": {"max": 3}}, "Image").reading(image([[2.0, 4.0]])).depth.tolist() == [[2.0, np.inf]]
     assert unsuitable_key({"range_limit": {"max": 12}}, "Scan", spec=Lidar())[0] == "max"
 
 
-def test_a_ghost_is_in_its_window_and_behind_what_is_nearer():
+def test_ghost_fills_its_sector_behind_nearer_ranges():
     ranges = np.full(360, 2.0)
     ranges[180], ranges[181], ranges[182] = 0.5, np.inf, np.nan
-    told = begun({"ghost": {"range": 1, "width": "10 deg"}}, "Scan").reading(scan(ranges)).ranges
-    assert told[180:183].tolist() == [0.5, 1.0, 1.0]
-    assert np.flatnonzero(told == 1.0).tolist() == [175, 176, 177, 178, 179, 181, 182, 183, 184, 185]
+    measured = start({"ghost": {"range": 1, "width": "10 deg"}}, "Scan").reading(scan(ranges)).ranges
+    assert measured[180:183].tolist() == [0.5, 1.0, 1.0]
+    assert np.flatnonzero(measured == 1.0).tolist() == [175, 176, 177, 178, 179, 181, 182, 183, 184, 185]
     assert unsuitable_key({"ghost": {"range": 20}}, "Scan", spec=Lidar())[0] == "range"
 
 
-def test_dust_ends_beams_early_as_a_poisson_process_along_them_does():
+def test_dust_shortens_beams_by_a_poisson_process():
     """At range r a share 1 - exp(-r / L) is short; of those the mean is L - r / (exp(r / L) - 1)."""
-    path, there = 8.0, 5.0
-    told = begun({"dust": {"mean_free_path": path}}, "Scan").reading(scan(np.full(40_000, there), least=0.0)).ranges
-    short = told < there
-    assert short.mean() == pytest.approx(1 - math.exp(-there / path), abs=0.01)
-    assert told[short].mean() == pytest.approx(path - there / (math.exp(there / path) - 1), rel=0.02)
-    assert (told[~short] == there).all()
+    path, wall = 8.0, 5.0
+    measured = start({"dust": {"mean_free_path": path}}, "Scan").reading(scan(np.full(40_000, wall), least=0.0)).ranges
+    short = measured < wall
+    assert short.mean() == pytest.approx(1 - math.exp(-wall / path), abs=0.01)
+    assert measured[short].mean() == pytest.approx(path - wall / (math.exp(wall / path) - 1), rel=0.02)
+    assert (measured[~short] == wall).all()
 
 
-def test_dust_is_seen_where_nothing_else_is_and_not_nearer_than_the_lidar_can():
-    told = (
-        begun({"dust": {"mean_free_path": 1}}, "Scan").reading(scan(np.full(20_000, np.inf), least=0.5, most=4)).ranges
+def test_dust_is_hit_by_beams_without_target_within_the_range_of_the_lidar():
+    measured = (
+        start({"dust": {"mean_free_path": 1}}, "Scan").reading(scan(np.full(20_000, np.inf), least=0.5, most=4)).ranges
     )
-    finite = told[np.isfinite(told)]
+    finite = measured[np.isfinite(measured)]
     assert 0.5 <= finite.min() < finite.max() < 4
-    assert np.isposinf(told).mean() == pytest.approx(math.exp(-4), abs=0.005)
-    assert np.isneginf(told).mean() == pytest.approx(1 - math.exp(-0.5), abs=0.015)
+    assert np.isposinf(measured).mean() == pytest.approx(math.exp(-4), abs=0.005)
+    assert np.isneginf(measured).mean() == pytest.approx(1 - math.exp(-0.5), abs=0.015)
 
 
-def test_rain_hides_what_is_farther_than_its_equation_says():
+def test_rain_hides_targets_beyond_the_detection_limit():
     """The farthest range that is seen solves ρ exp(-2 α z) / z² = 0.9 / 12² (here by bisection)."""
     alpha, low, high = 0.01 * 25**0.6, 0.1, 12.0
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if 0.5 * math.exp(-2 * alpha * middle) / middle**2 > 0.9 / 144 else (low, middle)
     ranges = np.linspace(0.5, 12, 5000)
-    told = begun({"rain": {"rate": "25 mm/h", "reflectivity": 0.5}}, "Scan").reading(scan(ranges)).ranges
-    assert ranges[np.isfinite(told)].max() == pytest.approx(low, abs=0.005)
-    assert np.isinf(told[ranges > low + 0.005]).all()
+    measured = start({"rain": {"rate": "25 mm/h", "reflectivity": 0.5}}, "Scan").reading(scan(ranges)).ranges
+    assert ranges[np.isfinite(measured)].max() == pytest.approx(low, abs=0.005)
+    assert np.isinf(measured[ranges > low + 0.005]).all()
 
 
-def test_rain_makes_ranges_uncertain_by_two_percent_where_it_pours():
-    told = begun({"rain": {"rate": 10 * MM_PER_HOUR}}, "Scan").reading(scan(np.full(20_000, 4.0))).ranges
-    assert told.std() == pytest.approx(0.08, rel=0.03)
-    assert told.mean() == pytest.approx(4.0, abs=0.003)
+def test_heavy_rain_adds_range_noise_of_two_percent():
+    measured = start({"rain": {"rate": 10 * MM_PER_HOUR}}, "Scan").reading(scan(np.full(20_000, 4.0))).ranges
+    assert measured.std() == pytest.approx(0.08, rel=0.03)
+    assert measured.mean() == pytest.approx(4.0, abs=0.003)
 
 
-def test_white_in_hardly_any_rain_is_seen_to_the_end_of_the_range():
-    told = begun({"rain": {"rate": 1e-6 * MM_PER_HOUR}}, "Scan").reading(scan(np.array([11.9, 0.2]))).ranges
-    assert told == pytest.approx([11.9, 0.2])
+def test_light_rain_does_not_hide_white_targets():
+    measured = start({"rain": {"rate": 1e-6 * MM_PER_HOUR}}, "Scan").reading(scan(np.array([11.9, 0.2]))).ranges
+    assert measured == pytest.approx([11.9, 0.2])

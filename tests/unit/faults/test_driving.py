@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from begun import Hand, begun, odometry, unsuitable_key
+from fault_effects import ManualClock, odometry, start, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -12,71 +12,71 @@ from simscen.model.robot import Differential, Omnidirectional
 WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
 
 
-def rims(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
+def wheel_speeds(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
     return motion.vx - separation / 2 * motion.wz, motion.vx + separation / 2 * motion.wz
 
 
-def test_a_gain_scales_a_command_on_its_way():
-    work = begun({"gain": {"linear": "50 %", "angular": -1}}, "Command")
-    assert work.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
+def test_gain_scales_commands():
+    effect = start({"gain": {"linear": "50 %", "angular": -1}}, "Command")
+    assert effect.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
 
 
-def test_a_weaker_side_rolls_its_share_and_the_other_all():
-    work = begun({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
-    told = Twist(0.4, 0.0, 0.5)
-    left, right = rims(work.command(told))
-    assert (left, right) == pytest.approx((0.8 * rims(told)[0], rims(told)[1]))
+def test_gain_of_one_side_does_not_affect_the_other():
+    effect = start({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
+    motion = Twist(0.4, 0.0, 0.5)
+    left, right = wheel_speeds(effect.command(motion))
+    assert (left, right) == pytest.approx((0.8 * wheel_speeds(motion)[0], wheel_speeds(motion)[1]))
 
 
-def test_speeds_are_cut_and_keep_their_direction():
-    work = begun({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
-    assert work.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
-    assert work.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
+def test_saturation_limits_speed_and_keeps_direction():
+    effect = start({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
+    assert effect.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
+    assert effect.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
 
 
-def test_a_saturated_side_rolls_no_faster_than_its_limit_either_way():
-    work = begun({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
-    for told, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
-        assert rims(work.command(Twist(*told))) == pytest.approx(expected)
+def test_saturated_side_is_limited_forward_and_backward():
+    effect = start({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
+    for motion, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
+        assert wheel_speeds(effect.command(Twist(*motion))) == pytest.approx(expected)
 
 
-def test_accelerations_are_limited_from_one_beat_to_the_next():
-    now = Hand()
-    work = begun({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
-    work.command(Twist())
+def test_acceleration_is_limited_between_beats():
+    now = ManualClock()
+    effect = start({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
+    effect.command(Twist())
     speeds = []
     for now.tick in range(12, 361, 12):
-        speeds.append(work.command(Twist(0.6, 0.0, 2.0)))
+        speeds.append(effect.command(Twist(0.6, 0.0, 2.0)))
     assert [speed.vx for speed in speeds] == pytest.approx(np.minimum(0.6, 0.025 * np.arange(1, 31)))
     assert [speed.wz for speed in speeds] == pytest.approx(np.minimum(2.0, 0.05 * np.arange(1, 31)))
 
 
-def test_wheels_that_slip_mislead_every_odometry_of_theirs_each_by_its_own_sum():
-    work = begun({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
-    assert work.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
+def test_wheel_slip_affects_each_odometry_sensor_separately():
+    effect = start({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
+    assert effect.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
     for k in range(5):
-        first = work.reading(odometry(Pose2(0.1 * k, 0), 6 * k))
-        other = work.reading(Odometry("other", 6 * k, Pose2(5 + 0.1 * k, 0), Twist()))
+        first = effect.reading(odometry(Pose2(0.1 * k, 0), 6 * k))
+        other = effect.reading(Odometry("other", 6 * k, Pose2(5 + 0.1 * k, 0), Twist()))
     assert first.pose.x == pytest.approx(0.8)
     assert other.pose.x == pytest.approx(5.8)
 
 
 @pytest.mark.parametrize("word", ["gain", "saturation"])
-def test_sides_are_those_of_wheels(word):
+def test_left_and_right_are_valid_only_for_differential_wheels(word):
     assert unsuitable_key({word: {"left": 0.5}}, "Command")[0] == "left"
     assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
     assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
 
 
-def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
-    now = Hand()
-    work = begun({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
-    told, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
+def test_battery_limit_falls_linearly_and_keeps_the_curvature_of_commands():
+    now = ManualClock()
+    effect = start({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
+    motion, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
     for now.tick, most in limits.items():
-        assert work.command(told) == pytest.approx((most, 0.0, most / 2))
-    assert work.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
+        assert effect.command(motion) == pytest.approx((most, 0.0, most / 2))
+    assert effect.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
 
 
 def test_rising_battery_curve_is_refused():
     with pytest.raises(ValueError, match="a battery does not charge itself"):
-        begun({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")
+        start({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")

@@ -9,7 +9,7 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.faults.base import AnyFault, FaultSetting
 
 
-def begun(fault: dict, separation=0.3, seed=1):
+def start(fault: dict, separation=0.3, seed=1):
     kind = "Scan" if {"noise"} & set(fault) else "Odometry"
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), FaultSetting(separation, kind=kind))
 
@@ -23,29 +23,29 @@ def straight(meters: float, steps: int = 100):
 
 
 def test_sensor_that_is_off_publishes_nothing():
-    assert begun({"off": {}}).reading(scan([1.0])) is None
+    assert start({"off": {}}).reading(scan([1.0])) is None
 
 
-def test_dropout_loses_the_share_of_messages_it_says():
-    fault = begun({"dropout": {"probability": "30 %"}})
+def test_dropout_loses_the_given_share_of_messages():
+    fault = start({"dropout": {"probability": "30 %"}})
     lost = sum(fault.reading(scan([1.0])) is None for _ in range(4000))
     assert lost / 4000 == pytest.approx(0.3, abs=0.03)
 
 
-def test_beam_dropout_blinds_the_share_of_beams_it_says_and_leaves_the_rest():
-    seen = begun({"beam_dropout": {"probability": 0.4}}).reading(scan(np.full(4000, 2.0)))
+def test_beam_dropout_loses_the_given_share_of_beams():
+    seen = start({"beam_dropout": {"probability": 0.4}}).reading(scan(np.full(4000, 2.0)))
     assert np.isnan(seen.ranges).mean() == pytest.approx(0.4, abs=0.035)
     assert set(seen.ranges[~np.isnan(seen.ranges)]) == {2.0}
 
 
-def test_noise_has_the_standard_deviation_it_says_and_no_bias():
-    seen = begun({"noise": {"std": "10 cm"}}).reading(scan(np.full(10_000, 5.0))).ranges
+def test_noise_has_the_given_standard_deviation_and_no_bias():
+    seen = start({"noise": {"std": "10 cm"}}).reading(scan(np.full(10_000, 5.0))).ranges
     assert seen.std() == pytest.approx(0.1, rel=0.04)
     assert seen.mean() == pytest.approx(5.0, abs=0.005)
 
 
 def test_noise_keeps_beams_without_a_hit_and_the_range_of_the_sensor():
-    seen = begun({"noise": {"std": 1.0}}).reading(scan([np.inf, np.nan, 0.1, 12.0] * 50)).ranges
+    seen = start({"noise": {"std": 1.0}}).reading(scan([np.inf, np.nan, 0.1, 12.0] * 50)).ranges
     assert np.isinf(seen[0::4]).all()
     assert np.isnan(seen[1::4]).all()
     finite = seen[np.isfinite(seen)]
@@ -53,35 +53,35 @@ def test_noise_keeps_beams_without_a_hit_and_the_range_of_the_sensor():
     assert finite.max() <= 12.0
 
 
-def test_a_fault_never_changes_the_reading_it_was_handed():
+def test_fault_does_not_modify_its_input():
     original = scan(np.full(100, 2.0))
-    begun({"noise": {"std": 1.0}}).reading(original)
-    begun({"beam_dropout": {"probability": 1.0}}).reading(original)
+    start({"noise": {"std": 1.0}}).reading(original)
+    start({"beam_dropout": {"probability": 1.0}}).reading(original)
     assert (original.ranges == 2.0).all()
 
 
-def test_a_linear_bias_scales_the_reported_way():
-    fault = begun({"bias": {"linear_scale": 1.1}})
+def test_linear_bias_scales_the_reported_distance():
+    fault = start({"bias": {"linear_scale": 1.1}})
     reported = [fault.reading(odometry) for odometry in straight(2.0)]
     assert reported[-1].pose.x == pytest.approx(2.2)
     assert reported[-1].twist.vx == pytest.approx(0.55)
 
 
-def test_a_turn_for_each_meter_bends_the_reported_way_into_an_arc():
-    fault = begun({"bias": {"turn_per_metre": 0.5}})
+def test_turn_per_meter_bends_the_reported_path_into_an_arc():
+    fault = start({"bias": {"turn_per_metre": 0.5}})
     end = [fault.reading(odometry) for odometry in straight(2.0, 2000)][-1].pose
     assert end.yaw == pytest.approx(1.0)
     assert (end.x, end.y) == pytest.approx((math.sin(1.0) / 0.5, (1 - math.cos(1.0)) / 0.5), abs=2e-3)
 
 
 def test_slip_reduces_the_true_distance():
-    fault = begun({"slip": {"left": 0.25, "right": 0.25}})
+    fault = start({"slip": {"left": 0.25, "right": 0.25}})
     assert fault.command(Twist(0.4, 0, 0.8)) == pytest.approx((0.3, 0, 0.6))
     assert [fault.reading(odometry) for odometry in straight(3.0)][-1].pose.x == pytest.approx(4.0)
 
 
-def test_slip_on_one_side_turns_the_robot_without_its_odometry_noticing():
-    fault = begun({"slip": {"left": 0.5}}, separation=0.4)
+def test_slip_on_one_side_turns_the_robot_but_not_its_odometry():
+    fault = start({"slip": {"left": 0.5}}, separation=0.4)
     on_the_ground = fault.command(Twist(1.0, 0, 0))
     # left wheel at half speed: v = (0.5 + 1) / 2, w = (1 - 0.5) / 0.4
     assert on_the_ground == pytest.approx((0.75, 0, 1.25))
@@ -89,15 +89,15 @@ def test_slip_on_one_side_turns_the_robot_without_its_odometry_noticing():
     assert reported == pytest.approx((1.0, 0, 0))
 
 
-def test_when_an_odometry_fault_is_over_its_error_stays_and_new_steps_are_true():
-    fault = begun({"bias": {"linear_scale": 2.0}})
-    way = straight(2.0)
-    for odometry in way[:51]:
+def test_error_of_an_odometry_fault_remains_after_its_end_without_growing():
+    fault = start({"bias": {"linear_scale": 2.0}})
+    readings = straight(2.0)
+    for odometry in readings[:51]:
         reported = fault.reading(odometry)
     assert reported.pose.x == pytest.approx(2.0)
-    rest = fault.end()
-    assert rest is not None
-    for odometry in way[51:]:
-        reported = rest.reading(odometry)
+    remaining = fault.end()
+    assert remaining is not None
+    for odometry in readings[51:]:
+        reported = remaining.reading(odometry)
     assert reported.pose.x == pytest.approx(3.0)
     assert reported.twist.vx == pytest.approx(0.5)

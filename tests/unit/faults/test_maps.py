@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from begun import begun
+from fault_effects import start
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 
 
 def grid() -> OccupancyGrid:
-    """10 m by 10 m, a wall cell at (2, 3), unknown at (9, 9)."""
+    """Return a map of 10 m by 10 m with a wall cell at (2, 3) and an unknown cell at (9, 9)."""
     cells = np.zeros((20, 20), dtype=np.int8)
     cells[6, 4], cells[18, 18] = OCCUPIED, UNKNOWN
     return OccupancyGrid(cells, 0.5)
@@ -22,19 +22,19 @@ def value(grid: OccupancyGrid, x: float, y: float) -> int:
 
 
 def test_shifted_map_moves_every_point():
-    moved = begun({"shift": {"x": 1.0, "y": -0.5, "yaw": "90 deg"}}, "Map").map(grid())
+    moved = start({"shift": {"x": 1.0, "y": -0.5, "yaw": "90 deg"}}, "Map").map(grid())
     place = Pose2(1.0, -0.5, math.pi / 2).apply(np.array([[2.25, 3.25]]))[0].tolist()
     assert place == pytest.approx([1.0 - 3.25, -0.5 + 2.25])
     assert value(moved, *place) == OCCUPIED
     assert value(moved, 2.25, 3.25) == UNKNOWN
 
 
-def test_an_outdated_map_shows_nothing_in_what_is_missing_and_walls_in_what_is_extra():
+def test_outdated_map_has_free_missing_areas_and_occupied_extra_areas():
     spec = {"missing": [[[1.8, 2.8], [2.7, 2.8], [2.7, 3.7], [1.8, 3.7]]], "extra": [[[5, 5], [7, 5], [7, 6], [5, 6]]]}
     before = grid()
-    shown = begun({"outdated": spec}, "Map").map(before)
+    shown = start({"outdated": spec}, "Map").map(before)
     assert value(shown, 2.25, 3.25) == FREE
     assert int((shown.cells == OCCUPIED).sum()) == 4 * 2
     assert value(shown, 5.25, 5.25) == value(shown, 6.75, 5.75) == OCCUPIED
     assert value(shown, 9.25, 9.25) == UNKNOWN
-    assert value(before, 2.25, 3.25) == OCCUPIED, "the map that all runs share stays as it is"
+    assert value(before, 2.25, 3.25) == OCCUPIED, "the shared map is not modified"

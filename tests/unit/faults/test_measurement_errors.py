@@ -1,10 +1,10 @@
-"""Noise, bias, scale, and drift of every kind of message, against their definitions."""
+"""Tests of noise, bias, scale, and drift of all message types against their definitions."""
 
 import math
 
 import numpy as np
 import pytest
-from begun import Hand, begun, belief, image, imu, odometry, scan, unsuitable_key
+from fault_effects import ManualClock, belief, image, imu, odometry, scan, start, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -13,108 +13,108 @@ MANY = 10_000
 
 
 def test_camera_noise_has_the_given_strength_and_stays_in_range():
-    seen = begun({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
+    seen = start({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
     assert seen.depth.std() == pytest.approx(0.05, rel=0.05)
     assert seen.rgb.std() == pytest.approx(0.04 * 255, rel=0.05)
     assert (seen.rgb.dtype, seen.depth.dtype) == (np.uint8, np.float32)
-    assert np.isinf(begun({"noise": {"std": 1.0}}, "Image").reading(image([[np.inf]])).depth).all()
+    assert np.isinf(start({"noise": {"std": 1.0}}, "Image").reading(image([[np.inf]])).depth).all()
 
 
-def test_a_noisy_imu_spreads_each_axis_by_what_is_said():
-    work = begun({"noise": {"gyro": "0.05 rad/s", "accelerometer": 0.3}}, "Imu")
-    got = [work.reading(imu()) for _ in range(4000)]
-    turning, pushing = (np.array([getattr(one, name) for one in got]) for name in
+def test_imu_noise_has_the_given_standard_deviation_on_each_axis():
+    effect = start({"noise": {"gyro": "0.05 rad/s", "accelerometer": 0.3}}, "Imu")
+    got = [effect.reading(imu()) for _ in range(4000)]
+    rates, accelerations = (np.array([getattr(one, name) for one in got]) for name in
                         ("angular_velocity", "linear_acceleration"))  # fmt: skip
-    assert turning.std(axis=0) == pytest.approx([0.05] * 3, rel=0.06)
-    assert pushing.std(axis=0) == pytest.approx([0.3] * 3, rel=0.06)
-    assert turning.mean(axis=0) == pytest.approx([0, 0, 0.2], abs=0.004)
+    assert rates.std(axis=0) == pytest.approx([0.05] * 3, rel=0.06)
+    assert accelerations.std(axis=0) == pytest.approx([0.3] * 3, rel=0.06)
+    assert rates.mean(axis=0) == pytest.approx([0, 0, 0.2], abs=0.004)
 
 
 @pytest.mark.parametrize("steps", [4, 40])
 def test_noise_of_odometry_after_a_meter_does_not_depend_on_its_rate(steps):
     ends = []
     for seed in range(300):
-        work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry", seed=seed)
+        effect = start({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry", seed=seed)
         for k in range(steps + 1):
-            end = work.reading(odometry(Pose2(k / steps, 0.0), 24 * k)).pose
+            end = effect.reading(odometry(Pose2(k / steps, 0.0), 24 * k)).pose
         ends.append(end.x)
     assert np.std(ends) == pytest.approx(0.05, rel=0.15)
     assert np.mean(ends) == pytest.approx(1.0, abs=0.01)
 
 
-def test_noise_of_odometry_that_stands_is_none():
-    work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
-    assert {work.reading(odometry(Pose2(1, 2), 6 * k)).pose for k in range(50)} == {Pose2(1, 2)}
+def test_stationary_odometry_has_no_noise():
+    effect = start({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
+    assert {effect.reading(odometry(Pose2(1, 2), 6 * k)).pose for k in range(50)} == {Pose2(1, 2)}
 
 
-def test_a_noisy_odometry_reports_the_velocity_of_the_way_that_it_reports():
-    work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
-    before = work.reading(odometry(Pose2(0, 0), 0, Twist(0.5)))
-    after = work.reading(odometry(Pose2(0.0125, 0), 6, Twist(0.5)))
+def test_noisy_odometry_reports_the_velocity_of_its_reported_path():
+    effect = start({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry")
+    before = effect.reading(odometry(Pose2(0, 0), 0, Twist(0.5)))
+    after = effect.reading(odometry(Pose2(0.0125, 0), 6, Twist(0.5)))
     assert after.twist.vx == pytest.approx((after.pose.x - before.pose.x) * 40)
 
 
-def test_every_noisy_belief_is_off_by_another_draw_and_its_odometry_is_not():
-    work = begun({"noise": {"linear": "10 cm", "angular": "2 deg"}}, "Belief")
-    told = [work.belief(belief(Pose2(3, 4, 0.5), Pose2(1, 0, 0.1))) for _ in range(3000)]
-    poses = np.array([one.pose for one in told])
+def test_belief_noise_is_independent_and_keeps_the_odometry():
+    effect = start({"noise": {"linear": "10 cm", "angular": "2 deg"}}, "Belief")
+    output = [effect.belief(belief(Pose2(3, 4, 0.5), Pose2(1, 0, 0.1))) for _ in range(3000)]
+    poses = np.array([one.pose for one in output])
     assert poses.std(axis=0) == pytest.approx([0.1, 0.1, math.radians(2)], rel=0.06)
-    assert told[7].map_from_odom.compose(Pose2(1, 0, 0.1)) == pytest.approx(told[7].pose)
+    assert output[7].map_from_odom.compose(Pose2(1, 0, 0.1)) == pytest.approx(output[7].pose)
 
 
-def test_a_bias_is_added_to_what_is_measured_and_to_nothing_else():
-    assert begun({"bias": {"range": "-20 cm"}}, "Scan").reading(scan([1.0, np.inf, np.nan, 0.2])).ranges == (
+def test_bias_is_added_to_finite_measurements_only():
+    assert start({"bias": {"range": "-20 cm"}}, "Scan").reading(scan([1.0, np.inf, np.nan, 0.2])).ranges == (
         pytest.approx([0.8, np.inf, np.nan, -np.inf], nan_ok=True)
     )
-    felt = begun({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
-    assert felt.angular_velocity == pytest.approx((0, 0, 0.3))
-    assert felt.linear_acceleration == pytest.approx((-0.4, 0, 9.81))
-    seen = begun({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(image([[1.0, np.inf]], gray=230))
+    motion = start({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
+    assert motion.angular_velocity == pytest.approx((0, 0, 0.3))
+    assert motion.linear_acceleration == pytest.approx((-0.4, 0, 9.81))
+    seen = start({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(image([[1.0, np.inf]], gray=230))
     assert seen.depth.tolist() == [[1.5, np.inf]]
     assert (seen.rgb == 255).all()
 
 
 def test_range_scaled_beyond_the_maximum_is_no_hit():
-    told = begun({"scale": {"factor": 2}}, "Scan").reading(scan([1.0, 7.0, np.inf, np.nan])).ranges
-    assert told == pytest.approx([2.0, np.inf, np.inf, np.nan], nan_ok=True)
+    output = start({"scale": {"factor": 2}}, "Scan").reading(scan([1.0, 7.0, np.inf, np.nan])).ranges
+    assert output == pytest.approx([2.0, np.inf, np.inf, np.nan], nan_ok=True)
 
 
 def test_scaled_odometry_drives_and_turns_by_the_factor():
-    work = begun({"scale": {"factor": "110 %"}}, "Odometry")
-    work.reading(odometry())
-    told = work.reading(odometry(Pose2(1.0, 0.0, 0.0), 6, Twist(0.5, 0, 0.2)))
-    assert told.pose == pytest.approx((1.1, 0, 0))
-    assert told.twist == pytest.approx((0.55, 0, 0.22))
+    effect = start({"scale": {"factor": "110 %"}}, "Odometry")
+    effect.reading(odometry())
+    output = effect.reading(odometry(Pose2(1.0, 0.0, 0.0), 6, Twist(0.5, 0, 0.2)))
+    assert output.pose == pytest.approx((1.1, 0, 0))
+    assert output.twist == pytest.approx((0.55, 0, 0.22))
 
 
-def test_a_drift_grows_with_the_time_since_it_began():
-    now = Hand()
+def test_drift_grows_with_the_time_since_its_start():
+    now = ManualClock()
     now.tick = 480
-    gyro, lidar = begun({"drift": {"gyro": 0.01}}, "Imu", now), begun({"drift": {"range": "5 cm/s"}}, "Scan", now)
+    gyro, lidar = start({"drift": {"gyro": 0.01}}, "Imu", now), start({"drift": {"range": "5 cm/s"}}, "Scan", now)
     for seconds in (0, 1, 7.5):
         tick = 480 + round(240 * seconds)
         assert gyro.reading(imu(tick)).angular_velocity[2] == pytest.approx(0.2 + 0.01 * seconds)
         assert lidar.reading(scan([2.0], tick)).ranges == pytest.approx([2.0 + 0.05 * seconds])
 
 
-def test_odometry_that_drifts_drives_while_the_robot_stands_and_keeps_the_way_when_it_is_over():
-    work = begun({"drift": {"linear": "10 cm/s"}}, "Odometry")
+def test_odometry_drifts_at_standstill_and_keeps_the_drift_after_the_fault():
+    effect = start({"drift": {"linear": "10 cm/s"}}, "Odometry")
     for tick in range(0, 481, 6):
-        told = work.reading(odometry(tick=tick))
-    assert told.pose == pytest.approx((0.2, 0, 0))
-    assert told.twist.vx == pytest.approx(0.1)
-    rest = work.end()
+        output = effect.reading(odometry(tick=tick))
+    assert output.pose == pytest.approx((0.2, 0, 0))
+    assert output.twist.vx == pytest.approx(0.1)
+    rest = effect.end()
     assert rest.reading(odometry(tick=720)).pose == pytest.approx((0.2, 0, 0))
 
 
-def test_a_belief_that_drifts_slides_along_the_heading_of_when_it_began():
-    now = Hand()
-    work = begun({"drift": {"linear": "10 cm/s", "angular": 0.0}}, "Belief", now)
-    work.belief(belief(Pose2(1, 1, math.pi / 2), Pose2(0, 0)))
+def test_belief_drifts_along_the_heading_at_the_start_of_the_fault():
+    now = ManualClock()
+    effect = start({"drift": {"linear": "10 cm/s", "angular": 0.0}}, "Belief", now)
+    effect.belief(belief(Pose2(1, 1, math.pi / 2), Pose2(0, 0)))
     now.tick = 960
-    told = work.belief(belief(Pose2(1, 1, math.pi / 2), Pose2(0, 0)))
-    assert told.pose == pytest.approx((1, 1.4, math.pi / 2))
-    assert told.map_from_odom == pytest.approx(told.pose)
+    output = effect.belief(belief(Pose2(1, 1, math.pi / 2), Pose2(0, 0)))
+    assert output.pose == pytest.approx((1, 1.4, math.pi / 2))
+    assert output.map_from_odom == pytest.approx(output.pose)
 
 
 @pytest.mark.parametrize(

@@ -1,32 +1,32 @@
-"""Faults that delay, drop, thin out, or freeze messages."""
+"""Tests of faults that delay, drop, thin out, or freeze messages."""
 
 import numpy as np
 import pytest
-from begun import Hand, begun, belief, image, imu, odometry, scan, unsuitable_key
+from fault_effects import ManualClock, belief, image, imu, odometry, scan, start, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
 
-def heard(fault: dict, ticks: int, period: int = 24, until: int | None = None) -> list[tuple[int, int]]:
-    """At which tick each scan arrives, and when it was taken; from `until` on the fault is over."""
-    now = Hand()
-    work, got = begun(fault, "Scan", now), []
+def arrivals(fault: dict, ticks: int, period: int = 24, until: int | None = None) -> list[tuple[int, int]]:
+    """Return the ticks at which each scan arrives and was taken; the fault ends at `until`."""
+    now = ManualClock()
+    effect, got = start(fault, "Scan", now), []
     for now.tick in range(ticks):
         if now.tick == until:
-            work = work.end()
-        got += [(now.tick, one.tick) for one in work.arriving_readings()]
-        if now.tick % period == 0 and (one := work.reading(scan([1.0], now.tick))) is not None:
+            effect = effect.end()
+        got += [(now.tick, one.tick) for one in effect.arriving_readings()]
+        if now.tick % period == 0 and (one := effect.reading(scan([1.0], now.tick))) is not None:
             got.append((now.tick, one.tick))
     return got
 
 
-def test_a_fixed_delay_puts_every_message_off_by_the_same():
-    assert heard({"delay": {"latency": "0.2 s"}}, 200) == [(48 + 24 * k, 24 * k) for k in range(7)]
+def test_fixed_delay_is_equal_for_every_message():
+    assert arrivals({"delay": {"latency": "0.2 s"}}, 200) == [(48 + 24 * k, 24 * k) for k in range(7)]
 
 
-def test_a_random_delay_is_uniform_and_never_changes_the_order():
-    got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
+def test_random_delay_keeps_the_order_of_messages():
+    got = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
     assert [taken for _, taken in got] == [24 * k for k in range(len(got))]
     arrived = np.array([at for at, _ in got])
     assert (np.diff(arrived) >= 0).all()
@@ -37,47 +37,47 @@ def test_a_random_delay_is_uniform_and_never_changes_the_order():
     assert late.mean() > 0.6
 
 
-def test_messages_that_come_seldom_are_delayed_uniformly():
-    got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
+def test_rare_messages_have_a_uniform_delay():
+    got = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
     late = np.array([(at - taken) / 240 for at, taken in got])
     assert np.quantile(late, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
 
 
 def test_delayed_messages_arrive_before_newer_ones():
-    got = heard({"delay": {"latency": "0.5 s"}}, 400, until=60)
+    got = arrivals({"delay": {"latency": "0.5 s"}}, 400, until=60)
     assert got == [(120, 0), (144, 24), (168, 48), (168, 72), (168, 96), (168, 120), (168, 144), (168, 168)] + [
         (24 * k, 24 * k) for k in range(8, 17)
     ]
 
 
-def test_only_the_newest_of_late_commands_counts():
-    now = Hand()
-    work = begun({"delay": {"latency": "50 ms"}}, "Command", now)
+def test_only_the_newest_delayed_command_is_used():
+    now = ManualClock()
+    effect = start({"delay": {"latency": "50 ms"}}, "Command", now)
     for now.tick in range(0, 12, 3):
-        assert work.command(Twist(now.tick)) is None
+        assert effect.command(Twist(now.tick)) is None
     now.tick = 21
-    assert work.arriving_command() == Twist(9)
-    assert work.arriving_command() is None
+    assert effect.arriving_command() == Twist(9)
+    assert effect.arriving_command() is None
 
 
 @pytest.mark.parametrize(("rate", "every"), [("5 Hz", 48), ("2 Hz", 120)])
-def test_a_slow_sensor_has_the_rate_that_is_said(rate, every):
-    assert [at for at, _ in heard({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, every))
+def test_slow_sensor_has_the_given_rate(rate, every):
+    assert [at for at, _ in arrivals({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, every))
 
 
-def test_a_rate_that_does_not_divide_the_sensors_own_is_kept_on_average():
-    got = [at for at, _ in heard({"slow": {"rate": "3 Hz"}}, 2400)]
+def test_rate_that_does_not_divide_that_of_the_sensor_holds_on_average():
+    got = [at for at, _ in arrivals({"slow": {"rate": "3 Hz"}}, 2400)]
     assert len(got) == 30
     assert set(np.diff(got)) == {72, 96}
 
 
-def test_slow_is_slower_than_the_sensor():
+def test_slow_rate_must_be_below_that_of_the_sensor():
     assert unsuitable_key({"slow": {"rate": 10}}, "Scan", rate=10.0)[0] == "rate"
     assert unsuitable_key({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
 
 
 def test_intermittent_fault_has_the_stated_share_and_burst_length():
-    got = np.array([at for at, _ in heard({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)])
+    got = np.array([at for at, _ in arrivals({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)])
     assert len(got) / 40_000 == pytest.approx(2 / 3, abs=0.03)
     gaps = np.diff(got)
     gaps = gaps[gaps > 6] / 240
@@ -96,66 +96,66 @@ def test_intermittent_fault_has_the_stated_share_and_burst_length():
     ],
 )
 def test_a_stuck_sensor_repeats_its_first_message_with_fresh_stamps(kind, first, later):
-    work = begun({"stuck": {}}, kind)
-    assert work.reading(first) is not None
-    told = work.reading(later)
-    assert told.tick == 24
+    effect = start({"stuck": {}}, kind)
+    assert effect.reading(first) is not None
+    output = effect.reading(later)
+    assert output.tick == 24
     name = {"Scan": "ranges", "Odometry": "pose", "Imu": "angular_velocity", "Image": "depth"}[kind]
-    np.testing.assert_array_equal(getattr(told, name), getattr(first, name))
+    np.testing.assert_array_equal(getattr(output, name), getattr(first, name))
 
 
-def test_a_stuck_command_is_kept_and_stuck_wheels_do_not_turn():
-    command, wheels = begun({"stuck": {}}, "Command"), begun({"stuck": {}}, "Wheels")
+def test_stuck_command_is_repeated_and_stuck_wheels_do_not_turn():
+    command, wheels = start({"stuck": {}}, "Command"), start({"stuck": {}}, "Wheels")
     assert [command.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist(0.1)] * 3
     assert [wheels.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist()] * 3
 
 
-def test_a_localizer_that_is_off_leaves_the_robot_to_its_odometry():
-    work = begun({"off": {}}, "Belief")
-    work.belief(belief(Pose2(5, 5), Pose2(1, 0)))
-    told = work.belief(belief(Pose2(7, 6), Pose2(2, 0)))
-    assert told.pose == pytest.approx((6, 5, 0))
-    assert told.map_from_odom == pytest.approx((4, 5, 0))
+def test_disabled_localizer_leaves_only_odometry():
+    effect = start({"off": {}}, "Belief")
+    effect.belief(belief(Pose2(5, 5), Pose2(1, 0)))
+    output = effect.belief(belief(Pose2(7, 6), Pose2(2, 0)))
+    assert output.pose == pytest.approx((6, 5, 0))
+    assert output.map_from_odom == pytest.approx((4, 5, 0))
 
 
-def test_a_localizer_that_is_stuck_keeps_the_robot_at_one_place():
-    work, first = begun({"stuck": {}}, "Belief"), belief(Pose2(5, 5), Pose2(1, 0))
-    assert work.belief(first) is first
-    assert work.belief(belief(Pose2(7, 6), Pose2(2, 0))) is first
+def test_stuck_localizer_repeats_its_first_belief():
+    effect, first = start({"stuck": {}}, "Belief"), belief(Pose2(5, 5), Pose2(1, 0))
+    assert effect.belief(first) is first
+    assert effect.belief(belief(Pose2(7, 6), Pose2(2, 0))) is first
 
 
-def test_a_belief_jumps_in_the_robots_own_frame_and_then_moves_as_the_map_lies_now():
-    work = begun({"jump": {"x": 1, "yaw": "90 deg"}}, "Belief")
-    told = work.belief(belief(Pose2(2, 2, np.pi / 2), Pose2(0, 0)))
-    assert told.pose == pytest.approx((2, 3, -np.pi), abs=1e-9) or told.pose == pytest.approx((2, 3, np.pi))
-    after = work.belief(belief(Pose2(2, 2.5, np.pi / 2), Pose2(0.5, 0)))
+def test_belief_jumps_in_the_robot_frame_and_keeps_the_offset_of_the_map():
+    effect = start({"jump": {"x": 1, "yaw": "90 deg"}}, "Belief")
+    output = effect.belief(belief(Pose2(2, 2, np.pi / 2), Pose2(0, 0)))
+    assert output.pose == pytest.approx((2, 3, -np.pi), abs=1e-9) or output.pose == pytest.approx((2, 3, np.pi))
+    after = effect.belief(belief(Pose2(2, 2.5, np.pi / 2), Pose2(0.5, 0)))
     assert (after.pose.x, after.pose.y) == pytest.approx((1.5, 3))
     assert after.map_from_odom.compose(Pose2(0.5, 0)) == pytest.approx(after.pose)
 
 
 def corrections(fault: dict, ticks: int, until: int | None = None) -> list[float]:
-    """What the navigator knows of a correction that grows by a meter a tick, as does the way by odometry."""
-    now = Hand()
-    work, told = begun(fault, "Belief", now), []
+    """Return the corrections that the navigator receives if correction and odometry grow by 1 m per tick."""
+    now = ManualClock()
+    effect, received = start(fault, "Belief", now), []
     for now.tick in range(ticks):
         if now.tick == until:
-            work = work.end()
-        got = work.belief(belief(Pose2(2.0 * now.tick, 0), Pose2(now.tick, 0))) if work else None
+            effect = effect.end()
+        got = effect.belief(belief(Pose2(2.0 * now.tick, 0), Pose2(now.tick, 0))) if effect else None
         if got:
             assert got.pose.x == pytest.approx(got.map_from_odom.x + now.tick)
-        told.append(got.map_from_odom.x if got else now.tick)
-    return told
+        received.append(got.map_from_odom.x if got else now.tick)
+    return received
 
 
-def test_corrections_of_the_localizer_come_late_in_order_and_are_carried_on_by_odometry():
-    told = corrections({"delay": {"latency": "50 ms"}}, 60)
-    assert told == pytest.approx([max(0, tick - 12) for tick in range(60)])
-    over = corrections({"delay": {"latency": "50 ms"}}, 60, until=30)
-    assert over[:41] == pytest.approx(told[:41])
-    assert over[41:] == pytest.approx(list(range(41, 60)))
+def test_delayed_localizer_corrections_are_extrapolated_by_odometry():
+    received = corrections({"delay": {"latency": "50 ms"}}, 60)
+    assert received == pytest.approx([max(0, tick - 12) for tick in range(60)])
+    ended = corrections({"delay": {"latency": "50 ms"}}, 60, until=30)
+    assert ended[:41] == pytest.approx(received[:41])
+    assert ended[41:] == pytest.approx(list(range(41, 60)))
 
 
-def test_corrections_that_come_seldom_or_not_stay_what_they_were():
+def test_last_correction_is_kept_until_the_next_one():
     assert corrections({"slow": {"rate": "10 Hz"}}, 60) == pytest.approx([24 * (tick // 24) for tick in range(60)])
     gappy = corrections({"intermittent": {"up": "0.1 s", "down": "0.1 s"}}, 2400)
     assert all(gappy[k] in (k, gappy[k - 1]) for k in range(1, 2400))

@@ -23,11 +23,11 @@ def event(at, happened=True, what="spawned pallet", entry=0):
     ]
 
 
-def fault(begins, touches=None, ends=None, touched=0, entry=0):
-    told = [[begins, "fault.started", "lidar.off", {"entry": entry, "sensor": "lidar"}]]
-    told += [[touches, "fault.took_effect", "lidar.off", {"entry": entry}]] if touches is not None else []
-    told += [[ends, "fault.ended", "lidar.off", {"entry": entry, "touched": touched}]] if ends is not None else []
-    return told
+def fault(start, effect=None, end=None, touched=0, entry=0):
+    events = [[start, "fault.started", "lidar.off", {"entry": entry, "sensor": "lidar"}]]
+    events += [[effect, "fault.took_effect", "lidar.off", {"entry": entry}]] if effect is not None else []
+    events += [[end, "fault.ended", "lidar.off", {"entry": entry, "touched": touched}]] if end is not None else []
+    return events
 
 
 def judged(events, *ordered, **changes):
@@ -77,9 +77,9 @@ def test_entry_without_effect_fails_the_run_at_its_line(ordered, events, why, ti
     assert result.lines == (ordered["line"], 20)
     (finding,) = verdict.findings
     assert (finding.detail, finding.tick) == ((why,), tick)
-    (told,) = json.loads(to_json(result))["verdicts"][0]["findings"]
-    assert told["message"].startswith(f"disturbance did not happen: {ordered['name']} (when time: 3 s)")
-    assert "expected" not in told["message"]
+    (data,) = json.loads(to_json(result))["verdicts"][0]["findings"]
+    assert data["message"].startswith(f"disturbance did not happen: {ordered['name']} (when time: 3 s)")
+    assert "expected" not in data["message"]
 
 
 @pytest.mark.parametrize("ordered", [EVENT, FAULT])
@@ -89,13 +89,13 @@ def test_optional_entry_that_did_not_happen_fails_nothing(ordered):
     assert [(one.happened, one.missing) for one in result.disturbances] == [(False, False)]
 
 
-def test_a_log_that_was_cut_off_leaves_it_open():
+def test_disturbance_is_undecided_in_a_truncated_log():
     result = judged([], EVENT, ended=None)
     assert [verdict.status for verdict in result.verdicts] == [Status.INCONCLUSIVE, Status.INCONCLUSIVE]
     assert result.outcome is Outcome.FAILED
 
 
-def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
+def test_every_action_of_an_event_must_take_effect_at_least_once():
     def twice(first, second):
         effects = [{"happened": did, "what": what} for did, what in zip((first, second), "ab", strict=True)]
         return [
@@ -121,13 +121,13 @@ def test_entries_with_the_same_name_are_distinguished():
     assert [verdict.id for verdict in result.verdicts] == ["lidar.off", "lidar.off#2", "collisions#2", "collisions"]
 
 
-def test_disturbances_survive_their_file():
+def test_disturbances_are_unchanged_after_writing_and_reading():
     result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False})
     assert from_json(to_json(result)) == result
     assert result.disturbances[1].disturbance == Disturbance("lidar.off", "fault", required=False, line=9)
 
 
-def test_in_a_file_that_does_not_hold_the_criteria_it_has_no_line_either():
+def test_disturbance_has_no_line_without_lines_of_criteria():
     trace, case = synthetic_trace(WORDS), synthetic_case({"disturbances": [EVENT]})
     result = judge_run(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
     assert len(result.verdicts) == 2

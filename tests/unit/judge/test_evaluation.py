@@ -27,7 +27,7 @@ def verdict(status, severity="fail"):
     return Verdict("clearance", "clearance", severity, (Finding(status, "clearance", "", ""),))
 
 
-def test_every_criterion_has_a_verdict_in_order():
+def test_verdicts_are_in_the_order_of_the_criteria():
     verdicts = judge(
         [
             criterion(clearance={"min": 0.1}),
@@ -44,7 +44,7 @@ def test_every_criterion_has_a_verdict_in_order():
     ]
 
 
-def test_an_exception_in_a_criterion_is_its_verdict_and_the_others_still_answer(monkeypatch):
+def test_exception_in_a_criterion_is_an_error_verdict_for_this_criterion_only(monkeypatch):
     monkeypatch.setattr(Clearance, "judge", lambda *_: 1 / 0)
     broken, fine = judge([criterion(clearance={"min": 0.1}), criterion(collisions={})], TRACE, CASE)
     assert broken.status is Status.ERROR
@@ -52,7 +52,7 @@ def test_an_exception_in_a_criterion_is_its_verdict_and_the_others_still_answer(
     assert fine.status is Status.PASS
 
 
-def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
+def test_criterion_without_findings_is_an_error(monkeypatch):
     monkeypatch.setattr(Clearance, "judge", lambda *_: [])
     (empty,) = judge([criterion(clearance={"min": 0.1})], TRACE, CASE)
     assert empty.status is Status.ERROR
@@ -73,7 +73,7 @@ def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
         (at_least("value", 0.3, 0.1, "m"), ""),
     ],
 )
-def test_a_limit_that_nothing_could_break_is_a_defect(finding, defect):
+def test_limit_that_cannot_be_violated_is_a_defect(finding, defect):
     assert findings_defect([finding]) == defect
 
 
@@ -90,7 +90,7 @@ def test_a_limit_that_nothing_could_break_is_a_defect(finding, defect):
         ([], Outcome.ERROR),
     ],
 )
-def test_only_severity_fail_fails_a_run_but_a_broken_criterion_always_breaks_it(verdicts, expected):
+def test_warnings_do_not_fail_a_run_but_errors_in_warnings_do(verdicts, expected):
     assert outcome_of_verdicts(verdicts) is expected
 
 
@@ -99,7 +99,7 @@ def without_signals(trace):
     return replace(trace, truth=none, velocity=none, belief=none, odometry=none, command=none)
 
 
-def test_nothing_passes_in_a_log_with_nothing_in_it_but_one_signal_or_event_is_something():
+def test_log_without_signals_and_events_does_not_pass():
     few = [criterion(recoveries={"max": 5})]
     (empty,) = judge(few, without_signals(TRACE), CASE)
     assert empty.status is Status.INCONCLUSIVE

@@ -15,9 +15,9 @@ def verdict(name: str, status: Status, criterion: str = "", severity: str = "fai
 
 
 def judged(expected: ExpectedFailure | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
-    """The outcome, and what is told of the expectation."""
-    came_out, on_that = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole)
-    return came_out, "" if on_that is None else on_that.findings[0].measured
+    """Return the outcome, and the measured text of the verdict on the expectation."""
+    outcome, verdict_on_it = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole)
+    return outcome, "" if verdict_on_it is None else verdict_on_it.findings[0].measured
 
 
 KNOWN = ExpectedFailure("NAV-1")
@@ -25,7 +25,7 @@ SPEED = ExpectedFailure("NAV-1", ("speed",))
 
 
 @pytest.mark.parametrize(
-    ("expected", "statuses", "came_out", "told"),
+    ("expected", "statuses", "outcome", "text"),
     [
         (KNOWN, (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
         (KNOWN, (FAIL, FAIL), Outcome.FAILED_AS_EXPECTED, "speed, clearance failed"),
@@ -43,14 +43,14 @@ SPEED = ExpectedFailure("NAV-1", ("speed",))
         (None, (PASS, PASS), Outcome.PASSED, ""),
     ],
 )
-def test_only_what_was_expected_to_fail_may_and_must(
-    expected: ExpectedFailure | None, statuses: tuple[Status, Status], came_out: Outcome, told: str
+def test_exactly_the_expected_criteria_must_fail(
+    expected: ExpectedFailure | None, statuses: tuple[Status, Status], outcome: Outcome, text: str
 ) -> None:
     verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
-    assert judged(expected, *verdicts) == (came_out, told)
+    assert judged(expected, *verdicts) == (outcome, text)
 
 
-def test_all_that_is_named_must_fail() -> None:
+def test_all_named_criteria_must_fail() -> None:
     both = ExpectedFailure("NAV-1", ("speed", "clearance"))
     assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance passed")
 
@@ -67,15 +67,15 @@ def test_a_warning_is_no_failure_to_expect() -> None:
     assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
 
 
-def test_a_log_that_was_cut_off_is_never_as_expected() -> None:
+def test_truncated_log_never_fails_as_expected() -> None:
     assert judged(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), whole=False) == (Outcome.FAILED, "")
 
 
 @pytest.mark.parametrize(
     ("ids", "name"), [((), "expected"), (("speed",), "expected"), (("expected", "speed"), "expected#2")]
 )
-def test_the_verdict_about_the_expectation_has_a_name_of_its_own(ids: tuple[str, ...], name: str) -> None:
+def test_verdict_on_the_expectation_has_a_unique_name(ids: tuple[str, ...], name: str) -> None:
     verdicts = [verdict(each, FAIL) for each in ids]
-    _, about_it = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
-    assert about_it is not None
-    assert about_it.id == name
+    _, verdict_on_it = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
+    assert verdict_on_it is not None
+    assert verdict_on_it.id == name

@@ -26,7 +26,7 @@ STOP = Finding(
 )
 
 
-def test_a_failure_reads_as_in_the_format():
+def test_failed_verdict_has_the_documented_format():
     expected = "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"
     assert sentence(verdict(STOP), STOP, 240) == expected
 
@@ -42,11 +42,11 @@ def test_a_failure_reads_as_in_the_format():
         (Finding(Status.FAIL, "clearance ratio", "2", "≤ 1"), "clearance: ratio: 2 > 1"),
     ],
 )
-def test_every_kind_of_answer_has_its_sentence(finding, text):
+def test_every_status_has_its_sentence(finding, text):
     assert sentence(verdict(finding, "clearance", "clearance"), finding, 240) == text
 
 
-def test_the_tightest_bound_is_the_one_with_the_least_share_of_its_limit_left():
+def test_tightest_bound_has_the_smallest_relative_margin():
     far = Finding(Status.PASS, "time_to_goal", "", "≤ 40.00 s", 4.0, "s", 36.0)
     near = Finding(Status.PASS, "path_length", "", "≤ 10.00 m", 0.14, "m", 9.86)
     count = Finding(Status.PASS, "collisions", "", "≤ 0", 0.0, "", 0.0)
@@ -59,28 +59,28 @@ def test_the_tightest_bound_is_the_one_with_the_least_share_of_its_limit_left():
     assert tightest_margin([]) == ""
 
 
-def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_tightest():
+def test_pose_and_duration_at_a_goal_are_never_the_tightest_bound():
     stopped = Finding(Status.PASS, "goal dock", "", "≤ 0.25 m from the goal", 0.01, "m", 0.24)
     turned = Finding(Status.PASS, "goal dock heading", "", "≤ 0.25 rad from the goal's heading", 0.01, "rad", 0.24)
     waited = Finding(Status.PASS, "goal dock wait", "", "≥ 3.00 s", 0.0, "s", 3.0)
     within = Finding(Status.PASS, "goal dock time", "", "≤ 20.00 s", 15.0, "s", 5.0)
     assert tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
-    told = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
-    assert told == "g: goal dock time +15.00 s, 75 % of its limit"
+    text = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
+    assert text == "g: goal dock time +15.00 s, 75 % of its limit"
 
 
 @pytest.mark.parametrize(
-    ("finding", "told"),
+    ("finding", "text"),
     [
         (Finding(Status.PASS, "own", "", "≤ 0.00 m/s", 0.2, "m/s", -0.2), "own +0.20 m/s"),
         (Finding(Status.PASS, "own", "", "≥ 0.10 m", 0.3, "m", 0.4), "own +0.30 m, 300 % of its limit"),
         (Finding(Status.PASS, "own", "", "in the yard", 0.3, "m"), "own +0.30 m"),
         (Finding(Status.PASS, "own", "", "≥ 0.10 m", float("inf"), "m", float("inf")), ""),
     ],
-    ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
+    ids=["limit zero", "at least", "without a measured text", "infinite"],
 )
-def test_margin_is_reported_as_a_share_if_possible(finding, told):
-    assert tightest_margin([verdict(finding, "own", "own")]) == told
+def test_margin_is_reported_as_a_share_if_possible(finding, text):
+    assert tightest_margin([verdict(finding, "own", "own")]) == text
 
 
 def bound(limit, margin, value):
@@ -98,7 +98,7 @@ def bound(limit, margin, value):
     ],
     ids=["of either direction", "met to the bit", "with nothing used of it", "below zero", "of zero"],
 )
-def test_shares_of_a_limit_compare_bounds(tight, loose):
+def test_bounds_are_compared_by_relative_margin(tight, loose):
     for verdicts in ([tight, loose], [loose, tight]):
         assert tightest_margin(verdicts).startswith(tight.id)
 
@@ -167,13 +167,13 @@ def test_the_margin_of_a_failed_run_is_negative_and_at_least_minus_one() -> None
     assert margins(Outcome.ERROR) == -1.0
 
 
-def test_a_margin_without_a_known_limit_counts_as_it_is() -> None:
+def test_margin_without_a_limit_is_not_scaled() -> None:
     assert relative_margin(Finding(Status.PASS, "x", "", "", 0.3, "m")) == 0.3
     assert relative_margin(Finding(Status.PASS, "x", "", "≥ 0 m", 0.3, "m", 0.3)) == 0.3
     assert relative_margin(Finding(Status.PASS, "x", "", "> -2 m", 0.5, "m", -1.5)) == 0.25
 
 
-def test_the_margin_of_a_failed_run_ignores_findings_without_a_finite_one() -> None:
+def test_margin_of_a_failed_run_ignores_infinite_margins() -> None:
     broken = measured(Status.FAIL, 0.3, 0.4)
     assert margins(Outcome.FAILED, replace(broken, margin=math.inf), broken) == pytest.approx(-0.25)
     assert margins(Outcome.FAILED, replace(broken, margin=-math.inf), broken) == pytest.approx(-0.25)

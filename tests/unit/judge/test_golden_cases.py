@@ -15,7 +15,7 @@ CASES = [(file.stem, case) for file in FILES for case in yaml.load(file.read_tex
 
 
 @pytest.mark.parametrize(("kind", "golden"), CASES, ids=[f"{kind}: {case['name']}" for kind, case in CASES])
-def test_a_criterion_answers_as_its_golden_case_says(kind, golden):
+def test_verdict_equals_that_of_the_golden_case(kind, golden):
     entry = AnyCriterion.model_validate(golden["criterion"])
     assert entry.kind == kind
     assert golden["origin"]
@@ -48,7 +48,7 @@ def compare(finding: Finding, wanted: dict) -> None:
 
 
 @pytest.mark.parametrize("kind", AnyCriterion.choices())
-def test_every_criterion_has_a_golden_case_that_passes_and_one_that_does_not(kind):
+def test_every_criterion_has_a_passing_and_a_non_passing_golden_case(kind):
     statuses = {case["expect"]["status"] for name, case in CASES if name == kind}
     assert "pass" in statuses
     assert "fail" in statuses

@@ -1,4 +1,4 @@
-"""Claims about a pass rate, against scipy, exact enumeration, and simulated studies."""
+"""Tests of pass-rate claims against scipy, exact enumeration, and simulated studies."""
 
 import math
 from collections.abc import Sequence
@@ -28,14 +28,14 @@ def results(outcomes: Sequence[bool]) -> list[RunResult]:
 
 @pytest.mark.parametrize("passed", [0, 1, 17, 94, 99, 100])
 @pytest.mark.parametrize("confidence", [0.5, 0.9, 0.95, 0.999])
-def test_clopper_pearson_limits_are_those_of_scipy(passed: int, confidence: float) -> None:
+def test_clopper_pearson_limits_equal_those_of_scipy(passed: int, confidence: float) -> None:
     low = binomtest(passed, 100, alternative="greater").proportion_ci(confidence, "exact").low
     high = binomtest(passed, 100, alternative="less").proportion_ci(confidence, "exact").high
     assert clopper_pearson_limits(passed, 100, confidence) == pytest.approx((low, high), abs=1e-12)
 
 
 @pytest.mark.parametrize(("rate", "confidence", "runs"), [(0.95, 0.95, 59), (0.99, 0.95, 299), (0.9, 0.9, 22)])
-def test_fewest_runs_are_those_of_the_zero_failure_test(rate: float, confidence: float, runs: int) -> None:
+def test_fewest_runs_equal_those_of_the_zero_failure_test(rate: float, confidence: float, runs: int) -> None:
     assert fewest_runs(rate, confidence) == runs
     assert 1 - rate**runs >= confidence > 1 - rate ** (runs - 1)
     fixed = claim(min=rate, confidence=confidence)
@@ -148,7 +148,7 @@ def test_a_crash_of_the_stack_is_a_failure_and_any_other_error_blocks_the_claim(
 
 
 @pytest.mark.parametrize(
-    ("fields", "told"),
+    ("fields", "message"),
     [
         ({"method": "sprt"}, "`sprt` needs a `target`"),
         ({"method": "sprt", "target": 0.9}, "must be greater than `min`"),
@@ -159,18 +159,18 @@ def test_a_crash_of_the_stack_is_a_failure_and_any_other_error_blocks_the_claim(
         ({"confidence": 1.0}, "less than or equal to 0.999999"),
     ],
 )
-def test_contradictory_claims_are_refused(fields: dict[str, object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_contradictory_claims_are_refused(fields: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         claim(**fields)
 
 
-def test_a_limit_that_equals_the_claimed_rate_is_enough_to_hold_and_not_to_refute() -> None:
+def test_limit_equal_to_the_claimed_rate_holds_and_does_not_refute() -> None:
     low, high = clopper_pearson_limits(95, 100, 0.95)
     assert evaluate_claim(claim(min=low, runs=100), results([True] * 95 + [False] * 5)).status is ClaimStatus.HELD
     assert evaluate_claim(claim(min=high, runs=100), results([True] * 95 + [False] * 5)).status is ClaimStatus.UNDECIDED
 
 
-def test_an_anytime_claim_is_refuted_although_the_first_run_passed() -> None:
+def test_anytime_claim_can_be_refuted_if_the_first_run_passed() -> None:
     status = evaluate_claim(claim(method="anytime", runs=400), results([True] + [False] * 30)).status
     assert status is ClaimStatus.REFUTED
 

@@ -49,7 +49,7 @@ TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.N
         ({"recoveries": {"max": 2}}, {Evidence.RECOVERIES}),
     ],
 )
-def test_a_criterion_needs_this_and_no_more(words, wanted):
+def test_criterion_needs_exactly_this_evidence(words, wanted):
     assert required_evidence(AnyCriterion.model_validate(words)) == wanted
 
 
@@ -93,7 +93,7 @@ def test_missing_evidence_removes_exactly_these_metrics(lacking, left_out):
         assert all(found.values[name] == whole.values[name] for name in METRICS if name not in left_out)
 
 
-def test_only_what_decides_a_criterion_makes_its_pass_doubtful():
+def test_only_gaps_in_needed_evidence_prevent_a_pass():
     gaps = LogCoverage(partial={Evidence.CONTACTS: "no contacts before t = 3 s", BELIEF: "no belief after t = 9 s"})
     assert partial_evidence_reason({Evidence.CONTACTS}, gaps) == "no contacts before t = 3 s"
     assert partial_evidence_reason({Evidence.CLEARANCE}, gaps) == ""

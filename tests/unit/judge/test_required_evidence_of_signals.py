@@ -14,7 +14,7 @@ DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-def test_every_signal_says_what_it_needs_and_the_truth_is_its_clock(name):
+def test_every_signal_states_its_evidence_and_uses_the_clock_of_the_truth(name):
     assert Evidence.TRUTH in signal_evidence(name)
 
 
@@ -37,7 +37,7 @@ def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
 
 
 @pytest.mark.parametrize("lacking", Evidence)
-def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
+def test_metric_without_its_evidence_is_none_with_a_reason(lacking):
     measures = compute_metrics(synthetic_trace(DRIVE), synthetic_case({}), LogCoverage({lacking: "no such topic"}))
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)

@@ -1,4 +1,4 @@
-"""result.json to the byte."""
+"""Tests of the exact content of result.json."""
 
 import json
 import math
@@ -23,7 +23,7 @@ FAILED = RunResult(
 )
 
 
-def test_the_file_is_sorted_indented_by_two_and_written_in_plain_letters():
+def test_result_file_is_sorted_and_indented_by_two_with_unescaped_unicode():
     text = to_json(FAILED)
     assert text == json.dumps(result_data(FAILED), sort_keys=True, indent=2, ensure_ascii=False) + "\n"
     assert text.startswith('{\n  "again": "simscen run a.scenario.yaml --seed 7",\n')
@@ -46,36 +46,36 @@ def test_verdicts_without_a_line_have_line_0():
     assert [verdict["line"] for verdict in result_data(FAILED)["verdicts"]] == [0, 0]
 
 
-def test_the_failure_of_a_run_survives_its_file():
+def test_run_failure_is_unchanged_after_writing_and_reading():
     crashed = RunResult(RunKey("a", 7), "a", Outcome.ERROR, error=RunFailure("crashed", "SIGSEGV", "last words"))
     assert result_data(FAILED)["error"] is None
     assert result_data(crashed)["error"] == {"kind": "crashed", "message": "SIGSEGV", "tail": "last words"}
     assert from_json(to_json(crashed)) == crashed
 
 
-def test_a_place_survives_its_file():
+def test_finding_position_is_unchanged_after_writing_and_reading():
     (finding,) = from_json(to_json(FAILED)).verdicts[0].findings
     assert finding == PLACED
 
 
-def test_a_time_that_is_no_number_is_not_written():
+def test_nan_times_are_not_written():
     with pytest.raises(ValueError, match="not JSON compliant"):
         to_json(RunResult(RunKey("a", 7), "a", Outcome.PASSED, simulated=math.nan))
 
 
-def test_lines_are_those_of_the_verdicts_one_each():
+def test_number_of_lines_must_equal_number_of_verdicts():
     with pytest.raises(ValueError, match="shorter"):
         result_data(replace(FAILED, lines=(3,)))
 
 
-def test_keys_are_read_also_from_before_variations_existed():
+def test_keys_of_older_files_without_variations_are_read():
     now = {"scenario": "a", "seed": 3, "variation": "speed=1", "stack_name": "dwb"}
     assert read_key(now) == RunKey("a", 3, "speed=1", "dwb")
     assert read_key({"scenario": "a", "seed": 3, "variation": "dwb"}) == RunKey("a", 3, "", "dwb")
 
 
 @pytest.mark.parametrize("by_stack", [True, False])
-def test_an_error_says_whether_the_stack_is_its_cause(by_stack):
+def test_error_states_whether_the_stack_is_its_cause(by_stack):
     failure = RunFailure("crashed", "gone", "the end", by_stack)
     result = RunResult(RunKey("a", 1), "a", Outcome.ERROR, error=failure)
     assert from_json(to_json(result)).error == failure

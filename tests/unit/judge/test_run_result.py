@@ -16,19 +16,19 @@ TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "event
 
 def conclude(trace, *criteria):
     built, case = synthetic_trace(trace), synthetic_case({})
-    asked = [AnyCriterion.model_validate(words) for words in criteria]
+    entries = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
-    return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
+    return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", entries, built, case, lines)
 
 
-def test_a_result_survives_its_file(tmp_path):
+def test_result_is_unchanged_after_writing_and_reading(tmp_path):
     result = conclude(TRACE, {"clearance": {"min": 0.6}}, {"goals_reached": {}})
     path = tmp_path / "result.json"
     path.write_text(to_json(result), encoding="utf-8")
     assert read_result(path) == result
 
 
-def test_the_file_says_what_happened_in_words_and_numbers():
+def test_result_file_contains_texts_and_numbers_of_findings():
     data = json.loads(to_json(conclude(TRACE, {"clearance": {"min": 0.6}})))
     (verdict,) = data["verdicts"]
     (finding,) = verdict["findings"]
@@ -41,25 +41,25 @@ def test_the_file_says_what_happened_in_words_and_numbers():
     assert finding["margin"] == pytest.approx(-0.1)
 
 
-def test_the_same_run_gives_the_same_bytes():
+def test_equal_runs_give_equal_result_files():
     words = ({"clearance": {"min": 0.2}}, {"collisions": {}}, {"speed": {"max": 1.0}})
     assert to_json(conclude(TRACE, *words)) == to_json(conclude(TRACE, *words))
 
 
-def test_numbers_that_json_lacks_become_null():
+def test_non_finite_numbers_become_null():
     text = to_json(conclude({**TRACE, "clearance": math.inf}, {"clearance": {"min": 0.2}}))
     assert "Infinity" not in text
     assert json.loads(text)["verdicts"][0]["findings"][0]["margin"] is None
 
 
-def test_a_broken_signal_makes_the_run_an_error_even_when_no_criterion_looks_at_it():
+def test_nan_in_an_unused_signal_makes_the_run_an_error():
     result = conclude({**TRACE, "truth": [[0, 0, 0], [2, math.nan, 0]]}, {"collisions": {}})
     assert result.outcome is Outcome.ERROR
     assert "not finite" in result.error.message
 
 
 @pytest.mark.parametrize("broken", [math.nan, -math.inf])
-def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(broken):
+def test_invalid_clearance_makes_the_run_an_error_without_a_criterion(broken):
     result = conclude({**TRACE, "clearance": [[0, 0.5], [2, broken], [4, 0.5]]}, {"collisions": {}})
     assert result.outcome is Outcome.ERROR
     assert "the clearance is not a number at t = " in result.error.message
@@ -67,7 +67,7 @@ def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(brok
 
 @pytest.mark.parametrize("signal", ["truth", "velocity", "belief", "command"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, value):
+def test_nan_in_one_sample_makes_the_run_an_error_for_any_criteria(signal, value):
     trace = synthetic_trace(TRACE)
     getattr(trace, signal).values[2, 1] = value
     criteria = [AnyCriterion.model_validate({"collisions": {}})]
@@ -80,7 +80,7 @@ def test_object_without_pose_makes_the_run_an_error():
     assert "the pose of cart is not finite" in result.error.message
 
 
-def test_free_space_without_end_is_no_error_and_its_metric_is_the_range():
+def test_infinite_clearance_is_valid_and_its_metric_is_the_maximum_range():
     result = conclude({**TRACE, "clearance": math.inf}, {"collisions": {}})
     assert result.outcome is Outcome.PASSED
     assert result.metrics["min_clearance"] == 2.0
@@ -92,7 +92,7 @@ def test_events_are_counted_in_the_order_of_their_names():
     assert list(counted.items()) == [("goal.accepted", 1), ("plan.made", 2), ("run.ended", 1)]
 
 
-def test_an_error_says_which_criteria_broke_and_how(monkeypatch):
+def test_error_names_the_criteria_with_exceptions(monkeypatch):
     monkeypatch.setattr(Clearance, "judge", lambda *_: 1 / 0)
     criteria = [{"clearance": {"min": 0.1}}, {"collisions": {}}]
     assert conclude(TRACE, *criteria).error.message == "clearance: ZeroDivisionError: division by zero"
@@ -100,7 +100,7 @@ def test_an_error_says_which_criteria_broke_and_how(monkeypatch):
     assert broken.error.message == "clearance: ZeroDivisionError: division by zero"
 
 
-def test_a_run_that_nothing_judged_is_an_error():
+def test_run_without_criteria_is_an_error():
     assert conclude(TRACE).error.message == "no criterion judged this run"
     assert conclude(TRACE, {"collisions": {}}).error is None
 
@@ -113,12 +113,12 @@ def test_other_content_is_refused(text):
 
 def expecting(trace, *criteria, lines=(10,)):
     built, case = synthetic_trace(trace), synthetic_case({})
-    asked = [AnyCriterion.model_validate(words) for words in criteria]
+    entries = [AnyCriterion.model_validate(words) for words in criteria]
     expected = ExpectedFailure("NAV-1", (), 30)
-    return judge_run(RunKey("a/b", 7), "a/b.scenario.yaml", asked, built, case, lines, expected=expected)
+    return judge_run(RunKey("a/b", 7), "a/b.scenario.yaml", entries, built, case, lines, expected=expected)
 
 
-def test_the_verdict_on_an_expected_failure_is_the_last_one_with_its_own_line():
+def test_verdict_on_an_expected_failure_is_last_and_has_its_line():
     result = expecting(TRACE, {"clearance": {"min": 0.6}})
     assert result.outcome is Outcome.FAILED_AS_EXPECTED
     assert [verdict.criterion for verdict in result.verdicts] == ["clearance", "expected"]
@@ -128,11 +128,11 @@ def test_the_verdict_on_an_expected_failure_is_the_last_one_with_its_own_line():
     assert (held.outcome, held.lines) == (Outcome.FAILED, (10, 30))
 
 
-def test_without_lines_an_expected_failure_has_none_either():
+def test_expected_failure_has_no_line_without_lines_of_criteria():
     assert expecting(TRACE, {"clearance": {"min": 0.6}}, lines=()).lines == ()
 
 
-def test_nothing_is_expected_of_a_log_that_breaks_off_or_without_an_expectation():
+def test_truncated_logs_and_runs_without_expectation_have_no_such_verdict():
     broken = expecting({**TRACE, "ended": None}, {"clearance": {"min": 0.6}})
     assert [verdict.criterion for verdict in broken.verdicts] == ["clearance"]
     assert broken.lines == (10,)

@@ -1,4 +1,4 @@
-"""The combined result of several robots."""
+"""Tests of the combined result of several robots."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ def disturbance(name: str, kind: str, happened: bool = True) -> DisturbanceOutco
 TRACES = {"a": trace(), "b": trace()}
 
 
-def test_verdicts_metrics_and_reasons_have_the_name_of_their_robot() -> None:
+def test_verdicts_metrics_and_reasons_contain_the_robot_name() -> None:
     results = {
         "a": result(verdicts=(verdict("clearance"),), lines=(4,), metrics={"success": 1.0, "collisions": 0.0}),
         "b": result(
@@ -52,7 +52,7 @@ def test_verdicts_metrics_and_reasons_have_the_name_of_their_robot() -> None:
     assert (whole.outcome, whole.error, whole.reason) == (Outcome.PASSED, None, "")
 
 
-def test_without_lines_there_are_none() -> None:
+def test_combined_result_has_no_lines_if_a_robot_has_none() -> None:
     results = {"a": result(verdicts=(verdict("clearance"),)), "b": result(verdicts=(verdict("speed"),))}
     assert combine_robots(results, TRACES).lines == ()
     first_only = {"a": result(verdicts=(verdict("clearance"),), lines=(4,)), "b": results["b"]}
@@ -104,7 +104,7 @@ def test_a_missing_event_of_the_world_is_reported_once_and_a_fault_for_its_robot
     assert [one.disturbance.name for one in whole.disturbances] == ["cart", "b/lidar.off"]
 
 
-def test_events_of_the_world_count_once_and_those_of_robots_each() -> None:
+def test_world_events_count_once_and_robot_events_for_each_robot() -> None:
     shared = [[1, "object.moved", "cart", {}], [1, "object.spawned", "b", {}]]
     traces = {
         "a": trace(*shared, [2, "plan.made", "", {}]),
@@ -126,7 +126,7 @@ def test_an_expected_failure_is_judged_over_all_robots() -> None:
     assert (held.verdicts[-1].criterion, held.lines[-1]) == ("expected", 12)
 
 
-def test_a_failure_is_only_expected_if_the_logs_of_all_robots_are_whole() -> None:
+def test_failure_is_expected_only_if_all_logs_are_complete() -> None:
     bad = result(Outcome.FAILED, verdicts=(verdict("clearance", Status.FAIL),), lines=(4,))
     good = result(verdicts=(verdict("clearance"),), lines=(5,))
     broken = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 1, 0]], "ended": None})
@@ -139,7 +139,7 @@ def test_a_failure_is_only_expected_if_the_logs_of_all_robots_are_whole() -> Non
     assert cut.lines == (4, 5)
 
 
-def test_a_result_with_another_number_of_lines_than_verdicts_is_refused() -> None:
+def test_different_numbers_of_lines_and_verdicts_are_refused() -> None:
     broken = result(verdicts=(verdict("clearance"), verdict("speed")), lines=(4,))
     with pytest.raises(ValueError, match="shorter"):
         combine_robots({"a": broken, "b": result()}, TRACES)

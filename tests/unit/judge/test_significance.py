@@ -1,4 +1,4 @@
-"""Significant changes, against scipy and the definition of Holm's correction."""
+"""Tests of significant changes, against scipy and the definition of Holm's correction."""
 
 import pytest
 from scipy.stats import binomtest, wilcoxon
@@ -53,7 +53,7 @@ def test_a_change_has_the_means_of_its_pairs_and_a_direction() -> None:
         assert change.is_worse is is_worse
 
 
-def test_p_values_are_corrected_for_the_tests_that_can_find_something() -> None:
+def test_p_values_are_corrected_for_tests_that_can_be_significant() -> None:
     equal = sample([(1.0, 1.0)] * 20)
     half_equal = sample([(10.0, 10.0)] * 5 + SLOWER)
     found = significant_changes([sample(SLOWER), equal, half_equal], Significance())
@@ -62,7 +62,7 @@ def test_p_values_are_corrected_for_the_tests_that_can_find_something() -> None:
     assert not significant_changes([sample(SLOWER), *crowd], Significance())  # 7 tests: 0.055
 
 
-def test_alpha_and_the_smallest_effect_are_limits_that_count_themselves() -> None:
+def test_alpha_and_smallest_effect_are_inclusive_limits() -> None:
     p, effect = 2 / 2**8, (12.5 - 10.35) / 10.35
     assert significant_changes([sample(SLOWER)], Significance(alpha=p, min_effect=0.0))
     assert not significant_changes([sample(SLOWER)], Significance(alpha=p * 0.999, min_effect=0.0))

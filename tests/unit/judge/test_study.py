@@ -1,4 +1,4 @@
-"""Evaluation of studies, against scipy and counting by hand."""
+"""Tests of the evaluation of studies, against scipy and counting by hand."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -44,7 +44,7 @@ def test_a_crash_of_the_stack_counts_as_a_failure_and_any_other_error_does_not_c
     assert (study.scenario, study.passed, study.failed, study.errors) == ("s", 2, 2, 1)
 
 
-def test_limits_of_a_fixed_number_of_runs_are_those_of_wilson() -> None:
+def test_limits_of_a_fixed_number_of_runs_equal_those_of_wilson() -> None:
     study = evaluate_study(plan_of([]), [run(seed, seed > 3) for seed in range(1, 21)])
     interval = stats.binomtest(17, 20).proportion_ci(0.95, "wilson")
     assert study.limits == pytest.approx((interval.low, interval.high), abs=1e-6)
@@ -59,13 +59,13 @@ def test_limits_of_a_fixed_number_of_runs_are_those_of_wilson() -> None:
         {"claim": PassRate(min=0.5), "stops_early": True},
     ],
 )
-def test_limits_of_a_study_that_may_stop_early_hold_whenever_it_stops(fields: Any) -> None:
+def test_study_that_may_stop_early_has_anytime_valid_limits(fields: Any) -> None:
     study = evaluate_study(plan_of([{"x": 1}] * 20, **fields), [run(seed, seed > 3) for seed in range(1, 21)])
     assert study.limits == anytime_limits(17, 20, 0.95)
     assert [row.limits for row in study.rates] == [None]
 
 
-def test_runs_that_are_not_random_have_no_limits() -> None:
+def test_runs_without_random_sampling_have_no_limits() -> None:
     study = evaluate_study(plan_of([{"x": 1}], is_random=False), [run(1)])
     assert study.limits is None
     assert study.rates == (RateRow("x", "1", 1, 1, None),)
@@ -107,7 +107,7 @@ def test_the_worst_margin_of_each_criterion_is_the_smallest_of_all_runs_and_find
     ]
 
 
-def test_rates_by_value_are_in_the_order_of_the_numbers() -> None:
+def test_rates_by_value_are_sorted_numerically() -> None:
     values = ["5 cm", "1 m", 0.2, "5 cm", "wide", None, "1 m", 0.2]
     study = study_of("gap", values, [-1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
     assert [(row.path, row.value, row.passed, row.runs) for row in study.rates] == [
@@ -121,7 +121,7 @@ def test_rates_by_value_are_in_the_order_of_the_numbers() -> None:
     assert study.rates[0].limits == pytest.approx((interval.low, interval.high), abs=1e-6)
 
 
-def test_ten_different_values_are_listed_and_more_are_divided_into_four_ranges() -> None:
+def test_more_than_ten_values_are_grouped_into_four_ranges() -> None:
     ten = study_of("gap", [0.1 * k for k in range(10)], [1.0] * 10)
     assert len(ten.rates) == 10
     values = [f"{k * 1.0001} cm" for k in range(11, 0, -1)]
@@ -145,7 +145,7 @@ def test_ten_different_values_are_listed_and_more_are_divided_into_four_ranges()
     assert [row.value for row in mixed.rates] == [*map(str, range(10)), "wide"]
 
 
-def test_rates_are_in_the_order_of_the_names_of_the_parameters() -> None:
+def test_rates_are_sorted_by_parameter_name() -> None:
     names = [f"events.{name}.at" for name in "hgfedcba"]
     study = evaluate_study(plan_of([dict.fromkeys(names, 1)]), [run(1)])
     assert [row.path for row in study.rates] == sorted(names)
@@ -163,11 +163,11 @@ def test_rates_are_in_the_order_of_the_names_of_the_parameters() -> None:
         ({"x": 1, "y": [True, None]}, "x: 1, y: true, unchanged"),
     ],
 )
-def test_values_in_one_line(value: Any, text: str) -> None:
+def test_values_are_formatted_in_one_line(value: Any, text: str) -> None:
     assert value_text(value) == text
 
 
-def test_the_effect_of_a_number_is_the_rank_correlation_of_scipy() -> None:
+def test_effect_of_a_number_equals_the_rank_correlation_of_scipy() -> None:
     rng = np.random.default_rng(1)
     gaps = rng.uniform(0.1, 2.0, 30)
     margins = (gaps**3 + rng.normal(0.0, 1.0, 30)).tolist()
@@ -222,7 +222,7 @@ def test_effects_are_corrected_for_their_number_and_the_strongest_is_first() -> 
     ],
     ids=["seven runs", "one value", "one margin", "a value for every two runs"],
 )
-def test_no_effect_without_enough_runs_and_differences(values: Sequence[Any], margins: Sequence[float]) -> None:
+def test_effect_needs_enough_runs_and_differences(values: Sequence[Any], margins: Sequence[float]) -> None:
     assert study_of("x", list(values), [float(margin) for margin in margins]).effects == ()
 
 
@@ -255,7 +255,7 @@ def test_coverage_is_the_share_of_pairs_of_values_that_occurred() -> None:
     assert evaluate_study(one, [run(1), run(2)]).coverage is None
 
 
-def test_the_share_of_accepted_draws_and_the_values_of_the_runs_that_were_made() -> None:
+def test_study_has_the_share_of_accepted_draws_and_values_of_finished_runs() -> None:
     values = [{"a": 1}, {"a": 2}, {"a": 3}]
     study = evaluate_study(plan_of(values, drawn=8), [run(1), run(2)])
     assert study.accepted == 0.25
@@ -263,7 +263,7 @@ def test_the_share_of_accepted_draws_and_the_values_of_the_runs_that_were_made()
     assert evaluate_study(plan_of(values), [run(1)]).accepted is None
 
 
-def test_the_study_as_plain_data() -> None:
+def test_study_is_converted_to_plain_data() -> None:
     claim = PassRate(min=0.5, confidence=0.9, method="sprt", target=0.8, runs=30)
     runs = [run(seed, seed != 3, {"clearance": [0.1 * seed]}) for seed in range(1, 9)]
     values = [{"gap": float(seed), "floor": "oak" if seed < 5 else "ash"} for seed in range(1, 9)]

@@ -1,4 +1,4 @@
-"""Runs whose samples are uneven, sparse or missing, as in the logs of real robots and in damaged logs."""
+"""Tests of runs with uneven, sparse, or missing samples, as in logs of real robots and damaged logs."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ RATE = 240
 
 
 def drive(times, speeds, clearance=0.5):
-    """A run along x, sampled at these times (s) with these speeds."""
+    """Return a run along x, sampled at these times (s) with these speeds."""
     ticks = np.round(np.array(times) * RATE).astype(np.int64)
     speeds = np.array(speeds, dtype=np.float64)
     trace = synthetic_trace({"seconds": float(times[-1]), "truth": [[0, 0, 0]]})
@@ -41,8 +41,8 @@ def result(trace, *criteria, coverage=FOREIGN):
     return judge_run(RunKey("a", 7), "a", entries, trace, synthetic_case({}), coverage=coverage)
 
 
-def wobble(times):
-    """A drive of 4 s that speeds up, wobbles at 1 Hz and slows down."""
+def oscillating(times):
+    """Return speeds that rise and fall in 4 s and oscillate at 1 Hz."""
     t = np.array(times)
     return 0.5 * np.sin(np.pi * t / 4) * (1 + 0.2 * np.sin(2 * np.pi * t))
 
@@ -60,20 +60,20 @@ EVEN = np.arange(0, 4.0001, 1 / 40)
     ],
     ids=["a late second sample", "lost samples", "jitter", "30 Hz"],
 )
-def test_sparc_and_ldlj_do_not_depend_on_how_even_the_samples_are(times):
-    even, uneven = (result(drive(each, wobble(each)), {"collisions": {}}).metrics for each in (EVEN, times))
+def test_smoothness_does_not_depend_on_the_spacing_of_samples(times):
+    even, uneven = (result(drive(each, oscillating(each)), {"collisions": {}}).metrics for each in (EVEN, times))
     assert uneven["sparc"] == pytest.approx(even["sparc"], abs=0.03)
     assert uneven["mean_jerk"] == pytest.approx(even["mean_jerk"], rel=0.5)
     bound = {"smoothness": {"min_sparc": even["sparc"] + 0.1}}
-    assert result(drive(times, wobble(times)), bound).verdicts[0].status is Status.FAIL
+    assert result(drive(times, oscillating(times)), bound).verdicts[0].status is Status.FAIL
 
 
-def test_a_first_gap_of_a_quarter_second_does_not_make_a_drive_smooth():
+def test_initial_gap_of_a_quarter_second_does_not_hide_oscillation():
     times = np.concatenate(([0.0], EVEN[11:]))
-    rough = drive(times, wobble(times))
+    rough = drive(times, oscillating(times))
     found = result(rough, {"smoothness": {"min_sparc": -2}})
     assert found.verdicts[0].status is not Status.PASS
-    assert sparc(wobble(times), 1 / 0.275) > -2, "what the rate of the first gap would give"
+    assert sparc(oscillating(times), 1 / 0.275) > -2, "the value at the rate of the first gap"
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -82,9 +82,9 @@ def test_smoothness_of_a_few_samples_is_never_an_error(count):
     assert found.verdicts[0].status is not Status.ERROR
 
 
-def test_smoothness_is_not_judged_by_too_rare_samples():
+def test_smoothness_is_inconclusive_with_sparse_samples():
     times = np.arange(0, 4.0001, 0.1)
-    found = result(drive(times, wobble(times)), {"smoothness": {"min_sparc": -9}})
+    found = result(drive(times, oscillating(times)), {"smoothness": {"min_sparc": -9}})
     (finding,) = found.verdicts[0].findings
     assert finding.status is Status.INCONCLUSIVE
     assert finding.measured == "the truth has 10.0 samples a second, too few for changes up to 10 Hz"
@@ -101,11 +101,11 @@ def test_criteria_judge_uneven_samples(name):
         "whenever": {"whenever": slow, "then": {"eventually": {"signal": "speed", "op": "<=", "value": 0.7}}},
     }[name]
     times = np.delete(np.arange(0, 4.0001, 1 / 30), [7, 50])
-    found = result(drive(times, wobble(times)), written)
+    found = result(drive(times, oscillating(times)), written)
     assert found.outcome is Outcome.PASSED, found
 
 
-def test_a_window_is_one_of_time_not_of_samples():
+def test_time_windows_do_not_depend_on_sample_counts():
     """Of the samples at 0, 0.1, 0.2, 1.0 and 1.1 s, the fourth is 1 s ahead and not 0.3 s."""
     times = [0, 0.1, 0.2, 1.0, 1.1]
     trace = drive(times, [0.1, 0.1, 0.1, 0.9, 0.1])
@@ -115,16 +115,16 @@ def test_a_window_is_one_of_time_not_of_samples():
         assert verdict.status is status
 
 
-def test_a_metric_that_no_one_asked_for_does_not_break_a_run():
+def test_unused_undefined_metric_is_no_error():
     times = np.delete(EVEN, range(20, 50))
-    found = result(drive(times, wobble(times)), {"speed": {"max": 1.0}})
+    found = result(drive(times, oscillating(times)), {"speed": {"max": 1.0}})
     assert found.outcome is Outcome.PASSED
     assert found.undefined["mean_jerk"].startswith("the truth has no sample from t = 0.47 s to 1.25 s")
     assert found.metrics["max_speed"] is not None
 
 
-def test_a_belief_that_is_not_finite_breaks_only_what_needs_it_in_the_log_of_another_recorder():
-    trace = drive(EVEN, wobble(EVEN))
+def test_non_finite_belief_in_a_third_party_log_affects_only_its_criteria():
+    trace = drive(EVEN, oscillating(EVEN))
     belief = np.full((1, 9), np.nan)
     trace = replace(trace, belief=Samples(np.array([5]), belief))
     assert result(trace, {"speed": {"max": 1.0}}).outcome is Outcome.PASSED
@@ -143,7 +143,7 @@ CUTS = {
 @pytest.mark.parametrize("coverage", [COMPLETE_COVERAGE, FOREIGN], ids=["own", "foreign"])
 @pytest.mark.parametrize("signal", ["truth", "clearance"])
 def test_partial_coverage_does_not_pass(cut, coverage, signal):
-    trace = drive(EVEN, wobble(EVEN))
+    trace = drive(EVEN, oscillating(EVEN))
     kept = CUTS[cut](EVEN)
     names = ("truth", "velocity") if signal == "truth" else ("clearance",)
     parts = {name: Samples(getattr(trace, name).ticks[kept], getattr(trace, name).values[kept]) for name in names}
@@ -160,11 +160,11 @@ def test_partial_coverage_does_not_pass(cut, coverage, signal):
 
 def test_gaps_are_named_by_evidence():
     trace = drive([0.0, 1.0, 2.5], [0.0, 0.0, 0.0])
-    told = "has no sample from t = 1.00 s to 2.50 s"
+    gap = "has no sample from t = 1.00 s to 2.50 s"
     assert time_gaps(trace) == {
-        Evidence.TRUTH: f"the truth {told}",
-        Evidence.VELOCITY: f"the truth {told}",
-        Evidence.CLEARANCE: f"the clearance {told}",
+        Evidence.TRUTH: f"the truth {gap}",
+        Evidence.VELOCITY: f"the truth {gap}",
+        Evidence.CLEARANCE: f"the clearance {gap}",
     }
     assert time_gaps(drive([0.0, 1.0, 2.0], [0.0, 0.0, 0.0])) == {}
     assert time_gaps(replace(trace, truth=Samples(np.empty(0, dtype=np.int64), np.empty((0, 3))))).keys() == {
@@ -174,7 +174,7 @@ def test_gaps_are_named_by_evidence():
 
 @pytest.mark.parametrize("signal", ["truth", "clearance", "belief"])
 @pytest.mark.parametrize("order", [[0, 2, 1, 3], [0, 1, 1, 3]])
-def test_a_log_of_simscen_whose_samples_do_not_rise_is_an_error(signal, order):
+def test_unsorted_samples_in_a_simscen_log_are_an_error(signal, order):
     trace = drive(EVEN[:4], [0.0] * 4)
     trace = replace(trace, belief=Samples(trace.truth.ticks, np.zeros((4, 9))))
     check_recorded_signals(trace)

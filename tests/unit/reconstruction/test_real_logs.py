@@ -46,7 +46,7 @@ def messages(with_map=True, with_goal=True, idle=0.0):
     said = []
 
     def add(topic, time, message):
-        said.append(logs.Said(topic, logs.BEGIN + round((time + idle) * logs.SECOND) + 5_000_000, message))
+        said.append(logs.Message(topic, logs.BEGIN + round((time + idle) * logs.SECOND) + 5_000_000, message))
 
     def stamp(time):
         return logs.BEGIN + round((time + idle) * logs.SECOND)
@@ -202,10 +202,10 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
     said = messages(with_goal=False)
     end = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
     plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[end, end])
-    said.append(logs.Said("/plan", logs.BEGIN + 100_000_000, plan))
+    said.append(logs.Message("/plan", logs.BEGIN + 100_000_000, plan))
     for time, status in ((0.1, 2), (11.0, 4)):
         at = logs.BEGIN + round(time * logs.SECOND)
-        said.append(logs.Said("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
+        said.append(logs.Message("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
     drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)), DriveOptions())
     (only,) = drive.goals
     assert math.dist(only.pose[:2], GOAL) < 0.01

@@ -49,7 +49,7 @@ gaps = st.lists(st.integers(1, 300), min_size=MOST, max_size=MOST)
 
 
 def spread(run: list[Moment], apart: list[int]) -> list[Moment]:
-    """The same moments, so many ticks apart, with events that happened by then."""
+    """Return the moments with these intervals in ticks, with the times of their events adapted."""
     return [_at(moment, tick) for moment, tick in zip(run, np.cumsum(apart).tolist(), strict=False)]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import Said, write_mcap
+from foreign_logs import Message, write_mcap
 
 from simscen.core.errors import InvalidInput
 from simscen.record.foreign.options import ForeignLogOptions
@@ -19,21 +19,21 @@ MOCAP = ForeignLogOptions(truth="/mocap")
 
 @pytest.fixture
 def read(tmp_path: Path) -> Callable[..., ForeignLog]:
-    """Writes messages as an MCAP file and reads it."""
+    """Return a function that writes messages to an MCAP file and reads it."""
 
-    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> ForeignLog:
-        return read_foreign_log(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
+    def call(messages: list[Message], settings: ForeignLogOptions = MOCAP, **options: Any) -> ForeignLog:
+        return read_foreign_log(write_mcap(tmp_path / "a.mcap", messages, **options), settings)
 
     return call
 
 
 @pytest.fixture
 def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
-    """Why a log cannot be used."""
+    """Return a function that returns the reason why a log cannot be used."""
 
-    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> str:
+    def call(messages: list[Message], settings: ForeignLogOptions = MOCAP, **options: Any) -> str:
         with pytest.raises(InvalidInput) as raised:
-            read(said, wanted, **options)
+            read(messages, settings, **options)
         (problem,) = raised.value.problems
         return f"{problem.code} {problem.message} ({problem.hint})"
 

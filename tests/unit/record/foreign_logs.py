@@ -1,4 +1,4 @@
-"""Logs of a robot that simscen never met, written by rosbags and mcap from rosbags' own message definitions."""
+"""Third-party logs of a robot, written by rosbags and mcap with the message definitions of rosbags."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -21,28 +21,28 @@ SPEED = 0.5
 
 
 @dataclass(frozen=True)
-class Said:
-    """A message: its topic, when it was logged (ns) and what it is; its own stamp is in there."""
+class Message:
+    """Message with its topic and the time of logging (ns)."""
 
     topic: str
     time: int
     message: Any
 
 
-def drive(seconds: float = 10.0, begin: int = BEGIN, off: float = 0.05, mocap: str = "map") -> list[Said]:
-    """A robot that drives along x at 0.5 m/s and believes itself `off` meters further; /mocap knows better."""
-    said = []
+def drive(seconds: float = 10.0, begin: int = BEGIN, off: float = 0.05, mocap: str = "map") -> list[Message]:
+    """Return the log of a robot driving along x at 0.5 m/s, its estimate `off` m ahead of the true pose on /mocap."""
+    messages = []
     for k in range(round(seconds * 20) + 1):
         t = k / 20
         stamp = begin + round(t * SECOND)
         pose = stamped_pose(stamp, mocap, SPEED * t)
-        said.append(Said("/mocap", stamp + LATENCY, pose))
-        said.append(Said("/odom", stamp + LATENCY, odometry(stamp, "odom", SPEED * t, SPEED)))
-        said.append(Said("/cmd_vel", stamp + LATENCY, twist(SPEED)))
+        messages.append(Message("/mocap", stamp + LATENCY, pose))
+        messages.append(Message("/odom", stamp + LATENCY, odometry(stamp, "odom", SPEED * t, SPEED)))
+        messages.append(Message("/cmd_vel", stamp + LATENCY, twist(SPEED)))
         if k % 10 == 0:
-            said.append(Said("/amcl_pose", stamp + 5 * LATENCY, believed(stamp, SPEED * t + off)))
-            said.append(Said("/scan", stamp + LATENCY, scan(stamp)))
-    return said
+            messages.append(Message("/amcl_pose", stamp + 5 * LATENCY, believed(stamp, SPEED * t + off)))
+            messages.append(Message("/scan", stamp + LATENCY, scan(stamp)))
+    return messages
 
 
 def stamp_of(time: int) -> Any:
@@ -122,15 +122,15 @@ def statuses(*goals: tuple[int, int, int]) -> Any:
 
 
 def write_bag(
-    folder: Path, said: Iterable[Said], plugin: StoragePlugin = StoragePlugin.SQLITE3, compress: str = ""
+    folder: Path, messages: Iterable[Message], plugin: StoragePlugin = StoragePlugin.SQLITE3, compress: str = ""
 ) -> Path:
-    """A rosbag2 as rosbags writes it; `compress` is file or message."""
+    """Write a rosbag2 with rosbags; `compress` is file or message."""
     writer = Writer(folder, version=9, storage_plugin=plugin)
     if compress:
         writer.set_compression(CompressionMode[compress.upper()], CompressionFormat.ZSTD)
     with writer:
         connections: dict[str, Any] = {}
-        for one in said:
+        for one in messages:
             kind = one.message.__msgtype__
             if one.topic not in connections:
                 connections[one.topic] = writer.add_connection(one.topic, kind, typestore=STORE)
@@ -140,18 +140,18 @@ def write_bag(
 
 def write_mcap(
     file: Path,
-    said: Iterable[Said],
+    messages: Iterable[Message],
     profile: str = "ros2",
     encoding: str = "cdr",
     change: Callable[[bytes], bytes] = bytes,
     **options: Any,
 ) -> Path:
-    """An MCAP file as the mcap library writes it; `change` is done to the bytes of each message."""
+    """Write an MCAP file with the mcap library; `change` modifies the bytes of each message."""
     with file.open("wb") as stream:
         writer = McapWriter(stream, **options)
-        writer.start(profile, "somebody")
+        writer.start(profile, "other recorder")
         channels: dict[str, int] = {}
-        for number, one in enumerate(said):
+        for number, one in enumerate(messages):
             kind = one.message.__msgtype__
             if one.topic not in channels:
                 definition, _ = STORE.generate_msgdef(kind, ros_version=2)

@@ -1,4 +1,4 @@
-"""A made-up run that has everything a log can hold."""
+"""Synthetic run with everything that a log can contain."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,7 @@ CASE = Case(
 )
 
 
-def about(seed: int = 7) -> LogHeader:
+def sample_header(seed: int = 7) -> LogHeader:
     cells = np.random.default_rng(seed).integers(-1, 101, size=(30, 40), dtype=np.int8)
     return LogHeader(
         name="navigation/goal",
@@ -45,7 +45,7 @@ def about(seed: int = 7) -> LogHeader:
 def moments(
     seconds: float = 2.0, seed: int = 0, particles: int = 500, beams: int = 360, extras: bool = True
 ) -> Iterator[Moment]:
-    """Truth, odometry and imu at 40 Hz, commands at 20 Hz, scans and beliefs at 10 Hz, events now and then."""
+    """Yield truth, odometry, and IMU at 40 Hz, commands at 20 Hz, scans and beliefs at 10 Hz, and some events."""
     rng = np.random.default_rng(seed)
     for tick in range(0, CLOCK.ticks(seconds) + 1, 6):
         x, y, yaw, z = rng.normal(size=4).tolist()

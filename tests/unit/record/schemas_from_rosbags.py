@@ -1,4 +1,4 @@
-"""Writes simscen/record/schemas.json anew: `python tests/unit/record/schemas_from_rosbags.py`.
+"""Regenerate simscen/record/schemas.json: `python tests/unit/record/schemas_from_rosbags.py`.
 
 The texts and hashes are those of ROS 2 Humble as rosbags knows them, so that running simscen needs neither ROS nor
 rosbags.
@@ -41,7 +41,7 @@ NAV2 = {
 
 
 def humble() -> Typestore:
-    """ROS 2 Humble's message types and those of nav2_msgs that we write."""
+    """Return a type store with the messages of ROS 2 Humble and those of nav2_msgs that simscen writes."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     for name, text in NAV2.items():
         store.register(get_types_from_msg(text, name))
@@ -49,7 +49,7 @@ def humble() -> Typestore:
 
 
 def expected() -> dict[str, dict[str, str]]:
-    """What schemas.json should hold."""
+    """Return the expected content of schemas.json."""
     store = humble()
     return {
         name: {"hash": store.hash_rihs01(name), "definition": store.generate_msgdef(name, ros_version=2)[0]}

@@ -15,7 +15,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
-from moments import CASE, CLOCK, about, moments
+from moments import CASE, CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
@@ -29,9 +29,9 @@ HERE = Path(__file__).parent
 
 
 def recorded(path: Path, seconds: float) -> Trace:
-    """A whole log, and the trace of its moments."""
+    """Write a complete log, and return the trace of its moments."""
     builder, end = TraceBuilder(CLOCK), CLOCK.ticks(seconds)
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(seconds):
             recorder.append(moment)
             builder.append(moment)
@@ -47,14 +47,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def killed(folder: Path, seconds: float) -> Path:
-    """The log of a process that a SIGKILL ended after so many simulated seconds."""
+    """Return the log of a process killed by SIGKILL after this simulated time."""
     code = f"""if True:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
-        from moments import CLOCK, about, moments
+        from moments import CLOCK, sample_header, moments
         from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer
         from simscen.record.recorder import Recorder
-        recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
+        recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, sample_header())
         log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
         for moment in moments({seconds}):
             log.append(moment)
@@ -110,15 +110,15 @@ def test_file_of_another_type_is_reported(
     assert problem(path) == expected
 
 
-def test_a_file_of_two_logs_is_refused(tmp_path: Path, log: Path) -> None:
+def test_concatenated_logs_are_refused(tmp_path: Path, log: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(2 * log.read_bytes())
-    told = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
-    assert problem(path) == told
+    message = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
+    assert problem(path) == message
 
 
 def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
-    """A bag with one chunk, which holds one message."""
+    """Write a log with one chunk that contains one message."""
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression)
         writer.start("ros2", "rosbag2")
@@ -157,7 +157,7 @@ def test_log_of_another_recorder_is_reported(tmp_path: Path) -> None:
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1), bit=st.integers(0, 7))
-def test_a_flipped_bit_is_noticed(tmp_path: Path, log: Path, place: float, bit: int) -> None:
+def test_flipped_bit_is_detected(tmp_path: Path, log: Path, place: float, bit: int) -> None:
     data = bytearray(log.read_bytes())
     (summary,) = struct.unpack_from("<Q", data, len(data) - 28)  # the index after it is not read
     data[int(place * (summary - 1))] ^= 1 << bit
@@ -168,7 +168,7 @@ def test_a_flipped_bit_is_noticed(tmp_path: Path, log: Path, place: float, bit: 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(kept=st.floats(0, 1))
-def test_a_log_cut_anywhere_is_read_as_far_as_it_goes_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
+def test_truncated_log_is_read_up_to_its_end_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
     data = log.read_bytes()
     path = tmp_path / "cut.partial.mcap"
     path.write_bytes(data[: int(kept * len(data))])

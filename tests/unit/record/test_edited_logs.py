@@ -9,7 +9,7 @@ import pytest
 from mcap import records
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from moments import CLOCK, about, moments
+from moments import CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry.kinematics import Twist
@@ -41,7 +41,7 @@ CRITERIA = [
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "run.mcap"
     end = CLOCK.ticks(SECONDS)
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(SECONDS, beams=8, particles=4):
             recorder.append(moment)
         ended = Event(end, EventKind.RUN_ENDED, "time limit")
@@ -51,16 +51,16 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def edited(log: Path, path: Path, keep: Keep = lambda *_: True, counts: bool = True, backwards: bool = False) -> Path:
-    """A copy, written by the mcap library, with the messages to keep (by topic and seconds)."""
+    """Write a copy with the mcap library that contains only the messages to keep (by topic and seconds)."""
     with log.open("rb") as source, path.open("wb") as target:
         reader, writer = make_reader(source), Writer(target)
         summary = reader.get_summary()
         assert summary is not None
-        writer.start("ros2", "somebody")
+        writer.start("ros2", "other recorder")
         schemas = {one.id: writer.register_schema(one.name, one.encoding, one.data) for one in summary.schemas.values()}
         notes = list(reader.iter_metadata())
-        (about_run,) = [note for note in notes if note.name == "simscen"]
-        writer.add_metadata(about_run.name, about_run.metadata)
+        (run_record,) = [note for note in notes if note.name == "simscen"]
+        writer.add_metadata(run_record.name, run_record.metadata)
         for file in reader.iter_attachments():
             writer.add_attachment(0, 0, file.name, file.media_type, file.data)
         channels: dict[str, int] = {}
@@ -88,7 +88,7 @@ def judged(read: Log):
     return judge_run(RunKey("a", 7), "a", entries, read.trace, read.header.case, coverage=read.coverage)
 
 
-def test_a_log_that_was_only_copied_passes(log: Path, tmp_path: Path) -> None:
+def test_copied_log_passes(log: Path, tmp_path: Path) -> None:
     for read in (read_log(log), read_log(edited(log, tmp_path / "copy.mcap"))):
         assert not read.coverage.missing and not read.coverage.partial
         assert judged(read).outcome is Outcome.PASSED
@@ -112,11 +112,11 @@ def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path
     statuses = {verdict.id: verdict.status for verdict in result.verdicts}
     assert {name for name, status in statuses.items() if status is Status.INCONCLUSIVE} == affected
     assert result.outcome is Outcome.FAILED
-    told = " ".join([*read.coverage.missing.values(), *read.coverage.partial.values()])
-    assert " recorded messages" in told
+    reasons = " ".join([*read.coverage.missing.values(), *read.coverage.partial.values()])
+    assert " recorded messages" in reasons
 
 
-def test_a_log_without_counts_is_not_passed(log: Path, tmp_path: Path) -> None:
+def test_log_without_message_counts_does_not_pass(log: Path, tmp_path: Path) -> None:
     read = read_log(edited(log, tmp_path / "edited.mcap", counts=False))
     assert set(read.coverage.partial) == set(Evidence)
     assert {verdict.status for verdict in judged(read).verdicts} == {Status.INCONCLUSIVE}
@@ -156,7 +156,7 @@ class Parts:
         """Write a log, with the messages of each topic spread over several channels in turn."""
         with path.open("wb") as target:
             writer = Writer(target)
-            writer.start("ros2", "somebody")
+            writer.start("ros2", "other recorder")
             for name, record in self.metadata:
                 writer.add_metadata(name, record)
             for name, data in self.attachments:
@@ -172,7 +172,7 @@ class Parts:
         return path
 
 
-def test_the_channels_of_a_topic_are_counted_together(log: Path, tmp_path: Path) -> None:
+def test_message_counts_are_summed_over_channels_of_a_topic(log: Path, tmp_path: Path) -> None:
     read = read_log(Parts(log).write(tmp_path / "split.mcap", channels_per_topic=3))
     assert judged(read).outcome is Outcome.PASSED
 
@@ -222,7 +222,7 @@ REFUSED: dict[str, tuple[Edit, str]] = {
 
 
 @pytest.mark.parametrize("edit", REFUSED)
-def test_a_log_that_contradicts_itself_is_refused(log: Path, tmp_path: Path, edit: str) -> None:
+def test_inconsistent_log_is_refused(log: Path, tmp_path: Path, edit: str) -> None:
     change, message = REFUSED[edit]
     parts = Parts(log)
     change(parts)
@@ -233,14 +233,14 @@ def test_a_log_that_contradicts_itself_is_refused(log: Path, tmp_path: Path, edi
 def described(robots: str) -> LogContents:
     """Return the contents of a log with this list of robots, and the cases of robots a and b."""
     contents = LogContents()
-    contents.add(records.Metadata("simscen", about_run("a", robots)))
+    contents.add(records.Metadata("simscen", run_record("a", robots)))
     for name in ("a", "b"):
-        case = case_to_json(about().case).encode()
+        case = case_to_json(sample_header().case).encode()
         contents.add(records.Attachment(0, 0, f"{name}/case.json", "application/json", case))
     return contents
 
 
-def about_run(name: str, robots: str) -> Record:
+def run_record(name: str, robots: str) -> Record:
     return {"format": "1", "scenario": name, "seed": "1", "tick_rate": "240", "robots": robots}
 
 
@@ -251,6 +251,6 @@ def test_all_robots_of_a_log_are_listed() -> None:
 
 
 @pytest.mark.parametrize("robots", ['["a", "a"]', '{"a": 1}', '"a"', "[[]]", "[1, 2]"])
-def test_the_list_of_robots_has_distinct_names(robots: str) -> None:
+def test_duplicate_robot_names_are_refused(robots: str) -> None:
     with pytest.raises(ValueError, match="its list of robots is"):
         described(robots)

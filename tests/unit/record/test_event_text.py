@@ -1,4 +1,4 @@
-"""Events as JSON and as lines."""
+"""Tests of events as JSON and as lines of text."""
 
 from simscen.core.records.events import Event
 from simscen.record.messages import event_text
@@ -20,6 +20,6 @@ def test_an_event_reads_as_one_line() -> None:
     assert event_text.sentence(Event(1, "navigation.ended")) == "navigation.ended"
 
 
-def test_failures_stand_out_in_a_log_panel() -> None:
+def test_failures_have_the_level_error_or_warning() -> None:
     levels = [event_text.level(Event(0, kind)) for kind in ("goal.accepted", "recovery.started", "collision.started")]
     assert levels == sorted(set(levels))

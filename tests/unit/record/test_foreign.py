@@ -1,4 +1,4 @@
-"""Reading the logs of real robots."""
+"""Tests of reading logs of real robots."""
 
 import sys
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from foreign_logs import (
     SPEED,
     STORE,
     UNINDEXED,
-    Said,
+    Message,
     drive,
     link,
     odometry,
@@ -33,17 +33,17 @@ from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
 
 MOCAP = ForeignLogOptions(truth="/mocap")
-WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
-    "sqlite": lambda path, said: write_bag(path / "bag", said),
-    "sqlite, files compressed": lambda path, said: write_bag(path / "bag", said, compress="file"),
-    "sqlite, messages compressed": lambda path, said: write_bag(path / "bag", said, compress="message"),
-    "rosbag2 of mcap": lambda path, said: write_bag(path / "bag", said, StoragePlugin.MCAP),
-    "rosbag2 of mcap, messages compressed": lambda path, said: write_bag(
-        path / "bag", said, StoragePlugin.MCAP, "message"
+WRITERS: dict[str, Callable[[Path, list[Message]], Path]] = {
+    "sqlite": lambda path, messages: write_bag(path / "bag", messages),
+    "sqlite, files compressed": lambda path, messages: write_bag(path / "bag", messages, compress="file"),
+    "sqlite, messages compressed": lambda path, messages: write_bag(path / "bag", messages, compress="message"),
+    "rosbag2 of mcap": lambda path, messages: write_bag(path / "bag", messages, StoragePlugin.MCAP),
+    "rosbag2 of mcap, messages compressed": lambda path, messages: write_bag(
+        path / "bag", messages, StoragePlugin.MCAP, "message"
     ),
-    "mcap without chunks or index": lambda path, said: write_mcap(path / "a.mcap", said, **UNINDEXED),
+    "mcap without chunks or index": lambda path, messages: write_mcap(path / "a.mcap", messages, **UNINDEXED),
     **{
-        f"mcap {name}": lambda path, said, options=options: write_mcap(path / "a.mcap", said, **options)  # type: ignore[misc]
+        f"mcap {name}": lambda path, messages, options=options: write_mcap(path / "a.mcap", messages, **options)  # type: ignore[misc]
         for name, options in CHUNKED.items()
     },
 }
@@ -68,7 +68,7 @@ def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> No
     }  # fmt: skip
 
 
-def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_be(
+def test_missing_ground_truth_is_reported_with_possible_topics(
     read: Callable[..., ForeignLog],
 ) -> None:
     log = read(drive(), ForeignLogOptions())
@@ -79,26 +79,26 @@ def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_
     assert "no topic /vicon" in read(drive(), ForeignLogOptions(truth="/vicon")).coverage.missing[Evidence.TRUTH]
 
 
-def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> None:
-    """map ← odom holds until it is told anew, odom ← base moves, base ← marker is static."""
-    said = drive()
+def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[..., ForeignLog]) -> None:
+    """map ← odom is constant between messages, odom ← base moves, base ← marker is static."""
+    messages = drive()
     for k in range(201):
         stamp = BEGIN + k * SECOND // 20
-        said.append(Said("/tf", stamp, link(stamp, "odom", "base_link", SPEED * k / 20)))
-    for at, offset in ((0, 1.0), (5, 2.0)):
-        said.append(Said("/tf", BEGIN + at * SECOND, link(BEGIN + at * SECOND, "map", "odom", 0.0, offset, 1.5707963)))
-    said.append(Said("/tf_static", BEGIN, link(0, "/base_link", "/marker", 0.25)))
-    trace = read(said, ForeignLogOptions(truth="map:marker")).trace
+        messages.append(Message("/tf", stamp, link(stamp, "odom", "base_link", SPEED * k / 20)))
+    for at, offset in ((BEGIN, 1.0), (BEGIN + 5 * SECOND, 2.0)):
+        messages.append(Message("/tf", at, link(at, "map", "odom", 0.0, offset, 1.5707963)))
+    messages.append(Message("/tf_static", BEGIN, link(0, "/base_link", "/marker", 0.25)))
+    trace = read(messages, ForeignLogOptions(truth="map:marker")).trace
     x, y, yaw = trace.truth.values.T
     np.testing.assert_allclose(x, 0.0, atol=1e-6)
     offset = np.where(trace.truth.ticks < 5000, 1.0, 2.0)
     np.testing.assert_allclose(y, offset + 0.25 + SPEED * trace.truth.ticks / 1000, atol=2e-3)
     np.testing.assert_allclose(yaw, np.pi / 2, atol=1e-6)
-    lost = read(said, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
+    lost = read(messages, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
     assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
 
 
-def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
+def test_ground_truth_in_another_frame_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
     log = read(drive(mocap="vicon"))
     assert "frame `vicon`, the map frame is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
     assert Evidence.TRUTH not in log.coverage.missing
@@ -106,7 +106,7 @@ def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callab
     assert Evidence.ALIGNMENT not in same.coverage.missing
 
 
-def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+def test_gap_in_the_ground_truth_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
     gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
     log = read([one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]])
     assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 3.9")
@@ -114,15 +114,15 @@ def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog
     assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 0.00 s to 6.0")
 
 
-def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+def test_belief_that_starts_after_a_meter_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
     log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
 
 
-def test_twists_that_were_never_set_are_not_a_standstill(read: Callable[..., ForeignLog]) -> None:
-    said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
-            for k in range(201)]  # fmt: skip
-    log = read(said, ForeignLogOptions(truth="/gps"))
+def test_velocity_is_computed_from_poses_if_all_twists_are_zero(read: Callable[..., ForeignLog]) -> None:
+    stamps = [BEGIN + k * SECOND // 20 for k in range(201)]
+    messages = [Message("/gps", t, odometry(t, "map", SPEED * k / 20, 0.0)) for k, t in enumerate(stamps)]
+    log = read(messages, ForeignLogOptions(truth="/gps"))
     assert log.notes == [
         "/gps: all twists are zero although the robot moves, so velocities are computed from the poses"
     ]
@@ -130,7 +130,7 @@ def test_twists_that_were_never_set_are_not_a_standstill(read: Callable[..., For
 
 
 @pytest.mark.parametrize("size", [0.2, 0.5, 0.9, 0.995])
-def test_a_log_that_breaks_off_has_no_end(tmp_path: Path, size: float) -> None:
+def test_truncated_log_has_no_end(tmp_path: Path, size: float) -> None:
     file = write_mcap(tmp_path / "a.mcap", drive(), **UNINDEXED)
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * size)])
@@ -157,35 +157,35 @@ def test_messages_that_are_not_cdr_are_ignored_with_a_note(refused: Callable[...
     assert "/mocap is encoded as json, not as CDR" in refused(drive(), encoding="json")
 
 
-def test_messages_that_do_not_fit_their_type_are_refused(refused: Callable[..., str]) -> None:
+def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[..., str]) -> None:
     only = [one for one in drive() if one.topic == "/mocap"]
     cut = refused(only, change=lambda data: data[:40])
     assert "message 1 of /mocap cannot be read as geometry_msgs/msg/PoseStamped" in cut
     assert "longer than its type" in refused(only, change=lambda data: data + bytes(8))
     assert "not plain CDR" in refused(only, change=lambda data: b"\x28\xb5\x2f\xfd" + data[4:])
-    zero = [Said("/mocap", BEGIN, replace_orientation(stamped_pose(BEGIN, "map", 0.0)))]
+    zero = [Message("/mocap", BEGIN, replace_orientation(stamped_pose(BEGIN, "map", 0.0)))]
     assert "not a quaternion" in refused(zero)
 
 
 def replace_orientation(message: Any) -> Any:
-    """The message with an orientation that nobody filled in."""
+    """Return the message with an orientation of zeros."""
     turn = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=0.0)
     where = STORE.types["geometry_msgs/msg/Pose"](position=message.pose.position, orientation=turn)
     return STORE.types["geometry_msgs/msg/PoseStamped"](header=message.header, pose=where)
 
 
 def test_big_endian_messages_are_read(tmp_path: Path) -> None:
-    said = [one for one in drive() if one.topic == "/mocap"]
-    little = read_foreign_log(write_mcap(tmp_path / "l.mcap", said), MOCAP)
-    big = [bytes(STORE.serialize_cdr(one.message, one.message.__msgtype__, little_endian=False)) for one in said]
+    messages = [one for one in drive() if one.topic == "/mocap"]
+    little = read_foreign_log(write_mcap(tmp_path / "l.mcap", messages), MOCAP)
+    big = [bytes(STORE.serialize_cdr(one.message, one.message.__msgtype__, little_endian=False)) for one in messages]
     rest = iter(big)
-    log = read_foreign_log(write_mcap(tmp_path / "b.mcap", said, change=lambda _: next(rest)), MOCAP)
+    log = read_foreign_log(write_mcap(tmp_path / "b.mcap", messages, change=lambda _: next(rest)), MOCAP)
     assert np.array_equal(log.trace.truth.values, little.trace.truth.values)
 
 
-def test_a_log_of_none_of_the_topics_is_refused_with_those_it_has(refused: Callable[..., str]) -> None:
-    told = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
-    assert told.startswith("SC804 it has no messages that can be judged (its topics: /robot1/amcl_pose, ")
+def test_log_without_known_topics_is_refused_with_a_list_of_its_topics(refused: Callable[..., str]) -> None:
+    error = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
+    assert error.startswith("SC804 it has no messages that can be judged (its topics: /robot1/amcl_pose, ")
     other = refused([], ForeignLogOptions())
     assert "its topics: none" in other
 
@@ -200,24 +200,24 @@ def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:
 
 def test_action_status_gives_goal_results(read: Callable[..., ForeignLog]) -> None:
     topic = "/navigate_to_pose/_action/status"
-    said = [
+    messages = [
         *drive(),
-        Said(topic, BEGIN + 1 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 1))),
-        Said(topic, BEGIN + 4 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 4))),
-        Said(topic, BEGIN + 5 * SECOND, statuses((1, BEGIN + SECOND, 4), (2, BEGIN + 5 * SECOND, 2))),
-        Said(topic, BEGIN + 8 * SECOND, statuses((2, BEGIN + 5 * SECOND, 6))),
+        Message(topic, BEGIN + 1 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 1))),
+        Message(topic, BEGIN + 4 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 4))),
+        Message(topic, BEGIN + 5 * SECOND, statuses((1, BEGIN + SECOND, 4), (2, BEGIN + 5 * SECOND, 2))),
+        Message(topic, BEGIN + 8 * SECOND, statuses((2, BEGIN + 5 * SECOND, 6))),
     ]
-    log = read(said, ForeignLogOptions(truth="/mocap", goals=("shelf", "dock")))
-    told = [(str(event.kind), event.name, round(log.trace.seconds(event.tick))) for event in log.trace.events]
-    assert told == [
+    log = read(messages, ForeignLogOptions(truth="/mocap", goals=("shelf", "dock")))
+    events = [(str(event.kind), event.name, round(log.trace.seconds(event.tick))) for event in log.trace.events]
+    assert events == [
         ("goal.accepted", "shelf", 1), ("goal.reached", "shelf", 4), ("goal.accepted", "dock", 5),
         ("goal.failed", "dock", 8), ("navigation.ended", "FAILED", 8), ("run.ended", "the recording ends", 10),
     ]  # fmt: skip
-    one = read(said, ForeignLogOptions(truth="/mocap", goals=("shelf",)))
+    one = read(messages, ForeignLogOptions(truth="/mocap", goals=("shelf",)))
     assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
 
 
-def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bag_without_rosbags_error_states_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(InvalidInput) as raised:

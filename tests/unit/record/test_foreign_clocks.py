@@ -1,4 +1,4 @@
-"""Clocks and stamps in the logs of real robots: which of them are trusted, converted, or refused."""
+"""Tests of clocks and stamps in logs of real robots: which are used, converted, or refused."""
 
 import random
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from foreign_logs import (
     LATENCY,
     SECOND,
     SPEED,
-    Said,
+    Message,
     believed,
     drive,
     header,
@@ -23,8 +23,8 @@ from simscen.record.foreign.read import ForeignLog
 from simscen.record.foreign.timebase import find_clock_step
 
 
-def test_times_are_those_of_the_headers(read: Callable[..., ForeignLog]) -> None:
-    """AMCL's pose is logged 80 ms after the truth of the same moment; at 0.5 m/s that would be 4 cm of error."""
+def test_times_are_taken_from_message_headers(read: Callable[..., ForeignLog]) -> None:
+    """AMCL's pose is logged 80 ms after the true pose with the same stamp, which is 4 cm at 0.5 m/s."""
     log = read(drive(off=0.0))
     error = log.trace.belief.values[:, 0] - np.interp(
         log.trace.belief.ticks, log.trace.truth.ticks, log.trace.truth.values[:, 0]
@@ -38,18 +38,19 @@ def test_times_are_those_of_the_headers(read: Callable[..., ForeignLog]) -> None
 
 
 def test_times_without_header_are_converted_to_the_clock_of_the_headers(read: Callable[..., ForeignLog]) -> None:
-    """Twist has no header; with simulated time the log's own clock is another one, and runs at another rate."""
-    said = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
-    trace = read(said).trace
+    """Twist has no header, and with simulated time the clock of the log has another rate."""
+    messages = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
+    trace = read(messages).trace
     assert trace.seconds(trace.end) == pytest.approx(10.0, abs=0.2)
     assert np.abs(trace.command.ticks - trace.truth.ticks).max() <= 2
 
 
 def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic == "/mocap"]
-    said[10], said[11] = replace(said[10], message=said[11].message), replace(said[11], message=said[10].message)
-    said.insert(51, replace(said[50], time=said[50].time + 1))
-    log = read(said)
+    messages = [one for one in drive() if one.topic == "/mocap"]
+    first, second = messages[10:12]
+    messages[10:12] = [replace(first, message=second.message), replace(second, message=first.message)]
+    messages.insert(51, replace(messages[50], time=messages[50].time + 1))
+    log = read(messages)
     assert len(log.trace.truth) == 201
     assert (np.diff(log.trace.truth.ticks) > 0).all()
     assert (np.diff(log.trace.truth.values[:, 0]) > 0).all()
@@ -57,22 +58,22 @@ def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., Forei
 
 
 def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
-    said = drive(4.0) + [replace(one, time=one.time + 5 * SECOND) for one in drive(4.0)]
-    assert refused(said).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
+    messages = drive(4.0) + [replace(one, time=one.time + 5 * SECOND) for one in drive(4.0)]
+    assert refused(messages).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
 
 
-def with_clock_step(seconds: float, also_recorder: bool = False) -> list[Said]:
-    """A drive during which the clock of the stamps, and perhaps that of the recorder, is set after 5 s."""
-    step, said = round(seconds * SECOND), []
+def with_clock_step(seconds: float, also_recorder: bool = False) -> list[Message]:
+    """Return a drive in which the clock of the stamps, and optionally that of the recorder, is set after 5 s."""
+    step, messages = round(seconds * SECOND), []
     for one in drive():
         if one.time > BEGIN + 5 * SECOND + LATENCY and hasattr(one.message, "header"):
             stamp = one.message.header.stamp
-            moved = header(stamp.sec * SECOND + stamp.nanosec + step, one.message.header.frame_id)
+            stepped = header(stamp.sec * SECOND + stamp.nanosec + step, one.message.header.frame_id)
             time = one.time + step if also_recorder else one.time
-            said.append(Said(one.topic, time, replace(one.message, header=moved)))
+            messages.append(Message(one.topic, time, replace(one.message, header=stepped)))
         else:
-            said.append(one)
-    return said
+            messages.append(one)
+    return messages
 
 
 @pytest.mark.parametrize("seconds", [-0.9, -0.3, 0.3, 0.9, 3.0])
@@ -87,27 +88,27 @@ def test_clock_that_is_set_while_recording_is_refused(
 
 
 def with_busy_start(step: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Times of logging and stamps in ns of a public log: 90 Hz, logged from 1.1 s on, with losses of 0.1 s before.
+    """Return times of logging and stamps (ns) as in a public log: 90 Hz, logged from 1.1 s on, 0.1 s lost before.
 
     The clock of the stamps is set by `step` ns at 5 s.
     """
     stamps = np.arange(0, 10 * SECOND, 11_000_000)
     is_lost = np.zeros(len(stamps), dtype=bool)
-    for begin in (6, 30, 50):
-        is_lost[begin : begin + 12] = True
+    for first in (6, 30, 50):
+        is_lost[first : first + 12] = True
     stamps = stamps[~is_lost]
     logged = np.maximum(stamps, round(1.1 * SECOND)) + LATENCY
     return logged, stamps + np.where(stamps >= 5 * SECOND, step, 0)
 
 
-def test_a_recorder_that_catches_up_after_a_busy_start_is_no_clock_that_was_set() -> None:
+def test_busy_start_of_the_recorder_is_not_a_clock_step() -> None:
     assert find_clock_step(*with_busy_start()) is None
     found = find_clock_step(*with_busy_start(round(0.3 * SECOND)))
     assert found is not None
     assert found[1] == pytest.approx(0.3 * SECOND, abs=0.02 * SECOND)
 
 
-def test_a_log_is_judged_from_when_the_recorder_has_subscribed_to_scans(read: Callable[..., ForeignLog]) -> None:
+def test_log_is_judged_from_the_first_recorded_scan(read: Callable[..., ForeignLog]) -> None:
     late = [one for one in drive() if one.topic != "/scan" or one.time > BEGIN + SECOND]
     log = read(late)
     assert log.notes == ["/scan is recorded 1.0 s after the first message; the log is judged from then on"]
@@ -122,11 +123,11 @@ def test_clock_of_the_recorder_that_is_set_back_is_refused(refused: Callable[...
     assert refused(with_clock_step(-0.55, also_recorder=True)).startswith(text)
 
 
-def delayed(said: list[Said], begin: float, end: float, seconds: float) -> list[Said]:
-    """Messages of one topic, of which those between two times (s) are logged late, and none before an earlier one."""
+def delayed(messages: list[Message], start: float, end: float, seconds: float) -> list[Message]:
+    """Return messages of one topic in order, those between two times (s) logged late."""
     late, last = [], 0
-    for one in said:
-        is_late = begin * SECOND <= one.time - BEGIN < end * SECOND
+    for one in messages:
+        is_late = start * SECOND <= one.time - BEGIN < end * SECOND
         last = max(last, one.time + (round(seconds * SECOND) if is_late else 0))
         late.append(replace(one, time=last))
     return late
@@ -134,28 +135,29 @@ def delayed(said: list[Said], begin: float, end: float, seconds: float) -> list[
 
 @pytest.mark.parametrize("change", ["shuffled", "reversed", "stalled", "slow start", "slow end", "jitter"])
 def test_order_and_delay_of_logging_do_not_change_stamped_poses(read: Callable[..., ForeignLog], change: str) -> None:
-    said, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
+    messages, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
     changed = {
-        "shuffled": lambda: rng.sample(said, len(said)),
-        "reversed": lambda: said[::-1],
-        "stalled": lambda: delayed(said, 4.0, 5.0, 1.5),
-        "slow start": lambda: delayed(said, 0.0, 3.0, 0.5),
-        "slow end": lambda: delayed(said, 5.0, 99.0, 0.5),
-        "jitter": lambda: [replace(one, time=one.time + rng.randrange(SECOND // 3)) for one in said],
+        "shuffled": lambda: rng.sample(messages, len(messages)),
+        "reversed": lambda: messages[::-1],
+        "stalled": lambda: delayed(messages, 4.0, 5.0, 1.5),
+        "slow start": lambda: delayed(messages, 0.0, 3.0, 0.5),
+        "slow end": lambda: delayed(messages, 5.0, 99.0, 0.5),
+        "jitter": lambda: [replace(one, time=one.time + rng.randrange(SECOND // 3)) for one in messages],
     }[change]()
-    assert (read(changed).trace.truth.values == read(said).trace.truth.values).all()
+    assert (read(changed).trace.truth.values == read(messages).trace.truth.values).all()
 
 
 def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic == "/mocap"]
-    said += [Said("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
-    assert "/amcl_pose and /mocap do not share a clock" in refused(said)
-    assert len(read(said, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
+    messages = [one for one in drive() if one.topic == "/mocap"]
+    messages += [Message("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
+    assert "/amcl_pose and /mocap do not share a clock" in refused(messages)
+    assert len(read(messages, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
 
-def test_stamps_that_were_never_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic != "/mocap"]
-    said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
-    log = read(said)
+def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
+    messages = [one for one in drive() if one.topic != "/mocap"]
+    poses = [stamped_pose(0, "map", SPEED * k / 20) for k in range(201)]
+    messages += [Message("/mocap", BEGIN + k * SECOND // 20, pose) for k, pose in enumerate(poses)]
+    log = read(messages)
     assert len(log.trace.truth) == 201
     assert log.notes == ["/mocap: all stamps are zero, so the times of logging are used"]

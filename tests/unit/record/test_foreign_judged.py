@@ -13,7 +13,7 @@ from foreign_logs import (
     BEGIN,
     SECOND,
     SPEED,
-    Said,
+    Message,
     drive,
     stamped_pose,
     statuses,
@@ -37,7 +37,7 @@ STATUS = "/navigate_to_pose/_action/status"
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
+    """Result of a command."""
 
     code: int
     out: str
@@ -48,7 +48,7 @@ class Ended(NamedTuple):
 def simscen(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Callable[..., Ended]:
-    """Runs `simscen judge ARGUMENTS` in a fresh folder."""
+    """Return a function that runs `simscen judge ARGUMENTS` in a fresh folder."""
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str) -> Ended:
@@ -63,7 +63,7 @@ def simscen(
 
 @pytest.fixture
 def limits(tmp_path: Path) -> Callable[..., str]:
-    """Writes a file of criteria."""
+    """Return a function that writes a criteria file."""
 
     def write(*criteria: str, more: str = "") -> str:
         (tmp_path / "limits.yaml").write_text(more + "pass:\n" + "".join(f"  - {one}\n" for one in criteria))
@@ -73,7 +73,7 @@ def limits(tmp_path: Path) -> Callable[..., str]:
 
 
 def _examples() -> list[Any]:
-    """The example of each criterion, from its docstring, as plain data."""
+    """Return the example of each criterion, from its docstring, as plain data."""
     examples = []
     for name, field in AnyCriterion.model_fields.items():
         if name in AnyCriterion.modifiers or name == "then":
@@ -90,8 +90,8 @@ def _examples() -> list[Any]:
 
 
 @pytest.mark.parametrize("example", _examples())
-def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, example: dict[str, Any]) -> None:
-    """Not even with a truth and goals, when any one kind of evidence is taken away."""
+def test_no_criterion_passes_without_its_evidence(tmp_path: Path, example: dict[str, Any]) -> None:
+    """The log has the ground truth and goals, but lacks one kind of evidence."""
     entry = AnyCriterion.model_validate(example)
     goals = (Goal("shelf", Pose2(SPEED * 10, 0.0)),)
     case = Case(Pose2(0.0, 0.0), goals, {"shelf": SPEED * 10}, {"aisle": ((50, 50), (51, 50), (51, 51))})
@@ -108,7 +108,7 @@ def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, ex
     assert verdict.status is Status.INCONCLUSIVE or not required_evidence(entry) & log.coverage.missing.keys()
 
 
-def test_a_log_is_judged_by_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
+def test_log_is_judged_with_a_criteria_file(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     file = limits("speed: {max: 0.6 m/s}", "localization_error: {max: 0.1 m}", "path_length: {max: 6 m}")
     ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
@@ -134,24 +134,24 @@ def test_judging_a_log_imports_no_engine(limits, tmp_path: Path) -> None:
     assert run.stdout.splitlines()[-1] == "set()"
 
 
-def test_a_log_is_judged_by_the_filter_masks_of_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
+def test_filter_masks_of_a_criteria_file_are_used(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     (tmp_path / "slow.pgm").write_bytes(b"P5\n20 2\n255\n" + b"\x1e" * 40)
-    said = "image: slow.pgm\nmode: raw\nresolution: 1\norigin: [-5, -1, 0]\n"
-    (tmp_path / "slow.yaml").write_text(f"{said}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    yaml = "image: slow.pgm\nmode: raw\nresolution: 1\norigin: [-5, -1, 0]\n"
+    (tmp_path / "slow.yaml").write_text(f"{yaml}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
     file = limits("speed: {mask: {file: slow.yaml, type: absolute, multiplier: 0.01}}")
     ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
     assert ended.code == 1
     assert "speed: 0.50 m/s > 0.35 m/s by slow.yaml (tolerance 0.05 m/s), at t = " in ended.out
 
 
-def test_limits_of_places_need_a_truth_that_lies_on_the_map() -> None:
+def test_position_limits_need_a_ground_truth_in_the_map_frame() -> None:
     mask = {"file": "slow.yaml", "type": "absolute"}
     for where in ({"max": 1.0, "in": "aisle"}, {"mask": mask}):
         assert Evidence.ALIGNMENT in required_evidence(AnyCriterion.model_validate({"speed": where}))
 
 
-def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, limits, tmp_path: Path) -> None:
+def test_criteria_are_inconclusive_without_their_ground_truth(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     file = limits("speed: {max: 9 m/s}", "collisions: {max: 9}", "replans: {max: 99}", "result: {status: SUCCEEDED}")
     ended = simscen("drive.mcap", "--scenario", file)
@@ -162,7 +162,7 @@ def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, l
     assert ended.out.count("inconclusive") == 4
 
 
-def test_a_log_of_others_needs_criteria(simscen, tmp_path: Path) -> None:
+def test_third_party_log_needs_criteria(simscen, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     ended = simscen("drive.mcap")
     assert ended.code == 2
@@ -188,13 +188,13 @@ def test_a_folder_of_old_logs_gives_a_table_of_margins(simscen, limits, tmp_path
     assert ended.out.splitlines()[-1] == "1 passed, 2 failed, 1 could not be judged"
 
 
-def test_goals_of_the_file_are_judged_by_the_actions_status_and_the_truth(simscen, limits, tmp_path: Path) -> None:
-    said = [
+def test_goals_are_judged_by_action_status_and_ground_truth(simscen, limits, tmp_path: Path) -> None:
+    messages = [
         *drive(),
-        Said(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
-        Said(STATUS, BEGIN + 10 * SECOND, statuses((1, BEGIN + SECOND, 4))),
+        Message(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
+        Message(STATUS, BEGIN + 10 * SECOND, statuses((1, BEGIN + SECOND, 4))),
     ]
-    write_mcap(tmp_path / "drive.mcap", said)
+    write_mcap(tmp_path / "drive.mcap", messages)
     goals = "goals: [{name: shelf, pose: {x: 5, y: 0}, xy_tolerance: 0.3 m}]\n"
     file = limits("goals_reached: {}", "result: {status: SUCCEEDED}", "time_to_goal: {max: 10 s}", more=goals)
     assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
@@ -208,7 +208,7 @@ def test_goals_of_the_file_are_judged_by_the_actions_status_and_the_truth(simsce
     assert ended.err.startswith("limits.yaml:1:16: error[SC030] no place of the world is called `shelf`")
 
 
-def test_regions_and_the_footprint_come_from_the_world_and_the_robot_of_the_file(simscen, limits, tmp_path) -> None:
+def test_regions_and_footprint_are_those_of_the_criteria_file(simscen, limits, tmp_path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     (tmp_path / "hall.world.yaml").write_text(
         "simscen: 1\nwalls: [{points: [[-9, -9], [9, -9], [9, 9], [-9, 9], [-9, -9]]}]\n"
@@ -221,7 +221,7 @@ def test_regions_and_the_footprint_come_from_the_world_and_the_robot_of_the_file
     assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
 
 
-def test_signals_are_judged_where_the_log_has_them(simscen, limits, tmp_path: Path) -> None:
+def test_signals_are_judged_if_the_log_contains_them(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     always = 'always: {{signal: {}, op: "<=", value: {}}}'
     file = limits(always.format("scan_age", "0.6 s"), always.format("collision_count", 3))
@@ -240,10 +240,10 @@ def test_unusual_logs_are_noted_and_truncated_logs_pass_nothing(simscen, limits,
     assert "so far, but the log stops at" in ended.out
 
 
-def test_a_gap_in_the_truth_leaves_a_pass_inconclusive_but_not_a_failure(simscen, limits, tmp_path: Path) -> None:
+def test_gap_in_the_ground_truth_makes_a_pass_but_no_failure_inconclusive(simscen, limits, tmp_path: Path) -> None:
     gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
-    said = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
-    write_mcap(tmp_path / "drive.mcap", said)
+    messages = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
+    write_mcap(tmp_path / "drive.mcap", messages)
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
     assert "so far, but /mocap has no message from t = " in ended.out
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 0.1 m/s}"), "--truth", "/mocap")
@@ -251,7 +251,7 @@ def test_a_gap_in_the_truth_leaves_a_pass_inconclusive_but_not_a_failure(simscen
 
 
 @pytest.mark.parametrize("option", ["odom", "odo=/x", "odom=x", "=", "odom="])
-def test_a_topic_that_cannot_be_understood_is_refused(simscen, limits, tmp_path: Path, option: str) -> None:
+def test_invalid_topic_option_is_refused(simscen, limits, tmp_path: Path, option: str) -> None:
     write_mcap(tmp_path / "drive.mcap", drive(1.0))
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--topic", option)
     assert ended.code == 2
@@ -266,14 +266,14 @@ def test_invalid_ground_truth_is_refused(simscen, limits, tmp_path: Path, truth:
     assert "--truth" in ended.err and ended.out == ""
 
 
-def test_a_database_without_its_folder_says_what_to_name(simscen, limits, tmp_path: Path) -> None:
+def test_error_for_a_database_file_names_the_bag_folder(simscen, limits, tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     ended = simscen(str(next(bag.glob("*.db3"))), "--scenario", limits("speed: {max: 9 m/s}"))
     assert ended.code == 2
     assert "a rosbag2 is a folder with a metadata.yaml" in ended.err
 
 
-def test_logs_of_others_among_several_say_that_they_need_criteria(simscen, tmp_path: Path) -> None:
+def test_third_party_logs_among_several_need_criteria(simscen, tmp_path: Path) -> None:
     write_mcap(tmp_path / "a.mcap", drive(1.0))
     write_mcap(tmp_path / "b.mcap", drive(1.0))
     ended = simscen(".", "--truth", "/mocap")
@@ -281,7 +281,7 @@ def test_logs_of_others_among_several_say_that_they_need_criteria(simscen, tmp_p
     assert ended.out.count("set criteria with --scenario") == 2
 
 
-def test_metrics_that_a_log_does_not_tell_are_null_in_its_result(simscen, limits, tmp_path: Path) -> None:
+def test_metrics_without_evidence_are_null_in_the_result(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap", "--json")
     assert re.search(r'"collisions": null', ended.out) and re.search(r'"path_length": (4\.9|5\.0)', ended.out)
@@ -289,9 +289,10 @@ def test_metrics_that_a_log_does_not_tell_are_null_in_its_result(simscen, limits
     assert not re.search(r'"(path_length|speed_max|success|localization_max)": [0-9]', blind.out)
 
 
-def test_a_truth_that_is_not_a_number_is_an_error(simscen, limits, tmp_path: Path) -> None:
-    said = [*drive(2.0), Said("/mocap", BEGIN + 3 * SECOND, stamped_pose(BEGIN + 3 * SECOND, "map", float("nan")))]
-    write_mcap(tmp_path / "drive.mcap", said)
+def test_nan_in_the_ground_truth_is_an_error(simscen, limits, tmp_path: Path) -> None:
+    end = BEGIN + 3 * SECOND
+    messages = [*drive(2.0), Message("/mocap", end, stamped_pose(end, "map", float("nan")))]
+    write_mcap(tmp_path / "drive.mcap", messages)
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
     assert ended.code == 3
     assert "is not finite at t = " in ended.out

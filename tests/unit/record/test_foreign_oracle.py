@@ -34,7 +34,7 @@ TRUTH = ForeignLogOptions(truth="/ground_truth/odom", tick_rate=240)
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The log of a short drive."""
+    """Return the log of a short drive."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "a.scenario.yaml").write_text(SCENARIO)
     simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), 1, log=folder / "run.mcap")
@@ -43,11 +43,11 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def disguised(own: Path) -> Path:
-    """Its messages alone, written by the mcap library."""
+    """Return a log with the same messages, without metadata, written by the mcap library."""
     file = own.with_name("disguised.mcap")
     with open_log(own) as source, file.open("wb") as stream:
         writer = Writer(stream)
-        writer.start("ros2", "somebody")
+        writer.start("ros2", "other recorder")
         schemas, channels = {}, {}
         for record in RecordReader(source):
             match record:
@@ -63,8 +63,8 @@ def disguised(own: Path) -> Path:
     return file
 
 
-def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) -> None:
-    """But for the normalized quaternions' last one; ticks are found exactly."""
+def test_signals_are_bit_identical(own: Path, disguised: Path) -> None:
+    """Headings may differ by rounding of normalized quaternions."""
     assert is_simscen_log(own) and not is_simscen_log(disguised)
     ours, theirs = read_log(own).trace, read_foreign_log(disguised, TRUTH).trace
     for name in ("truth", "velocity", "belief", "odometry", "command"):
@@ -85,7 +85,7 @@ def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) ->
         {"always": {"signal": "turn_rate", "op": "<=", "value": 3.0}},
     ],
 )
-def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, object]) -> None:
+def test_verdicts_and_margins_are_equal(own: Path, disguised: Path, text: dict[str, object]) -> None:
     entry = AnyCriterion.model_validate(text)
     log, foreign = read_log(own), read_foreign_log(disguised, TRUTH)
     (mine,) = judge([entry], log.trace, log.header.case)

@@ -1,4 +1,4 @@
-"""Tests of the replay page of logs of real robots."""
+"""Tests of replay pages for logs of real robots."""
 
 import sys
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import BEGIN, Said, T, drive, header, link, write_bag, write_mcap
+from foreign_logs import BEGIN, Message, T, drive, header, link, write_bag, write_mcap
 
 from simscen.cli.main import main
 from simscen.record.foreign.options import ForeignLogOptions
@@ -36,7 +36,7 @@ def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch)
     return call
 
 
-def a_map() -> Said:
+def a_map() -> Message:
     info = T["nav_msgs/msg/MapMetaData"](
         map_load_time=header(BEGIN, "").stamp,
         resolution=0.1,
@@ -48,15 +48,15 @@ def a_map() -> Said:
         ),
     )
     cells = np.array([0, 100, -1] * 4, dtype=np.int8)
-    return Said("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
+    return Message("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
 
 
-def mounted() -> Said:
-    return Said("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
+def mounted() -> Message:
+    return Message("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
 
 
 @pytest.mark.parametrize("write", [write_mcap, write_bag])
-def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
+def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
     write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
     read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
@@ -65,7 +65,7 @@ def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Call
     assert read.sensors.mounts["laser"].x == pytest.approx(0.2)
 
 
-def test_a_page_is_made_with_criteria_and_without(simscen, tmp_path: Path) -> None:
+def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Path) -> None:
     log = tmp_path / "monday.mcap"
     write_mcap(log, [a_map(), mounted(), *drive(2.0)])
     ended = simscen("replay", str(log), "--truth", "/mocap")

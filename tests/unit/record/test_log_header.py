@@ -5,7 +5,7 @@ import json
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from moments import CASE, about
+from moments import CASE, sample_header
 
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
@@ -34,18 +34,18 @@ def test_a_case_is_written_as_strict_json() -> None:
     json.loads(log_header.case_to_json(CASE), parse_constant=refuse)
 
 
-def test_something_else_than_a_case_is_refused() -> None:
+def test_invalid_cases_are_refused() -> None:
     with pytest.raises(ValueError, match="not a case"):
         log_header.case_from_json('{"start": "here"}')
 
 
-def test_facts_of_a_run_have_a_separate_namespace() -> None:
-    facts = log_header.run_metadata(about(), Clock(240))
+def test_facts_of_a_run_have_their_own_metadata_namespace() -> None:
+    facts = log_header.run_metadata(sample_header(), Clock(240))
     assert facts["seed"] == "7"
     assert log_header.extra_facts(facts) == {"simscen": "0.1.0"}
 
 
-def test_a_file_cannot_take_the_place_of_the_log_s_own() -> None:
+def test_attached_file_cannot_replace_an_attachment_of_the_log() -> None:
     with pytest.raises(ValueError, match=r"case\.json"):
         log_header.attachments(LogHeader("a", 1, Case(Pose2(0, 0), ()), files={"case.json": b""}))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from moments import CLOCK, about, moments
+from moments import CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.record.log_reader import read_log
@@ -23,10 +23,10 @@ def messages(path: Path) -> list[tuple[str, int, bytes]]:
 
 
 def killed(folder: Path, seconds: float) -> Path:
-    """The log of a process that a SIGKILL ended after so many simulated seconds."""
+    """Return the log of a process killed by SIGKILL after this simulated time."""
     child = os.fork()
     if child == 0:
-        recorder = Recorder(folder / "run.mcap", CLOCK, about())
+        recorder = Recorder(folder / "run.mcap", CLOCK, sample_header())
         for moment in moments(seconds):
             recorder.append(moment)
         os.kill(os.getpid(), signal.SIGKILL)
@@ -37,14 +37,14 @@ def killed(folder: Path, seconds: float) -> Path:
 @pytest.fixture
 def whole(tmp_path: Path) -> Path:
     path = tmp_path / "whole.mcap"
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(5.0):
             recorder.append(moment)
         recorder.close(CLOCK.ticks(5.0))
     return path
 
 
-def test_71_a_log_cut_anywhere_opens_in_a_reader_that_begins_with_the_index(tmp_path: Path, whole: Path) -> None:
+def test_71_log_truncated_anywhere_opens_in_an_indexed_reader(tmp_path: Path, whole: Path) -> None:
     expected, size = messages(whole), whole.stat().st_size
     for kept in (0.9, 0.7, 0.31):
         cut = tmp_path / "cut.partial.mcap"
@@ -69,7 +69,7 @@ def test_71_a_killed_log_keeps_95_percent_for_other_readers(tmp_path: Path, whol
 def test_a_killed_run_loses_at_most_one_simulated_second(tmp_path: Path, seconds: float) -> None:
     child = os.fork()
     if child == 0:  # writes through the same buffer as a run, and never flushes it by itself
-        recorder = Recorder(tmp_path / "run.mcap", CLOCK, about())
+        recorder = Recorder(tmp_path / "run.mcap", CLOCK, sample_header())
         log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
         for moment in moments(seconds):
             log.append(moment)
@@ -81,8 +81,8 @@ def test_a_killed_run_loses_at_most_one_simulated_second(tmp_path: Path, seconds
     assert CLOCK.ticks(seconds) - log_of_killed.trace.end <= CLOCK.ticks(1.0)
 
 
-def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
+def test_aborted_run_leaves_a_readable_log(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "run.mcap", CLOCK, sample_header()) as recorder:
         for moment in moments(1.0):
             recorder.append(moment)
         raise ZeroDivisionError
@@ -94,7 +94,7 @@ def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
-def test_file_that_is_no_log_is_unchanged(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_a_log_is_unchanged(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.partial.mcap"
     path.write_bytes(content)
     with pytest.raises(InvalidInput):

@@ -1,4 +1,4 @@
-"""The files are sound MCAP: the mcap library reads them in every way it has, checksums included."""
+"""Tests that the mcap library reads the written files in every way, with checksums."""
 
 import io
 import random
@@ -35,7 +35,7 @@ def ours() -> bytes:
 
 
 def theirs() -> bytes:
-    """The same calls on the library's own writer."""
+    """Make the same calls on the writer of the mcap library."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=1 << 16, compression=CompressionType.ZSTD)
     writer.start("ros2", "simscen")
@@ -50,7 +50,7 @@ def theirs() -> bytes:
     return stream.getvalue()
 
 
-def test_the_summary_is_the_one_that_the_library_writes() -> None:
+def test_summary_equals_that_of_the_mcap_library() -> None:
     mine, reference = (make_reader(io.BytesIO(data)).get_summary() for data in (ours(), theirs()))
     assert mine is not None
     assert reference is not None
@@ -78,14 +78,14 @@ def test_attachments_and_metadata_are_found_through_the_index() -> None:
     assert [(m.name, m.metadata) for m in reader.iter_metadata()] == [("facts", {"seed": "7"})]
 
 
-def test_a_changed_byte_anywhere_in_the_data_is_noticed() -> None:
+def test_any_changed_byte_in_the_data_is_detected() -> None:
     data = bytearray(ours())
     data[data.index(b"hello")] ^= 1
     with pytest.raises(ValueError, match="crc"):
         list(StreamReader(io.BytesIO(data), validate_crcs=True).records)
 
 
-def test_chunks_and_their_index_are_packed_as_the_library_packs_them() -> None:
+def test_chunks_and_their_index_equal_those_of_the_mcap_library() -> None:
     data, kinds = ours(), (records.Chunk, records.ChunkIndex, records.MessageIndex)
     theirs = []
     for record in StreamReader(io.BytesIO(data), emit_chunks=True).records:
@@ -97,22 +97,22 @@ def test_chunks_and_their_index_are_packed_as_the_library_packs_them() -> None:
     assert all(packed in data for packed in theirs)
 
 
-def test_a_message_larger_than_a_chunk_is_a_chunk_with_what_came_before() -> None:
+def test_message_larger_than_a_chunk_closes_the_current_chunk() -> None:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen", chunk_size=1000)
     channel = writer.channel("/t", TEXT, {})
-    said = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
-    for time, data in enumerate(said):
+    payloads = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
+    for time, data in enumerate(payloads):
         channel.write(time, data)
     writer.finish()
     reader = make_reader(io.BytesIO(stream.getvalue()), validate_crcs=True)
-    assert [message.data for _, _, message in reader.iter_messages()] == said
+    assert [message.data for _, _, message in reader.iter_messages()] == payloads
     summary = reader.get_summary()
     assert summary is not None
     assert [chunk.message_start_time for chunk in summary.chunk_indexes] == [0, 2, 3]
 
 
-def test_a_file_without_messages_is_sound() -> None:
+def test_file_without_messages_is_valid() -> None:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen")
     writer.channel("/t", TEXT, {})
@@ -125,8 +125,8 @@ def test_the_same_calls_give_the_same_bytes() -> None:
     assert ours() == ours()
 
 
-def test_messages_that_are_packed_together_give_the_bytes_of_single_ones() -> None:
-    """Also where a chunk ends among them, as it does here every few times, and where another is between them."""
+def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
+    """This holds also if a chunk ends, or another message is written, between them."""
     layouts = (topics.TRUTH, encode.odometry("map", "base")), (topics.CLEARANCE, encode.float64())
     pose, twist = Pose3(1.0, 2.0), Twist(0.5)
 

@@ -1,4 +1,4 @@
-"""Every packer writes the very bytes that rosbags writes for the same content, and reads them back."""
+"""Tests that packers write the same bytes as rosbags, and read them back."""
 
 from typing import Any
 
@@ -49,7 +49,7 @@ def ros_twist(twist: Twist) -> Any:
 
 
 def planar(row: Any) -> Pose3:
-    """As the packers turn headings: with numpy, whose sine may differ from the C library's in the last bit."""
+    """Return the pose with the orientation of numpy, as in the packers; the C library may round differently."""
     half = np.array([row[2]]) / 2
     return Pose3(float(row[0]), float(row[1]), 0.0, 0.0, 0.0, float(np.sin(half)[0]), float(np.cos(half)[0]))
 
@@ -59,25 +59,25 @@ def pose3(rng: np.random.Generator) -> Pose3:
 
 
 @given(stamps)
-def test_clock_is_what_rosbags_writes(stamp: Stamp) -> None:
+def test_clock_bytes_equal_those_of_rosbags(stamp: Stamp) -> None:
     assert encode.clock().packer()(stamp) == serialized(
         make("rosgraph_msgs/Clock", make("builtin_interfaces/Time", *stamp))
     )
 
 
 @given(st.floats(allow_nan=False))
-def test_float64_is_what_rosbags_writes(value: float) -> None:
+def test_float64_bytes_equal_those_of_rosbags(value: float) -> None:
     assert encode.float64().packer()(value) == serialized(make("std_msgs/Float64", value))
 
 
 @given(seeds)
-def test_twist_is_what_rosbags_writes(seed: int) -> None:
+def test_twist_bytes_equal_those_of_rosbags(seed: int) -> None:
     twist = Twist(*np.random.default_rng(seed).normal(size=3).tolist())
     assert encode.twist().packer()(twist) == serialized(ros_twist(twist))
 
 
 @given(seeds, stamps, names, names)
-def test_odometry_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, child: str) -> None:
+def test_odometry_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, child: str) -> None:
     rng = np.random.default_rng(seed)
     pose, twist = pose3(rng), Twist(*rng.normal(size=3).tolist())
     expected = make(
@@ -91,7 +91,7 @@ def test_odometry_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, ch
 
 
 @given(seeds, stamps, names, names)
-def test_odometry_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, child: str) -> None:
+def test_odometry_with_covariance_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, child: str) -> None:
     rng = np.random.default_rng(seed)
     pose, twist = pose3(rng), Twist(*rng.normal(size=3).tolist())
     covariance, variances = rng.normal(size=(3, 3)), rng.normal(size=3)
@@ -110,7 +110,7 @@ def test_odometry_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp
 
 
 @given(seeds, stamps, names)
-def test_imu_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None:
+def test_imu_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str) -> None:
     rng = np.random.default_rng(seed)
     turn, force = tuple(rng.normal(size=3).tolist()), tuple(rng.normal(size=3).tolist())
     unknown = np.zeros(9)
@@ -129,7 +129,7 @@ def test_imu_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None
 
 
 @given(seeds, stamps, names)
-def test_pose_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None:
+def test_pose_with_covariance_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str) -> None:
     rng = np.random.default_rng(seed)
     pose, covariance = pose3(rng), rng.normal(size=(3, 3))
     full = np.zeros((6, 6))
@@ -140,14 +140,14 @@ def test_pose_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp, fr
 
 
 @given(seeds, stamps, names)
-def test_pose_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None:
+def test_pose_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str) -> None:
     pose = pose3(np.random.default_rng(seed))
     expected = make("geometry_msgs/PoseStamped", header(stamp, frame), ros_pose(pose))
     assert encode.pose_stamped(frame).packer()(stamp, pose) == serialized(expected)
 
 
 @given(seeds, stamps, names, st.integers(0, 40))
-def test_scan_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, beams: int) -> None:
+def test_scan_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, beams: int) -> None:
     rng = np.random.default_rng(seed)
     ranges = rng.choice([np.inf, np.nan, 1.234, 20.0], size=beams)
     scan = Scan("lidar", 0, ranges, -3.0, 0.1, 0.05, 20.0)
@@ -162,7 +162,7 @@ def test_scan_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, beams:
 
 
 @given(seeds, stamps, names, st.integers(0, 12))
-def test_path_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, length: int) -> None:
+def test_path_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, length: int) -> None:
     points = np.random.default_rng(seed).normal(size=(length, 3))
     poses = [make("geometry_msgs/PoseStamped", header(stamp, frame), ros_pose(planar(row))) for row in points]
     expected = make("nav_msgs/Path", header(stamp, frame), poses)
@@ -170,7 +170,7 @@ def test_path_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, length
 
 
 @given(seeds, stamps, names, st.integers(1, 12))
-def test_particles_are_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, count: int) -> None:
+def test_particle_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, count: int) -> None:
     rows = np.random.default_rng(seed).normal(size=(count, 4))
     particles = [make("nav2_msgs/Particle", ros_pose(planar(row)), float(row[3])) for row in rows]
     expected = make("nav2_msgs/ParticleCloud", header(stamp, frame), particles)
@@ -178,7 +178,7 @@ def test_particles_are_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, 
 
 
 @given(seeds, st.lists(st.tuples(names, names, stamps), max_size=5))
-def test_transforms_are_what_rosbags_writes(seed: int, links: list[tuple[str, str, Stamp]]) -> None:
+def test_transform_bytes_equal_those_of_rosbags(seed: int, links: list[tuple[str, str, Stamp]]) -> None:
     rng = np.random.default_rng(seed)
     placed = [(*link, pose3(rng)) for link in links]
     transforms = [
@@ -194,7 +194,7 @@ def test_transforms_are_what_rosbags_writes(seed: int, links: list[tuple[str, st
 
 
 @given(seeds, stamps, names, st.integers(0, 9), st.integers(0, 9))
-def test_grid_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, height: int, width: int) -> None:
+def test_grid_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, height: int, width: int) -> None:
     cells = np.random.default_rng(seed).integers(-1, 101, size=(height, width), dtype=np.int8)
     origin = Pose2(-1.5, 2.25, 0.3)
     time = make("builtin_interfaces/Time", *stamp)
@@ -204,24 +204,24 @@ def test_grid_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, height
 
 
 @given(st.text(max_size=40))
-def test_text_is_what_rosbags_writes(text: str) -> None:
+def test_text_bytes_equal_those_of_rosbags(text: str) -> None:
     assert messages.string(text) == serialized(make("std_msgs/String", text))
 
 
 @pytest.mark.parametrize("value", [True, False])
-def test_a_bumper_is_what_rosbags_writes(value: bool) -> None:
+def test_bumper_bytes_equal_those_of_rosbags(value: bool) -> None:
     assert encode.boolean(value) == serialized(make("std_msgs/Bool", value))
 
 
 @given(stamps, st.integers(0, 255), names, st.text(max_size=40))
-def test_log_lines_are_what_rosbags_writes(stamp: Stamp, level: int, name: str, text: str) -> None:
+def test_log_line_bytes_equal_those_of_rosbags(stamp: Stamp, level: int, name: str, text: str) -> None:
     expected = make("rcl_interfaces/Log", make("builtin_interfaces/Time", *stamp), level, name, text, "", "", 0)
     assert messages.log(stamp, level, name, text) == serialized(expected)
 
 
 @settings(deadline=None)
 @given(seeds, stamps, names, st.integers(0, 5), st.integers(0, 5))
-def test_pictures_are_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, height: int, width: int) -> None:
+def test_image_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str, height: int, width: int) -> None:
     rng = np.random.default_rng(seed)
     rgb = rng.integers(0, 256, size=(height, width, 3), dtype=np.uint8)
     depth = rng.uniform(0, 5, size=(height, width)).astype(np.float32)

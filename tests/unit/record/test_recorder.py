@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from moments import CASE, CLOCK, about, moments
+from moments import CASE, CLOCK, moments, sample_header
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from schemas_from_rosbags import humble
@@ -39,7 +39,7 @@ TOPICS = LATCHED | {
 
 def record(run: list[Moment], seed: int = 7) -> bytes:
     stream = io.BytesIO()
-    recorder = Recorder(stream, CLOCK, about(seed))
+    recorder = Recorder(stream, CLOCK, sample_header(seed))
     for moment in run:
         recorder.append(moment)
     recorder.close(480, "{}")
@@ -55,7 +55,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """All messages by topic, with their times, as rosbags decodes them."""
+    """Return all messages by topic, with their times, decoded by rosbags."""
     found: dict[str, list[tuple[int, Any]]] = {}
     with AnyReader([path], default_typestore=humble()) as reader:
         for connection, time, data in reader.messages():
@@ -78,7 +78,7 @@ def test_mcap_ros2_decodes_every_message(path: Path) -> None:
     assert summary.statistics.message_count == topics.total()
 
 
-def test_only_what_late_subscribers_need_is_latched(path: Path) -> None:
+def test_only_topics_for_late_subscribers_are_transient_local(path: Path) -> None:
     with AnyReader([path], default_typestore=humble()) as reader:
         for connection in reader.connections:
             (profile,) = connection.ext.offered_qos_profiles
@@ -86,7 +86,7 @@ def test_only_what_late_subscribers_need_is_latched(path: Path) -> None:
             assert profile.durability is expected
 
 
-def test_type_hashes_are_those_of_ros(path: Path) -> None:
+def test_type_hashes_equal_those_of_ros(path: Path) -> None:
     store = humble()
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
@@ -96,7 +96,7 @@ def test_type_hashes_are_those_of_ros(path: Path) -> None:
         assert channel.metadata["topic_type_hash"] == store.hash_rihs01(name)
 
 
-def test_truth_is_in_the_log_to_the_last_bit(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_truth_is_logged_exactly(read: dict[str, list[tuple[int, Any]]]) -> None:
     for (time, message), moment in zip(read["/ground_truth/odom"], RUN, strict=True):
         assert moment.truth is not None
         pose = message.pose.pose
@@ -106,7 +106,7 @@ def test_truth_is_in_the_log_to_the_last_bit(read: dict[str, list[tuple[int, Any
         assert (message.twist.twist.linear.x, message.twist.twist.angular.z) == moment.truth.twist[::2]
 
 
-def test_scans_carry_ranges_frame_and_the_time_they_were_taken(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_scans_have_their_ranges_frame_and_acquisition_time(read: dict[str, list[tuple[int, Any]]]) -> None:
     scans = [r for m in RUN for r in m.readings if isinstance(r, Scan) and r.sensor == "lidar"]
     for (_, message), scan in zip(read["/scan"], scans, strict=True):
         assert np.array_equal(message.ranges, scan.ranges.astype(np.float32))
@@ -127,21 +127,21 @@ def test_the_frames_form_one_tree_under_map(read: dict[str, list[tuple[int, Any]
     assert {t.child_frame_id for t in read["/tf_static"][-1][1].transforms} == {"camera", "lidar", "rear lidar"}
 
 
-def test_the_map_is_the_one_the_robot_was_given(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_logged_map_equals_that_of_the_robot(read: dict[str, list[tuple[int, Any]]]) -> None:
     ((time, message),) = read["/map"]
-    given = about().map
+    given = sample_header().map
     assert given is not None
     assert time == 0
     assert (message.info.height, message.info.width) == given.shape
     assert np.array_equal(message.data.reshape(given.shape), given.cells)
 
 
-def test_an_accepted_goal_is_shown_where_the_scenario_has_it(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_accepted_goal_is_published_at_its_pose(read: dict[str, list[tuple[int, Any]]]) -> None:
     ((_, message),) = read["/goal_pose"]
     assert (message.pose.position.x, message.pose.position.y) == CASE.goals[0].pose[:2]
 
 
-def test_particles_come_twice_a_second(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_particles_are_logged_at_2_hz(read: dict[str, list[tuple[int, Any]]]) -> None:
     assert [time for time, _ in read["/particle_cloud"]] == [n * 500_000_000 for n in range(5)]
     assert len(read["/particle_cloud"][0][1].particles) == 500
 
@@ -163,7 +163,7 @@ def test_equal_runs_give_equal_bytes_in_any_process() -> None:
     assert digests == {hashlib.sha256(record(RUN)).hexdigest()}
 
 
-def test_a_sensor_cannot_speak_for_the_truth() -> None:
+def test_sensors_cannot_publish_on_truth_topics() -> None:
     odometry = [Odometry(name, 0, Pose2(1.0, 2.0), STOP) for name in ("wheels", "ground_truth", "2nd wheels")]
     summary = make_reader(io.BytesIO(record([Moment(0, None, tuple(odometry), Decision(STOP))]))).get_summary()
     assert summary is not None
@@ -172,18 +172,18 @@ def test_a_sensor_cannot_speak_for_the_truth() -> None:
     assert "/ground_truth/odom" not in topics
 
 
-def test_the_reference_page_names_every_topic() -> None:
+def test_reference_page_lists_every_topic() -> None:
     page = (HERE.parents[2] / "docs" / "reference" / "mcap.md").read_text()
     for topic in TOPICS - {"/rear_lidar/scan", "/visual/odom"}:
         assert f"`{topic.replace('/camera', '/NAME')}`" in page, topic
 
 
-def test_another_seed_gives_other_bytes() -> None:
+def test_different_seeds_give_different_logs() -> None:
     assert record(RUN[:5], seed=7) != record(RUN[:5], seed=8)
 
 
-def test_a_log_has_its_name_only_when_it_is_whole(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
+def test_log_has_its_final_name_only_when_complete(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", CLOCK, sample_header()) as recorder:
         recorder.append(RUN[0])
         assert [p.name for p in tmp_path.iterdir()] == ["run.partial.mcap"]
         recorder.close(0)
@@ -196,18 +196,18 @@ def test_a_full_disk_is_reported(tmp_path: Path) -> None:
         pytest.skip("this system has no /dev/full")
     (tmp_path / "run.partial.mcap").symlink_to(full)
     with pytest.raises(RunError, match=r"no space left writing .*run\.partial\.mcap") as caught:
-        Recorder(tmp_path / "run.mcap", CLOCK, about())
+        Recorder(tmp_path / "run.mcap", CLOCK, sample_header())
     assert caught.value.kind == "output"
 
 
 def test_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"cannot write .*: No such file"):
-        Recorder(tmp_path / "no" / "run.mcap", CLOCK, about())
+        Recorder(tmp_path / "no" / "run.mcap", CLOCK, sample_header())
 
 
 def test_external_stack_has_a_metadata_record() -> None:
     stream = io.BytesIO()
-    Recorder(stream, CLOCK, about(7)).close(0, stack={"name": "mine"})
+    Recorder(stream, CLOCK, sample_header(7)).close(0, stack={"name": "mine"})
     log = stream.getvalue()
     records = [(record.name, record.metadata) for record in make_reader(io.BytesIO(log)).iter_metadata()]
     assert records[1] == ("simscen.stack", {"name": "mine"})
@@ -217,7 +217,7 @@ def test_external_stack_has_a_metadata_record() -> None:
 
 
 def with_filter(run: list[Moment]) -> list[Moment]:
-    """The same run with a stack that filters the odometry: 1 m further ahead."""
+    """Return the same run with a stack whose filtered odometry is 1 m ahead."""
     found = []
     for moment in run:
         own = [each for each in moment.readings if isinstance(each, Odometry) and each.sensor == "wheels"]
@@ -226,7 +226,7 @@ def with_filter(run: list[Moment]) -> list[Moment]:
     return found
 
 
-def test_the_filter_of_the_stack_defines_where_the_base_is_in_the_odom_frame(tmp_path: Path) -> None:
+def test_filtered_odometry_of_the_stack_defines_the_odom_transform(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(record(with_filter(RUN)))
     with AnyReader([path], default_typestore=humble()) as reader:

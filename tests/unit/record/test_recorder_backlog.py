@@ -12,18 +12,18 @@ from simscen.record.moment_buffer import MomentBuffer
 SOME = list(moments(2.0))
 
 
-class Heard:
-    """A log that keeps what it is told, with its name, in the order of all logs."""
+class ListLog:
+    """Log that appends its name and the tick of each moment to a list that all logs share."""
 
-    def __init__(self, name: str, told: list[tuple[str, int]]) -> None:
-        self.name, self.told = name, told
+    def __init__(self, name: str, written: list[tuple[str, int]]) -> None:
+        self.name, self.written = name, written
 
     def append(self, moment: Moment) -> None:
-        self.told.append((self.name, moment.tick))
+        self.written.append((self.name, moment.tick))
 
 
-class Full:
-    """A log on a disk without room."""
+class FullDisk:
+    """Log on a full disk."""
 
     def append(self, moment: Moment) -> None:
         raise RunError("output", "no space left")
@@ -31,71 +31,71 @@ class Full:
 
 @pytest.mark.parametrize("ticks", [0, 1, 60, 10_000])
 def test_queued_messages_are_written_once_in_order(ticks: int) -> None:
-    told: list[tuple[str, int]] = []
+    written: list[tuple[str, int]] = []
     backlog = MomentBuffer(ticks)
-    robots = [backlog.sink(Heard(name, told)) for name in "ab"]
+    robots = [backlog.sink(ListLog(name, written)) for name in "ab"]
     for moment in SOME:
         for robot in robots:
             robot.append(moment)
     backlog.flush()
     backlog.flush()
-    assert told == [(name, moment.tick) for moment in SOME for name in "ab"]
+    assert written == [(name, moment.tick) for moment in SOME for name in "ab"]
 
 
-def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
-    told: list[tuple[str, int]] = []
-    log = MomentBuffer(48).sink(Heard("", told))
+def test_messages_wait_at_most_for_the_given_ticks() -> None:
+    written: list[tuple[str, int]] = []
+    log = MomentBuffer(48).sink(ListLog("", written))
     for moment in SOME:
         log.append(moment)
-        assert moment.tick - told[-1][1] <= 48
+        assert moment.tick - written[-1][1] <= 48
 
 
-def test_without_ticks_nothing_waits() -> None:
-    told: list[tuple[str, int]] = []
-    log = MomentBuffer(0).sink(Heard("", told))
+def test_messages_are_written_immediately_with_a_delay_of_zero() -> None:
+    written: list[tuple[str, int]] = []
+    log = MomentBuffer(0).sink(ListLog("", written))
     for moment in SOME:
         log.append(moment)
-        assert told[-1][1] == moment.tick
+        assert written[-1][1] == moment.tick
 
 
 def test_file_is_notified_after_each_flush() -> None:
-    told: list[tuple[str, int]] = []
+    written: list[tuple[str, int]] = []
 
     class File:
         def flush_if_due(self) -> None:
-            told.append(("file", told[-1][1]))
+            written.append(("file", written[-1][1]))
 
-    log = MomentBuffer(48, File()).sink(Heard("", told))
+    log = MomentBuffer(48, File()).sink(ListLog("", written))
     for moment in SOME:
         log.append(moment)
-    settled = [tick for who, tick in told if who == "file"]
-    assert len(settled) > 5
-    assert all(later - earlier == 48 for earlier, later in pairwise(settled))
+    flushes = [tick for log_name, tick in written if log_name == "file"]
+    assert len(flushes) > 5
+    assert all(later - earlier == 48 for earlier, later in pairwise(flushes))
 
 
 def test_log_of_each_robot_is_complete() -> None:
-    told: list[tuple[str, int]] = []
+    written: list[tuple[str, int]] = []
     backlog = MomentBuffer(60)
-    log = backlog.sink(Heard("trace", told), Heard("log", told))
+    log = backlog.sink(ListLog("trace", written), ListLog("log", written))
     for moment in SOME:
         log.append(moment)
     backlog.flush()
     for name in ("trace", "log"):
-        assert [tick for who, tick in told if who == name] == [moment.tick for moment in SOME]
+        assert [tick for log_name, tick in written if log_name == name] == [moment.tick for moment in SOME]
 
 
 def test_queued_messages_are_written_when_a_run_aborts() -> None:
-    told: list[tuple[str, int]] = []
+    written: list[tuple[str, int]] = []
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
-        log = backlog.sink(Heard("", told))
+        log = backlog.sink(ListLog("", written))
         for moment in SOME:
             log.append(moment)
         raise ZeroDivisionError
-    assert told[-1][1] == SOME[-1].tick
+    assert written[-1][1] == SOME[-1].tick
 
 
 def test_abort_reason_is_reported_despite_a_full_disk() -> None:
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
         backlog.next_flush_tick = 1
-        backlog.sink(Full()).append(SOME[0])
+        backlog.sink(FullDisk()).append(SOME[0])
         raise ZeroDivisionError

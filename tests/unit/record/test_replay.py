@@ -8,7 +8,7 @@ import pytest
 from any_moments import runs
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moments import CASE, CLOCK, about, moments
+from moments import CASE, CLOCK, moments, sample_header
 
 from simscen.core.messages.navigation import Path as Plan
 from simscen.core.records.trace import Moment, Samples, Trace
@@ -22,7 +22,7 @@ RESULT = '{"status": "pass"}'
 
 def recorded(path: Path, run: "list[Moment]", end: int) -> Trace:
     builder = TraceBuilder(CLOCK)
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in run:
             recorder.append(moment)
             builder.append(moment)
@@ -31,7 +31,7 @@ def recorded(path: Path, run: "list[Moment]", end: int) -> Trace:
 
 
 def exact(value: object) -> object:
-    """Something that is equal for equal bits only: nan equals itself, 0.0 is not -0.0."""
+    """Return a value that is equal only for equal bits: nan equals itself, 0.0 is not -0.0."""
     match value:
         case np.ndarray():
             return value.dtype.str, value.shape, value.tobytes()
@@ -57,14 +57,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_replayed_log_gives_the_very_same_trace(tmp_path: Path, seed: int) -> None:
+def test_replayed_log_gives_a_bit_identical_trace(tmp_path: Path, seed: int) -> None:
     trace = recorded(tmp_path / "run.mcap", list(moments(2.0, seed)), 481)
     assert_same(trace, read_log(tmp_path / "run.mcap").trace)
 
 
 @settings(max_examples=50, deadline=None)
 @given(run=runs, rest=st.integers(0, 10**7))
-def test_any_moments_are_replayed_to_the_last_bit(
+def test_any_moments_are_replayed_exactly(
     tmp_path_factory: pytest.TempPathFactory, run: list[Moment], rest: int
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "run.mcap"
@@ -72,8 +72,8 @@ def test_any_moments_are_replayed_to_the_last_bit(
     assert_same(recorded(path, run, end), read_log(path).trace)
 
 
-def test_a_log_knows_how_its_run_was_ordered(log: Path) -> None:
-    read, given_ = read_log(log), about()
+def test_log_contains_the_case_and_facts_of_its_run(log: Path) -> None:
+    read, given_ = read_log(log), sample_header()
     assert read.complete
     assert read.result == RESULT
     for name in ("name", "seed", "case", "scenario", "robot_description", "files", "facts"):
@@ -83,7 +83,7 @@ def test_a_log_knows_how_its_run_was_ordered(log: Path) -> None:
 
 
 def test_the_map_is_read_back_exactly(log: Path) -> None:
-    ours, theirs = read_log(log).header.map, about().map
+    ours, theirs = read_log(log).header.map, sample_header().map
     assert ours is not None
     assert theirs is not None
     assert exact(ours.cells) == exact(theirs.cells)

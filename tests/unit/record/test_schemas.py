@@ -1,4 +1,4 @@
-"""The message definitions that ship are those of ROS 2 Humble."""
+"""Tests that the shipped message definitions are those of ROS 2 Humble."""
 
 import json
 
@@ -8,11 +8,11 @@ from simscen.record import topics
 from simscen.record.topics import Topic, load_message_types
 
 
-def test_schemas_have_not_drifted_from_rosbags() -> None:
+def test_schemas_equal_those_of_rosbags() -> None:
     assert json.loads(SCHEMAS.read_text()) == expected()
 
 
-def test_every_topic_has_a_message_type_that_ships() -> None:
+def test_every_topic_has_a_shipped_message_type() -> None:
     types = {topic.type for topic in vars(topics).values() if isinstance(topic, Topic)}
     types |= {value for name, value in vars(topics).items() if name.endswith("_TYPE")}
     assert types == set(load_message_types())

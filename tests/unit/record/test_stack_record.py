@@ -1,10 +1,10 @@
-"""Tests of reading what an external stack reported: its log lines, and the facts about it."""
+"""Tests of reading the log lines and facts that an external stack reported."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from moments import CLOCK, about, moments
+from moments import CLOCK, moments, sample_header
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import LogLine, Moment
@@ -25,7 +25,7 @@ def run_with_lines(tick: int) -> list[Moment]:
 
 def test_lines_of_the_stack_are_read_at_their_ticks_without_events(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in run_with_lines(48):
             recorder.append(moment)
         recorder.close(120, "{}", {"external": "nav2", "about": "{}"})
@@ -37,7 +37,8 @@ def test_lines_of_the_stack_are_read_at_their_ticks_without_events(tmp_path: Pat
 
 def test_each_of_several_robots_has_its_own_stack_and_lines(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with Recorder(path, CLOCK, replace(about(), robots={"a": about(), "b": about()})) as recorder:
+    header = replace(sample_header(), robots={name: sample_header() for name in "ab"})
+    with Recorder(path, CLOCK, header) as recorder:
         for moment, other in zip(moments(0.5), run_with_lines(24), strict=True):
             recorder.robots["a"].append(moment)
             recorder.robots["b"].append(other)
@@ -48,9 +49,9 @@ def test_each_of_several_robots_has_its_own_stack_and_lines(tmp_path: Path) -> N
     assert robots["b"].sensors.stack_lines() == [(24, line) for line in LINES]
 
 
-def test_a_log_with_two_descriptions_of_the_stack_is_refused(tmp_path: Path) -> None:
+def test_log_with_two_stack_records_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with Recorder(path, CLOCK, about()) as recorder:
+    with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(0.2):
             recorder.append(moment)
         recorder._writer.add_metadata(log_header.STACK_RECORD, {"external": "nav2"})

@@ -1,4 +1,4 @@
-"""Templates align as CDR asks, and readers read what they wrote."""
+"""Tests of message templates: CDR alignment, packing, and reading."""
 
 import struct
 
@@ -16,13 +16,13 @@ def test_alignment_is_counted_after_the_header() -> None:
     assert bytes(message.buffer) == b"\0\1\0\0" + b"\1" + bytes(7) + struct.pack("<d", 1.0)
 
 
-def test_a_string_carries_its_length_with_the_closing_nul() -> None:
+def test_string_length_includes_the_terminating_nul() -> None:
     message = Template()
     message.string("añ")
     assert bytes(message.buffer[4:]) == b"\4\0\0\0a\xc3\xb1\0"
 
 
-def test_a_packer_puts_fields_into_slots_and_leaves_the_constants_alone() -> None:
+def test_packer_writes_fields_and_keeps_constants() -> None:
     message = Template()
     message.slot("iI", "*stamp")
     message.string("map")
@@ -39,7 +39,7 @@ def test_a_packer_puts_fields_into_slots_and_leaves_the_constants_alone() -> Non
     assert reader.take("5d") == (0.0, 0.0, 2.5, 0.0, 3.5)
 
 
-def test_fields_that_are_called_alike_are_asked_for_once() -> None:
+def test_fields_with_the_same_name_are_one_argument() -> None:
     one, other = Template(prefix=b""), Template(prefix=b"")
     one.slot("d", "value")
     other.slot("i", "count")
@@ -47,7 +47,7 @@ def test_fields_that_are_called_alike_are_asked_for_once() -> None:
     assert compile_packer((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
-def test_a_reader_reads_what_a_template_wrote() -> None:
+def test_reader_reads_messages_of_the_template() -> None:
     message = Template()
     message.put("B", 7)
     message.string("odom")
@@ -58,7 +58,7 @@ def test_a_reader_reads_what_a_template_wrote() -> None:
     assert reader.array("f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
 
 
-def test_a_message_that_ends_too_early_is_an_error() -> None:
+def test_truncated_message_is_an_error() -> None:
     message = Template()
     message.put("I", 5)
     data = bytes(message.buffer)

@@ -33,7 +33,7 @@ def assert_poses(values: np.ndarray, expected: "list[tuple[float, ...]]") -> Non
     assert np.abs(wrap_array(values[:, 2] - rows[:, 2])).max() < 1e-14
 
 
-def test_truth_is_sampled_where_there_is_truth(trace: Trace) -> None:
+def test_truth_is_sampled_at_moments_with_truth(trace: Trace) -> None:
     true = [(m.tick, m.truth) for m in RUN if m.truth]
     assert trace.truth.ticks.tolist() == trace.clearance.ticks.tolist() == [tick for tick, _ in true]
     assert_poses(trace.truth.values, [truth.pose.plane for _, truth in true])
@@ -49,13 +49,13 @@ def test_beliefs_carry_pose_and_upper_covariance(trace: Trace) -> None:
     assert trace.belief.values[:, 3:].tolist() == upper
 
 
-def test_odometry_is_that_of_the_first_sensor(trace: Trace) -> None:
+def test_odometry_of_the_first_sensor_is_used(trace: Trace) -> None:
     wheels = [(m.tick, r.pose) for m in RUN for r in m.readings if isinstance(r, Odometry) and r.sensor == "wheels"]
     assert trace.odometry.ticks.tolist() == [tick for tick, _ in wheels]
     assert_poses(trace.odometry.values, [pose for _, pose in wheels])
 
 
-def test_the_command_at_any_beat_is_the_one_that_was_decided(trace: Trace) -> None:
+def test_command_at_any_beat_is_the_last_decision(trace: Trace) -> None:
     held = trace.command.at(np.array([m.tick for m in RUN]))
     assert held.tolist() == [list(m.decision.command) for m in RUN]
 
@@ -68,7 +68,7 @@ def test_object_pose_at_a_cycle_is_the_true_pose(trace: Trace) -> None:
         assert_poses(held, [objects[name].plane for _, objects in seen])
 
 
-def test_scans_are_the_beats_at_which_any_lidar_spoke(trace: Trace) -> None:
+def test_scan_times_are_those_of_all_lidars(trace: Trace) -> None:
     assert trace.scans.tolist() == [m.tick for m in RUN if any(isinstance(r, Scan) for r in m.readings)]
 
 
@@ -85,7 +85,7 @@ def test_events_of_world_and_stack_are_kept_in_order() -> None:
     assert traced([moment]).events == (world, stack)
 
 
-def test_a_run_that_broke_off_at_once_has_an_empty_trace() -> None:
+def test_run_aborted_at_the_start_has_an_empty_trace() -> None:
     trace = traced([], end=0)
     assert trace.truth.values.shape == (0, 3)
     assert trace.belief.values.shape == (0, 9)

@@ -26,7 +26,7 @@ def changed(samples: Samples, row: int, column: int, by: float) -> Samples:
     return Samples(samples.ticks, values)
 
 
-def test_a_trace_does_not_differ_from_itself(trace: Trace) -> None:
+def test_trace_does_not_differ_from_itself(trace: Trace) -> None:
     assert first_difference(trace, trace) is None
 
 

@@ -26,7 +26,7 @@ def moved(trace: Trace, column: int, by: float) -> Trace:
 
 
 @pytest.mark.parametrize(("column", "by"), [(0, 0.0), (0, 1e-12), (1, -9e-6), (2, 9e-6), (2, 2 * math.pi)])
-def test_runs_that_differ_in_last_bits_agree(trace: Trace, column: int, by: float) -> None:
+def test_runs_that_differ_by_rounding_are_equal(trace: Trace, column: int, by: float) -> None:
     assert first_pose_difference(trace, moved(trace, column, by)) is None
 
 
@@ -37,6 +37,6 @@ def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, by:
     )
 
 
-def test_different_end_is_a_difference(trace: Trace) -> None:
+def test_different_end_is_reported(trace: Trace) -> None:
     assert first_pose_difference(trace, dataclasses.replace(trace, end=241)) == "the runs end at ticks 240 and 241"
     assert "tick rate" in str(first_pose_difference(trace, dataclasses.replace(trace, tick_rate=100)))

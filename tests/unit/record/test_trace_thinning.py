@@ -17,33 +17,33 @@ def test_an_unchanged_command_is_kept_twenty_times_a_second() -> None:
     assert sum(thinning.keeps_command(tick, STOP) for tick in range(240)) == 20
 
 
-def test_only_the_first_odometry_is_the_robots() -> None:
+def test_only_odometry_of_the_first_sensor_is_kept() -> None:
     thinning = Thinning(240)
     readings = [Odometry(name, 0, Pose2(0, 0), STOP) for name in ("wheels", "visual", "wheels")]
     assert [thinning.keeps_odometry(reading) for reading in readings] == [True, False, True]
 
 
-def test_things_that_stand_still_are_kept_once_a_second() -> None:
+def test_stationary_objects_are_kept_once_a_second() -> None:
     thinning = Thinning(240)
     still = [thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
     assert sum(map(len, still)) == 2
 
 
-def test_resting_objects_are_recorded_every_second() -> None:
+def test_each_stationary_object_is_kept_one_second_after_its_last_sample() -> None:
     thinning, box, both = Thinning(240), {"box": Pose3()}, {"box": Pose3(), "cart": Pose3()}
     seen = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
-    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, things))) for tick, things in seen}
+    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, objects))) for tick, objects in seen}
     expected = {0: {"box"}, 6: {"cart"}, 240: {"box"}, 246: {"cart"}, 480: {"box"}, 486: {"cart"}}
     assert {tick: names for tick, names in kept.items() if names} == expected
 
 
-def test_things_that_move_are_always_kept() -> None:
+def test_moving_objects_are_always_kept() -> None:
     thinning = Thinning(240)
     for tick in range(5):
         pose = Pose3(x=float(tick))
         assert thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == {"cart": pose}
 
 
-def test_a_throttle_lets_pass_at_its_rate_and_at_once() -> None:
+def test_throttle_passes_the_first_message_and_then_its_rate() -> None:
     throttle = Throttle(240, 2)
     assert [tick for tick in range(5, 500) if throttle.passes(tick)] == [5, 125, 245, 365, 485]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from diagnosis_cases import CASE, DOOR, STANDS, box, by, why
+from diagnosis_cases import CASE, DOOR, STATIONARY, box, why, with_event
 
 from simscen.judge.goal_failure_causes import MovableObject, diagnose_blocked_path, movable_objects
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
@@ -42,7 +42,7 @@ def test_two_objects_that_close_the_passage_together_are_both_named():
     [
         [],
         box(1, "crate", 5, 5, 0.6, 0.9, "crate falls"),
-        [*box(1, "crate", 5, 0, 0.6, 0.9, "crate falls"), *by("", 2, [2, "object.removed", "crate", {}])],
+        [*box(1, "crate", 5, 0, 0.6, 0.9, "crate falls"), *with_event("", 2, [2, "object.removed", "crate", {}])],
         box(1, "crate", 2, 0, 0.6, 0.9, "crate falls"),
     ],
 )
@@ -50,7 +50,7 @@ def test_object_outside_the_passage_is_not_reported(events):
     assert why("goals_reached", events) == []
 
 
-def test_a_passage_that_the_robot_has_passed_does_not_keep_it():
+def test_passage_behind_the_robot_is_not_a_cause():
     case = {**CASE, "passages": [["study", [3.9, 0.5], [3.9, -0.5], "a", "b"], DOOR]}
     crate = box(1, "crate", 3.2, 0, 0.2, 1.0, "crate falls")
     assert why("result", box(1, "crate", 3.9, 0, 0.2, 1.0, "crate falls"), case={**case, "inscribed_radius": 0.05}) == [
@@ -60,7 +60,7 @@ def test_a_passage_that_the_robot_has_passed_does_not_keep_it():
 
 
 def test_moved_object_counts_at_its_current_pose():
-    moved = by("cart comes", 3, [3, "object.moved", "cart", {}])
+    moved = with_event("cart comes", 3, [3, "object.moved", "cart", {}])
     (line,) = why(
         "goals_reached", [*box(0, "cart", 5, 9, 0.6, 1.2), *moved], objects={"cart": [[0, 5, 9], [3, 5, 9], [5, 5, 0]]}
     )
@@ -88,7 +88,7 @@ def test_three_centimeters_of_free_space_are_reported():
     assert "0.03 m are left" in line
 
 
-def test_a_robot_off_the_way_has_all_passages_before_it():
+def test_robot_off_the_path_has_not_passed_any_passage():
     case = {**CASE, "passages": [["study", [3.4, 0.5], [3.4, -0.5], "a", "b"], DOOR]}
     crate = box(1, "crate", 3.4, 0, 0.1, 2.0, "crate falls")
     assert why("result", crate, case=case)[0].startswith(
@@ -103,7 +103,7 @@ def doors(*at):
 
 
 @pytest.mark.parametrize(
-    ("at", "case", "told"),
+    ("at", "case", "is_reported"),
     [
         (3.0, doors(3.0, 3.9, 5.0, 6.0), False),
         (3.9, doors(3.0, 3.9, 5.0, 6.0), False),
@@ -117,30 +117,30 @@ def doors(*at):
         (3.9, doors(3.9), True),
     ],
 )
-def test_the_passages_from_the_robot_on_count(at, case, told):
+def test_only_passages_ahead_of_the_robot_count(at, case, is_reported):
     lines = why("result", box(1, "crate", at, 0, 0.02, 2.0), case=case)
-    assert any("closes" in line for line in lines) is told
+    assert any("closes" in line for line in lines) is is_reported
 
 
-def test_a_passage_in_line_with_the_next_is_not_passed():
+def test_collinear_passage_is_not_counted_as_passed():
     case = {**CASE, "passages": [["study", [3.9, 0.5], [3.9, -0.5], "a", "b"], ["study", [3.9, 3], [3.9, 2], "a", "b"]]}
     assert "closes" in why("result", box(1, "crate", 3.9, 0, 0.02, 2.0), case=case)[0]
 
 
-def test_a_long_robot_needs_more_room_to_turn():
+def test_long_robot_needs_more_space_to_turn():
     long = {**CASE, "footprint": [[0.1, 0.2], [-0.6, 0.2], [-0.6, -0.2], [0.1, -0.2]]}
     (line,) = why("result", box(1, "crate", 5, -0.5, 0.6, 1.1), case=long)
     assert "0.45 m are left" in line
 
 
-def test_two_centimeters_are_not_nothing_and_room_is_looked_for_up_to_the_very_end():
+def test_remaining_gap_of_two_centimeters_and_gap_at_the_wall_are_found():
     assert "0.02 m are left" in why("result", box(1, "crate", 5, 0, 0.6, 0.95))[0]
     assert "0.10 m are left" in why("result", box(1, "crate", 5, -0.3, 0.6, 1.4))[0]
 
 
 @dataclass(frozen=True)
 class Fog(MovableObject):
-    """What is equally near to every place."""
+    """Object at the same distance from every point."""
 
     near: float = 0.0
 
@@ -148,40 +148,40 @@ class Fog(MovableObject):
         return np.full(len(points), self.near)
 
 
-def told(*there, **changes):
-    fogs = [Fog(name, (), "", 0, False, near) for name, near in there]
-    lines, _ = diagnose_blocked_path(synthetic_trace(STANDS), synthetic_case({**CASE, **changes}), "study", 2400, fogs)
+def blocked_path_text(*objects, **changes):
+    fogs = [Fog(name, (), "", 0, False, near) for name, near in objects]
+    lines, _ = diagnose_blocked_path(synthetic_trace(STATIONARY), synthetic_case(CASE | changes), "study", 2400, fogs)
     return " ".join(lines)
 
 
-def said(*there, **changes):
-    return told(*there, **changes).split(" the passage")[0]
+def blocking_text(*objects, **changes):
+    return blocked_path_text(*objects, **changes).split(" the passage")[0]
 
 
-def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_hampered():
-    assert said(("fog", 0.2)) == "fog narrows"
-    assert said(("fog", 0.199)) == "fog closes"
-    assert said(("fog", 0.2), footprint=[]) == ""
+def test_gap_as_wide_as_the_robot_narrows_and_gap_to_turn_in_is_not_reported():
+    assert blocking_text(("fog", 0.2)) == "fog narrows"
+    assert blocking_text(("fog", 0.199)) == "fog closes"
+    assert blocking_text(("fog", 0.2), footprint=[]) == ""
 
 
 def test_remaining_gap_is_reported_from_two_centimeters():
-    assert "the shortest path: 0.02 m are left" in told(("fog", 0.01))
-    assert "the shortest path: nothing is left" in told(("fog", 0.0099))
+    assert "the shortest path: 0.02 m are left" in blocked_path_text(("fog", 0.01))
+    assert "the shortest path: nothing is left" in blocked_path_text(("fog", 0.0099))
 
 
-def test_two_centimeters_less_than_the_passage_has_are_no_change():
-    assert said(("fog", 0.49), footprint=[[0.6, 0.8]]) == ""
-    assert said(("fog", 0.48), footprint=[[0.6, 0.8]]) == "fog narrows"
+def test_passage_narrowed_by_less_than_two_centimeters_is_not_reported():
+    assert blocking_text(("fog", 0.49), footprint=[[0.6, 0.8]]) == ""
+    assert blocking_text(("fog", 0.48), footprint=[[0.6, 0.8]]) == "fog narrows"
 
 
 def test_last_closing_object_is_named():
-    assert said(("a", 0.1), ("b", 0.1), ("c", 0.1)) == "c closes"
-    assert said(("a", 0.1), ("b", 0.2)) == "a closes"
-    assert said(("a", 0.25), ("b", 0.4)) == "a narrows"
+    assert blocking_text(("a", 0.1), ("b", 0.1), ("c", 0.1)) == "c closes"
+    assert blocking_text(("a", 0.1), ("b", 0.2)) == "a closes"
+    assert blocking_text(("a", 0.25), ("b", 0.4)) == "a narrows"
 
 
 def test_uninvolved_object_is_not_named():
-    trace = synthetic_trace({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
+    trace = synthetic_trace({**STATIONARY, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
     fogs = [Fog("haze", (), "", 0, False, 0.49), Fog("mist", (), "", 0, False, 0.6)]
     (line,), _ = diagnose_blocked_path(
         trace, synthetic_case(CASE), "study", 2400, [*movable_objects(trace, 2400), *fogs]

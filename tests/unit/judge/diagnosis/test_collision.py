@@ -1,6 +1,6 @@
 """Tests of the diagnosis of collisions."""
 
-from diagnosis_cases import box, by, why
+from diagnosis_cases import box, why, with_event
 
 HIT = [2, "collision.started", "crate", {"robot_caused": True}]
 
@@ -11,10 +11,10 @@ def test_spawned_object_is_reported_with_its_distance():
 
 
 def test_object_that_hit_the_robot_is_reported_with_its_speed():
-    moved = by("cart comes", 1, [1, "object.moved", "crate", {}])
+    moved = with_event("cart comes", 1, [1, "object.moved", "crate", {}])
     hit = [*HIT[:3], {"robot_caused": False}]
-    way = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}
-    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *moved, hit], at=2, objects=way) == [
+    trajectory = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *moved, hit], at=2, objects=trajectory) == [
         "why: crate: event `cart comes` had moved it 1.00 s before, it moved at 3.50 m/s, and ran into the robot"
     ]
     assert why("collisions", [*box(0, "crate", 2, 0, 0.4, 0.4), HIT], at=2) == []

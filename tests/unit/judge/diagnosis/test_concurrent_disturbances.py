@@ -1,11 +1,11 @@
-"""Test of the report of disturbances at the time of a failure."""
+"""Tests of the report of disturbances at the time of a failure."""
 
 import pytest
-from diagnosis_cases import by, slip, why
+from diagnosis_cases import slip, why, with_event
 
 
 @pytest.mark.parametrize(
-    ("events", "told"),
+    ("events", "texts"),
     [
         (slip(2, 2, name="lidar.off", kind="off"), ["lidar.off was active since t = 2.00 s, for 8.00 s"]),
         (slip(0, 0, name="lidar.off", kind="off"), ["lidar.off was active since the start, for 10.00 s"]),
@@ -23,12 +23,12 @@ from diagnosis_cases import by, slip, why
             [[2, "fault.started", "imu.off", {"entry": 1}], *slip(2, 2, name="lidar.off", kind="off")],
             ["lidar.off was active since t = 2.00 s, for 8.00 s"],
         ),
-        (by("gust", 5), ["event `gust` happened 5.00 s before: something"]),
-        (by("gust", 10), ["event `gust` happened 0.00 s before: something"]),
+        (with_event("gust", 5), ["event `gust` happened 5.00 s before: something"]),
+        (with_event("gust", 10), ["event `gust` happened 0.00 s before: something"]),
         ([[8, "event.ended", "gust", {"effects": [{"happened": False, "what": "nothing"}]}]], []),
-        (by("gust", 6), ["event `gust` happened 4.00 s before: something"]),
-        (by("gust", 4), []),
+        (with_event("gust", 6), ["event `gust` happened 4.00 s before: something"]),
+        (with_event("gust", 4), []),
     ],
 )
-def test_active_and_recent_disturbances_are_reported_for_any_criterion(events, told):
-    assert why("speed", events, case={}) == [f"meanwhile: {text}" for text in told]
+def test_active_and_recent_disturbances_are_reported_for_any_criterion(events, texts):
+    assert why("speed", events, case={}) == [f"meanwhile: {text}" for text in texts]

@@ -1,7 +1,7 @@
 """Tests of the diagnosis of failed goals."""
 
 import pytest
-from diagnosis_cases import CASE, STANDS, box, why
+from diagnosis_cases import CASE, STATIONARY, box, why
 
 from simscen.judge.failure_causes import causes
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
@@ -26,7 +26,7 @@ def test_touched_object_is_named():
     assert line == "why: crate (spawned by event `crate falls` at t = 1.00 s) was 0.20 m from the robot"
 
 
-def test_the_gap_that_is_too_narrow_is_named_with_the_world_that_leaves_no_way():
+def test_unreachable_goal_names_the_passage_that_is_too_narrow():
     gap = ["study", [5, 0.15], [5, -0.15], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith(
@@ -43,19 +43,19 @@ def test_current_contact_is_named_with_its_start():
     assert why("stuck", [[6, "collision.started", "sill", {}]], at=5) == []
 
 
-def test_only_a_goal_that_is_still_wanted_has_something_in_its_way():
+def test_blocking_object_is_reported_only_for_an_active_goal():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     assert why("stuck", crate, at=9)
     reached = [[0, "goal.accepted", "study"], [8, "goal.reached", "study"]]
-    built = synthetic_trace({**STANDS, "events": [*reached, *crate]})
+    built = synthetic_trace({**STATIONARY, "events": [*reached, *crate]})
     assert causes("stuck", 2160, built, synthetic_case(CASE)) == []
     assert causes("goals_reached", 1920, built, synthetic_case(CASE)) == []
 
 
-def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
+def test_blocking_object_is_reported_after_the_goal_has_failed():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     failed = [[0, "goal.accepted", "study"], [8, "goal.failed", "study", {}], *crate]
-    built = synthetic_trace({**STANDS, "events": failed})
+    built = synthetic_trace({**STATIONARY, "events": failed})
     assert len(causes("result", 2400, built, synthetic_case(CASE))) == 1
 
 
@@ -79,7 +79,7 @@ def test_object_beyond_thirty_centimeters_is_not_reported():
 
 
 @pytest.mark.parametrize(
-    ("events", "at", "wanted"),
+    ("events", "at", "is_active"),
     [
         ([[3, "goal.accepted", "study"]], 3, True),
         ([[3, "goal.accepted", "study"]], 2.9, False),
@@ -91,19 +91,19 @@ def test_object_beyond_thirty_centimeters_is_not_reported():
         ([[8, "goal.failed", "study"]], 8, True),
     ],
 )
-def test_a_goal_is_wanted_from_when_it_was_accepted_until_it_was_reached_or_given_up(events, at, wanted):
-    built = synthetic_trace({**STANDS, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
-    assert bool(causes("stuck", round(at * 240), built, synthetic_case(CASE))) is wanted
+def test_goal_is_active_from_acceptance_to_its_result(events, at, is_active):
+    built = synthetic_trace({**STATIONARY, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
+    assert bool(causes("stuck", round(at * 240), built, synthetic_case(CASE))) is is_active
 
 
 def test_object_on_an_earlier_goal_is_not_a_cause():
     goals = [{"name": "kitchen", "pose": [2, 3, 0]}, {"name": "study", "pose": [8, 0, 0]}]
-    told = [[0, "goal.accepted", "kitchen"], [2, "goal.reached", "kitchen"], [2, "goal.accepted", "study"]]
-    built = synthetic_trace({**STANDS, "events": [*told, *box(3, "crate", 2, 3, 1, 1)]})
+    earlier = [[0, "goal.accepted", "kitchen"], [2, "goal.reached", "kitchen"], [2, "goal.accepted", "study"]]
+    built = synthetic_trace({**STATIONARY, "events": [*earlier, *box(3, "crate", 2, 3, 1, 1)]})
     assert causes("stuck", 2400, built, synthetic_case({**CASE, "goals": goals})) == []
 
 
-def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
+def test_passage_as_wide_as_the_robot_is_not_too_narrow():
     gap = ["study", [5, 0.2], [5, -0.2], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith("path to goal study for a robot 0.40 m wide")
@@ -133,16 +133,16 @@ def test_reason_for_waiting_of_the_stack_is_named():
     assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []
 
 
-def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried():
-    said = {"error_name": "PATIENCE_EXCEEDED", "message": "no room to turn"}
+def test_message_of_the_stack_is_quoted_only_without_another_cause():
     given_up = [[0, "goal.accepted", "study"], [5, "recovery.started", "spin", {}], [6, "recovery.started", "wait", {}]]
-    given_up.append([8, "goal.failed", "study", said])
+    given_up.append([8, "goal.failed", "study", {"error_name": "PATIENCE_EXCEEDED", "message": "no room to turn"}])
 
-    def told(*things):
-        return causes("result", 2400, synthetic_trace({**STANDS, "events": [*given_up, *things]}), synthetic_case(CASE))
+    def causes_with(*events):
+        trace = synthetic_trace({**STATIONARY, "events": [*given_up, *events]})
+        return causes("result", 2400, trace, synthetic_case(CASE))
 
-    assert told() == ["why: it gave up and reported: no room to turn; spin, wait had not helped"]
-    assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
+    assert causes_with() == ["why: it gave up and reported: no room to turn; spin, wait had not helped"]
+    assert "said" not in "".join(causes_with(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
 
 
 def test_failed_recoveries_are_always_reported_with_their_codes():

@@ -1,10 +1,10 @@
 """Tests of the diagnosis of localization errors."""
 
-from diagnosis_cases import GOAL, by, slip, why
+from diagnosis_cases import GOAL, slip, why, with_event
 
 
-def test_a_robot_that_was_set_down_elsewhere_is_lost_for_that_reason():
-    events = by("carried off", 6, [6, "robot.placed", "", {}])
+def test_kidnapping_explains_a_localization_error():
+    events = with_event("carried off", 6, [6, "robot.placed", "", {}])
     far = {"belief": {"offset": [2.0, 0, 0]}}
     case = {"goals": [GOAL]}
     assert why("goals_reached", events, case=case, **far) == [
@@ -19,7 +19,7 @@ def test_a_robot_that_was_set_down_elsewhere_is_lost_for_that_reason():
     ]
 
 
-def test_an_odometry_fault_leads_astray_long_after_it_is_over():
+def test_odometry_fault_explains_a_localization_error_after_it_has_ended():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [0, 0.8, 0]}}
     assert why("localization_error", slip(1, 1.5, 2), **lost) == [
         "why: odom.slip falsified its odometry from t = 1.50 s on"
@@ -27,7 +27,7 @@ def test_an_odometry_fault_leads_astray_long_after_it_is_over():
     assert why("localization_error", slip(1, 1.5, 2, "lidar.off", "off"), **lost) == []
 
 
-def test_a_fault_that_came_between_localizer_and_navigator_leads_astray_and_a_lidar_that_is_off_does_not():
+def test_belief_faults_explain_a_localization_error_and_lidar_faults_do_not():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [0, 0.8, 0]}}
     jump = slip(1, 1.5, 2, "localizer.jump", "jump", affects="Belief")
     assert why("localization_error", jump, **lost) == ["why: localizer.jump falsified its belief from t = 1.50 s on"]
@@ -49,7 +49,7 @@ def test_error_of_half_a_meter_counts_as_lost():
 
 def test_events_up_to_the_failure_tick_count():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [2, 0, 0]}}
-    events = by("carried off", 6, [6, "robot.placed", "", {}])
+    events = with_event("carried off", 6, [6, "robot.placed", "", {}])
     assert why("localization_error", events, at=6, **lost) == [
         "why: event `carried off` had moved the robot elsewhere 0.00 s before"
     ]

@@ -17,7 +17,7 @@ def spawned(at, name, x, y, yaw=0.0, parts=(SQUARE,)):
     return [at, "object.spawned", name, {"x": x, "y": y, "yaw": yaw, "parts": list(parts)}]
 
 
-def there(events, at, **words):
+def objects_at(events, at, **words):
     return movable_objects(
         synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240)
     )
@@ -25,35 +25,35 @@ def there(events, at, **words):
 
 @settings(max_examples=200, deadline=None)
 @given(st.floats(-4, 4), st.floats(-4, 4), st.floats(-3.1, 3.1), st.sampled_from([SQUARE, NOTCHED]))
-def test_the_distance_is_shapelys(x, y, yaw, outline):
-    (thing,) = there([spawned(1, "thing", 0.5, -0.5, yaw, [outline])], 2)
-    theirs = shapely.Polygon(thing.outlines[0]).distance(shapely.Point(x, y))
-    assert thing.distance(np.array([[x, y]]))[0] == pytest.approx(theirs, abs=1e-9)
+def test_distance_equals_that_of_shapely(x, y, yaw, outline):
+    (table,) = objects_at([spawned(1, "thing", 0.5, -0.5, yaw, [outline])], 2)
+    expected = shapely.Polygon(table.outlines[0]).distance(shapely.Point(x, y))
+    assert table.distance(np.array([[x, y]]))[0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_corner_that_repeats_and_one_at_the_height_of_the_point_change_nothing():
+def test_repeated_and_level_corners_do_not_change_the_distance():
     diamond = [[1, 0], [0, 1], [0, 1], [-1, 0], [0, -1]]
-    (thing,) = there([spawned(1, "thing", 0, 0, 0.0, [diamond])], 2)
-    assert thing.distance(np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 0.0], [0.0, 4.0]])).tolist() == [0.0, 2.0, 2.0, 3.0]
+    (table,) = objects_at([spawned(1, "thing", 0, 0, 0.0, [diamond])], 2)
+    assert table.distance(np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 0.0], [0.0, 4.0]])).tolist() == [0.0, 2.0, 2.0, 3.0]
 
 
-def test_of_several_parts_the_nearest_counts():
+def test_distance_is_to_the_nearest_part():
     far = [[9, 9], [10, 9], [10, 10]]
-    (thing,) = there([spawned(1, "table", 0, 0, parts=[far, SQUARE])], 2)
-    assert thing.distance(np.array([[1.5, 0.0], [9.9, 9.5]])).tolist() == pytest.approx([1.0, 0.0])
+    (table,) = objects_at([spawned(1, "table", 0, 0, parts=[far, SQUARE])], 2)
+    assert table.distance(np.array([[1.5, 0.0], [9.9, 9.5]])).tolist() == pytest.approx([1.0, 0.0])
 
 
 def test_object_exists_from_spawn_to_removal():
     events = [spawned(2, "crate", 3, 0), [5, "object.removed", "crate", {}], spawned(7, "crate", 4, 0)]
-    assert [len(there(events, at)) for at in (1.9, 2, 4.9, 5, 6.9, 7)] == [0, 1, 1, 0, 0, 1]
-    assert there(events, 8)[0].outlines[0].mean(axis=0).tolist() == [4.0, 0.0]
+    assert [len(objects_at(events, at)) for at in (1.9, 2, 4.9, 5, 6.9, 7)] == [0, 1, 1, 0, 0, 1]
+    assert objects_at(events, 8)[0].outlines[0].mean(axis=0).tolist() == [4.0, 0.0]
 
 
 def test_object_is_at_its_last_observed_pose():
     events = [spawned(0, "cart", 0, 0), [4, "object.removed", "cart", {}], spawned(6, "cart", 5, 0)]
-    way = {"cart": [[0, 0, 0], [3, 3, 0], [6, 3, 0], [8, 9, 0]]}
-    assert there(events, 2, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([2.0, 0.0])
-    assert there(events, 7, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([6.0, 0.0])
+    path = {"cart": [[0, 0, 0], [3, 3, 0], [6, 3, 0], [8, 9, 0]]}
+    assert objects_at(events, 2, objects=path)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([2.0, 0.0])
+    assert objects_at(events, 7, objects=path)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([6.0, 0.0])
 
 
 def test_effect_of_an_event_is_reported_for_its_object():
@@ -67,20 +67,20 @@ def test_effect_of_an_event_is_reported_for_its_object():
         [2, "event.ended", "cart comes", {}],
     ]
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
-    assert [thing.describe(trace) for thing in movable_objects(trace, 300)] == [
+    assert [found.describe(trace) for found in movable_objects(trace, 300)] == [
         "bin",
         "crate (spawned by event `crate falls` at t = 1.00 s)",
     ]
-    assert [thing.describe(trace) for thing in movable_objects(trace, 480)][1:] == [
+    assert [found.describe(trace) for found in movable_objects(trace, 480)][1:] == [
         "crate (moved by event `cart comes` at t = 2.00 s)"
     ]
 
 
 def test_object_above_the_robot_is_no_obstacle():
-    assert there([spawned(0, "lamp", 0, 0, parts=[])], 1) == []
+    assert objects_at([spawned(0, "lamp", 0, 0, parts=[])], 1) == []
 
 
-def test_one_that_replaces_another_of_its_name_stands_where_it_was_put():
+def test_replacing_object_has_its_own_pose():
     events = [spawned(0, "cart", 0, 0), spawned(6, "cart", 5, 0)]
-    way = {"cart": [[0, 0, 0], [6, 0, 0], [6.025, 5, 0], [10, 5, 0]]}
-    assert [there(events, at, objects=way)[0].outlines[0].mean(axis=0)[0] for at in (5.9, 6, 7)] == [0.0, 5.0, 5.0]
+    path = {"cart": [[0, 0, 0], [6, 0, 0], [6.025, 5, 0], [10, 5, 0]]}
+    assert [objects_at(events, at, objects=path)[0].outlines[0].mean(axis=0)[0] for at in (5.9, 6, 7)] == [0, 5, 5]

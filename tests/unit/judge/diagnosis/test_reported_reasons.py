@@ -1,4 +1,4 @@
-"""What the stack itself reported about a goal, up to the tick of the failure, this tick included."""
+"""Tests of reasons that the stack reported about a goal, up to and including the tick of the failure."""
 
 import pytest
 
@@ -10,7 +10,7 @@ SECOND = 240
 
 
 def recorded(*events):
-    """A run of 10 s with these events, and the outcome of its goal `study`, accepted at 2 s."""
+    """Return a run of 10 s with these events, and the outcome of its goal `study`, accepted at 2 s."""
     accepted = [2, "goal.accepted", "study"]
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": [accepted, *events]})
     return trace, goal_outcomes(trace, synthetic_case({"goals": [{"name": "study", "pose": [9, 0, 0]}]}))[0]
@@ -34,7 +34,7 @@ def test_robot_is_held_from_the_report_until_after_its_release(events, at, is_he
     assert bool(_stopped(trace, round(at * SECOND))) == is_held
 
 
-def test_the_report_of_a_goal_that_was_given_up_counts_from_its_own_tick_on():
+def test_report_of_a_failed_goal_counts_from_its_tick_on():
     trace, outcome = recorded(
         [1, "recovery.started", "wait"],
         [2, "recovery.started", "clear"],
@@ -48,7 +48,7 @@ def test_the_report_of_a_goal_that_was_given_up_counts_from_its_own_tick_on():
     ]
 
 
-def test_recoveries_that_failed_count_from_the_acceptance_of_the_goal_to_the_failure():
+def test_failed_recoveries_count_from_goal_acceptance_to_failure():
     failed = {"outcome": "failed", "error_name": "COLLISION_AHEAD"}
     trace, outcome = recorded(
         [1, "recovery.ended", "wait", failed],

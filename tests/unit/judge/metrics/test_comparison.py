@@ -53,12 +53,12 @@ def of(one, metric: str):
     return next(found for found in one.differences if found.metric == metric)
 
 
-def test_there_is_nothing_to_compare_with_a_single_stack() -> None:
+def test_single_stack_has_no_comparison() -> None:
     assert compare_stacks([run("")], ()) is None
     assert compare_stacks([run("")], STACKS[:1]) is None
 
 
-def test_outcomes_are_counted_for_each_scenario_and_stack_and_errors_by_themselves() -> None:
+def test_outcomes_are_counted_by_scenario_and_stack_with_separate_errors() -> None:
     runs = [run("ref", seed) for seed in (1, 2, 3)]
     runs += [run("mine", 1), run("mine", 2, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.ERROR)]
     comparison = compare_stacks([*runs, run("ref", scenario="b")], STACKS)
@@ -70,8 +70,8 @@ def test_outcomes_are_counted_for_each_scenario_and_stack_and_errors_by_themselv
     assert dict(comparison.stacks) == {"ref": "reference", "mine": "./nav --fast"}
 
 
-def test_differences_are_of_pairs_with_the_same_scenario_and_seed() -> None:
-    """Means of all runs would differ by 100 s: only seed 1 ran with both."""
+def test_differences_are_between_runs_with_the_same_scenario_and_seed() -> None:
+    """Only seed 1 was run with both stacks; the means of all runs differ by 100 s."""
     one = against(run("ref", 1, time_to_goal=10.0), run("mine", 1, time_to_goal=12.0), run("mine", 2, time_to_goal=210))
     found = of(one, "time_to_goal")
     assert (found.pairs, found.baseline, found.value, found.difference) == (1, 10.0, 12.0, 2.0)
@@ -80,13 +80,13 @@ def test_differences_are_of_pairs_with_the_same_scenario_and_seed() -> None:
     assert one.unpaired_runs == 1
 
 
-def test_an_error_is_compared_with_nothing_and_counted() -> None:
+def test_runs_with_errors_are_counted_and_not_compared() -> None:
     one = against(run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("ref", 2), run("mine", 2))
     assert (one.pairs, one.error_pairs, one.unpaired_runs, one.flips) == (1, 1, 0, ())
     assert of(one, "path_length").pairs == 1
 
 
-def test_a_flip_says_with_which_stack_it_failed_and_why() -> None:
+def test_flip_states_the_failing_stack_and_the_reason() -> None:
     one = against(
         *(run("ref", 1), run("mine", 1, outcome=Outcome.FAILED)),
         *(run("ref", 2, outcome=Outcome.FAILED), run("mine", 2)),
@@ -110,7 +110,7 @@ def test_determinism_runs_are_not_compared() -> None:
     assert one.pairs == 1
 
 
-def test_the_order_of_runs_changes_nothing_and_every_stack_is_compared_with_the_first() -> None:
+def test_comparison_is_with_the_first_stack_in_any_order_of_runs() -> None:
     names = ("ref", "mine", "other")
     runs = [run(name, seed, time_to_goal=seed * (1.0 + len(name) / 10)) for name in names for seed in range(1, 9)]
     stacks = [f"{name}=x" for name in names]
@@ -124,7 +124,7 @@ def test_the_order_of_runs_changes_nothing_and_every_stack_is_compared_with_the_
     assert found.difference == pytest.approx(0.2 * 4.5)
 
 
-def test_as_data_it_is_strict_json_and_says_what_was_left_out() -> None:
+def test_comparison_as_data_is_strict_json_with_excluded_runs() -> None:
     runs = [run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("mine", 2)]
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
@@ -135,17 +135,17 @@ def test_as_data_it_is_strict_json_and_says_what_was_left_out() -> None:
     assert data["against"][0]["differences"] == []
 
 
-def test_metrics_that_packages_add_are_compared_too() -> None:
+def test_metrics_of_packages_are_compared() -> None:
     found = of(against(run("ref", headway=2.0), run("mine", headway=2.5)), "headway")
     assert (found.difference, found.unit, found.pairs) == (0.5, "", 1)
 
 
-def test_every_metric_that_is_compared_is_one() -> None:
+def test_every_compared_metric_exists() -> None:
     assert set(COMPARED_METRICS) <= set(METRICS)
 
 
-def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() -> None:
-    """A stack that fails as expected is not better than one that holds what was expected to fail."""
+def test_expected_failures_are_compared_as_failures() -> None:
+    """A stack that fails as expected is not better than one that passes unexpectedly."""
     known = replace(run("ref", outcome=Outcome.FAILED), outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
     broken = Finding(Status.FAIL, "expected", "everything passed", "a failure: NAV-1")
     mended = replace(
@@ -163,13 +163,13 @@ def test_skipped_run_is_not_compared() -> None:
 
 
 def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
-    """Of the robots a and b; `b_time_to_goal` is b's."""
+    """Return a run of the robots a and b; `b_time_to_goal` is for robot b."""
     own = {f"{robot}/{name}": value for robot in "ba" for name, value in {**GOOD, "ape_trans_max": 0.1}.items()}
     own |= {name.replace("_", "/", 1): value for name, value in metrics.items()}
     return replace(run(stack, seed), metrics={"success": 1.0, **own})
 
 
-def test_of_several_robots_the_same_metrics_are_compared_of_each() -> None:
+def test_metrics_of_each_robot_are_compared() -> None:
     one = against(fleet("ref"), fleet("mine", b_path_length=7.0))
     names = [name for name in COMPARED_METRICS if name in GOOD]
     assert [found.metric for found in one.differences] == [f"{robot}/{name}" for robot in "ab" for name in names]
@@ -177,14 +177,14 @@ def test_of_several_robots_the_same_metrics_are_compared_of_each() -> None:
     assert of(one, "b/path_length").unit == METRICS["path_length"].unit
 
 
-def test_a_pair_in_which_another_robot_arrived_is_compared_by_collisions_alone() -> None:
+def test_pair_in_which_different_robots_arrived_is_compared_only_by_collisions() -> None:
     one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
     assert one.pairs_with_one_arrival == 1
     assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}
 
 
 @given(st.lists(st.integers(-30, 30), min_size=1, max_size=9, unique_by=abs).filter(lambda values: 0 not in values))
-def test_the_signed_rank_test_is_the_share_of_all_signs_that_are_as_extreme(differences: list[int]) -> None:
+def test_signed_rank_test_equals_enumeration_of_all_signs(differences: list[int]) -> None:
     """By enumeration of all signs, without ties."""
     ranks = stats.rankdata(np.abs(differences))
     mean = ranks.sum() / 2
@@ -198,14 +198,14 @@ def test_pairs_without_any_difference_have_p_1() -> None:
     assert signed_rank_test([0.0, 0.0, 0.0]) == 1.0
 
 
-def test_keys_of_sessions_keep_the_stack_in_the_name_of_the_scenario() -> None:
+def test_session_keys_contain_the_stack_in_the_scenario_name() -> None:
     assert labeled_key(RunKey("a", 1, "slow"), "now") == RunKey("a", 1, "slow", "now")
     assert labeled_key(RunKey("a", 1, "slow", "dwb"), "now") == RunKey("a (dwb)", 1, "slow", "now")
     second = RunKey("a", 1).repetition
     assert labeled_key(second, "now") == second
 
 
-def test_scenarios_are_in_order_whatever_the_order_of_the_runs() -> None:
+def test_scenarios_are_sorted_in_any_order_of_runs() -> None:
     runs = [run(stack, scenario=name) for name in "ecadbf" for stack in ("mine", "ref")]
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
@@ -224,7 +224,7 @@ def sessions(worse: dict[str, float], seeds: int = 12, failing: int = 0, scenari
     return one
 
 
-def test_changes_say_which_direction_is_worse() -> None:
+def test_changes_state_which_direction_is_worse() -> None:
     found = {(change.scenario, change.what): change for change in sessions({"min_clearance": 0.3}).changes}
     assert found.keys() == {("a", "min_clearance"), ("b", "min_clearance")}
     assert all(change.is_worse for change in found.values())
@@ -232,7 +232,7 @@ def test_changes_say_which_direction_is_worse() -> None:
     assert {(change.what, change.is_worse) for change in better} == {("time_to_goal", False)}
 
 
-def test_a_metric_of_a_package_may_change_either_way() -> None:
+def test_metric_of_a_package_has_no_worse_direction() -> None:
     before = [run("", seed, added=1.0, another=1.0) for seed in range(12)]
     now = [run("", seed, added=2.0, another=2.0) for seed in range(12)]
     comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
@@ -251,7 +251,7 @@ def test_the_pass_rate_over_all_scenarios_is_tested_if_there_are_several() -> No
     assert {change.scenario for change in single.changes if change.what == PASS_RATE} == {"a"}
 
 
-def test_a_metric_is_compared_where_both_runs_have_it() -> None:
+def test_metric_is_compared_if_both_runs_have_it() -> None:
     runs = [run("ref", 1, recoveries=1.0), run("mine", 1, recoveries=None), run("ref", 2, recoveries=2.0)]
     one = against(*runs, run("mine", 2, recoveries=2.0), run("ref", 3, recoveries=5.0), run("mine", 3, recoveries=4.5))
     found = of(one, "recoveries")
@@ -259,7 +259,7 @@ def test_a_metric_is_compared_where_both_runs_have_it() -> None:
     assert (found.baseline, found.value, found.difference) == (3.5, 3.25, -0.25)
 
 
-def test_each_robot_that_arrives_in_one_run_only_sets_the_pair_apart() -> None:
+def test_pairs_with_a_robot_that_arrived_in_one_run_only_are_excluded() -> None:
     both = {"a/time_to_goal": 5.0, "b/time_to_goal": 6.0}
     one = against(
         run("ref", 1, **both), run("mine", 1, **{**both, "b/time_to_goal": None}), run("ref", 2), run("mine", 2)
@@ -268,7 +268,7 @@ def test_each_robot_that_arrives_in_one_run_only_sets_the_pair_apart() -> None:
 
 
 @pytest.mark.parametrize(("count", "more"), [(1, ""), (2, " (and 1 more)"), (3, " (and 2 more)")])
-def test_a_flip_has_the_first_reason_and_the_number_of_others(count: int, more: str) -> None:
+def test_flip_states_the_first_reason_and_the_number_of_others(count: int, more: str) -> None:
     bad = run("mine", outcome=Outcome.FAILED)
     warning = replace(bad.verdicts[0], severity="warn")
     (flip,) = against(run("ref"), replace(bad, verdicts=(warning, *bad.verdicts * count))).flips

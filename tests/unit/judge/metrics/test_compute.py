@@ -1,4 +1,4 @@
-"""Metrics against closed forms, the authors' own numbers, evo and filterpy; bugs of other tools as cases."""
+"""Tests of metrics against closed forms, published values, evo, and filterpy; some cases are bugs of other tools."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,7 @@ def measured(words, case=None):
 
 
 def circle(radius, seconds=20, turns=1.0):
-    """Driven once around, at constant speed."""
+    """Return waypoints of full circles at constant speed."""
     count = round(seconds / STEP)
     angles = np.linspace(0, 2 * math.pi * turns, count + 1)
     return [[k * STEP, radius * math.cos(a), radius * math.sin(a), a + math.pi / 2] for k, a in enumerate(angles)]
@@ -37,7 +37,7 @@ def with_speeds(speeds):
     return replace(trace, velocity=Samples(trace.truth.ticks, np.column_stack((speeds, zero, zero))))
 
 
-def test_every_run_reports_the_metrics_of_the_table_each_with_a_number_or_a_reason():
+def test_every_metric_of_the_table_has_a_number_or_a_reason():
     for words, case in (
         ({"seconds": 0, "truth": [[0, 0, 0]], "belief": None}, {}),
         ({"seconds": 10, "truth": circle(2, 10), "events": ARRIVED}, GOAL),
@@ -48,7 +48,7 @@ def test_every_run_reports_the_metrics_of_the_table_each_with_a_number_or_a_reas
         assert all(measures.undefined.values())
 
 
-def test_a_standing_robot_has_no_smoothness_and_says_why():
+def test_stationary_robot_has_no_smoothness_with_a_reason():
     measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]]}), synthetic_case({}))
     assert measures.undefined["sparc"] == measures.undefined["ldlj"] == "the robot never moved"
     assert measures.undefined["aol"] == "the robot never drove"
@@ -57,10 +57,10 @@ def test_a_standing_robot_has_no_smoothness_and_says_why():
     assert measures.values["max_jerk"] == 0.0
 
 
-# -- the way
+# -- path
 
 
-def test_a_detour_halves_spl_when_it_doubles_the_way():
+def test_detour_that_doubles_the_path_halves_spl():
     truth = [[0, 0, 0], [2, 3, 0], [4, 3, 4], [5, 3, 5.5], [6, 3, 4], [10, 3, 4]]
     metrics = measured({"seconds": 10, "truth": truth, "events": ARRIVED}, GOAL)
     assert metrics["success"] == 1.0
@@ -71,20 +71,20 @@ def test_a_detour_halves_spl_when_it_doubles_the_way():
     assert metrics["time_to_goal"] == 8.0
 
 
-def test_a_way_shorter_than_the_shortest_counts_as_that():
+def test_path_shorter_than_the_shortest_has_spl_1():
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 2.8, 4]], "events": ARRIVED}, GOAL)
     assert metrics["spl"] == 1.0
     assert metrics["soft_spl"] == pytest.approx(1 - 0.2 / 5)
 
 
-def test_a_failure_has_no_spl_but_keeps_the_share_of_the_way_it_made():
+def test_failed_run_has_spl_0_and_soft_spl_for_its_progress():
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 1.5, 2], [10, 1.5, 2]]}, GOAL)
     assert metrics["success"] == metrics["spl"] == metrics["barn_score"] == 0.0
     assert metrics["soft_spl"] == pytest.approx(0.5)
     assert metrics["time_to_goal"] is None
 
 
-def test_a_robot_further_from_its_goal_than_at_the_start_has_no_soft_spl():
+def test_robot_farther_from_its_goal_than_at_the_start_has_soft_spl_0():
     assert measured({"seconds": 10, "truth": [[0, 0, 0], [8, -3, -4]]}, GOAL)["soft_spl"] == 0.0
 
 
@@ -96,7 +96,7 @@ def test_run_with_collision_has_no_spl():
 
 
 @pytest.mark.parametrize("shortest", [{}, {"a": math.inf}, {"a": 0.0}])
-def test_spl_is_left_out_when_no_shortest_way_is_known(shortest):
+def test_spl_is_undefined_without_a_shortest_path(shortest):
     measures = compute_metrics(
         synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), synthetic_case({**GOAL, "shortest": shortest})
     )
@@ -105,7 +105,7 @@ def test_spl_is_left_out_when_no_shortest_way_is_known(shortest):
         assert "shortest path" in measures.undefined[name]
 
 
-def test_a_robot_that_is_carried_has_neither_driven_nor_turned():
+def test_kidnapping_adds_no_path_length_and_no_heading_change():
     truth = [[0, 0, 0, 0], [2, 1, 0, 0], [2.025, 9, 0, 3], [4, 10, 0, 3]]
     metrics = measured({"seconds": 4, "truth": truth, "events": [[2, "robot.placed"]]})
     assert metrics["path_length"] == pytest.approx(2.0, abs=0.02)
@@ -113,7 +113,7 @@ def test_a_robot_that_is_carried_has_neither_driven_nor_turned():
 
 
 @pytest.mark.parametrize("radius", [1.0, 2.0])
-def test_a_circle_has_the_curvature_of_its_radius(radius):
+def test_circle_has_curvature_of_one_over_radius(radius):
     metrics = measured({"seconds": 20, "truth": circle(radius)})
     assert metrics["path_length"] == pytest.approx(2 * math.pi * radius, rel=1e-3)
     assert metrics["heading_change"] == pytest.approx(2 * math.pi)
@@ -122,30 +122,30 @@ def test_a_circle_has_the_curvature_of_its_radius(radius):
     assert metrics["norm_curvature"] == pytest.approx(4 * math.pi, rel=0.12)
 
 
-def test_a_straight_line_has_none_even_back_and_forth():
+def test_straight_line_has_no_curvature_even_back_and_forth():
     metrics = measured({"seconds": 20, "truth": [[0, 0, 0], [10, 5, 0], [20, 0, 0]]})
     assert metrics["max_curvature"] == metrics["norm_curvature"] == 0.0
     assert metrics["aol"] == pytest.approx(math.pi / 10, rel=0.01)
     assert metrics["heading_change"] == 0.0
 
 
-def test_points_nearer_than_30_cm_have_no_say_in_curvature():
+def test_points_nearer_than_30_cm_do_not_affect_curvature():
     shaky = [[k / 10, k * 0.05, 0.02 * (k % 2)] for k in range(101)]
     metrics = measured({"seconds": 10, "truth": shaky})
     assert metrics["max_curvature"] < 0.5
     assert metrics["aol"] > 5.0
 
 
-def test_turning_through_pi_is_a_small_change_of_heading():
-    """Arena's get_metrics.py does not wrap it, and adds yaw to meters in the norm of the way."""
+def test_heading_change_across_pi_is_small():
+    """Arena's get_metrics.py does not wrap it, and adds yaw to meters in the path length."""
     truth = [[0, 0, 0, 3.1], [1, 0, 0, 3.2], [2, 0, 0, 3.1]]
     metrics = measured({"seconds": 2, "truth": truth})
     assert metrics["heading_change"] == pytest.approx(0.2)
     assert metrics["path_length"] == 0.0
 
 
-def test_irregularity_is_what_was_turned_beyond_the_first_plan_to_each_goal():
-    """A stub (`pass`) in HuNavSim."""
+def test_irregularity_is_the_turning_beyond_the_first_plan_to_each_goal():
+    """HuNavSim leaves it unimplemented (`pass`)."""
     words = {"seconds": 20, "truth": circle(2), "events": [[1, "goal.accepted", "a"]]}
     bent = Path(np.array([[0, 0, 0.0], [1, 0, 3.0], [1, 1, -3.0], [2, 1, -3.0]]), 250)
     other = Path(np.array([[0, 0, 0.0], [1, 0, 1.0]]), 900)
@@ -165,7 +165,7 @@ def test_irregularity_is_what_was_turned_beyond_the_first_plan_to_each_goal():
 
 
 @pytest.mark.parametrize(("seconds", "expected"), [(1.0, 0.5), (12.0, 0.5), (24.0, 0.25), (48.0, 0.125), (99.0, 0.125)])
-def test_a_way_of_12_m_in_twice_its_optimal_time_or_less_is_worth_a_half(seconds, expected):
+def test_barn_score_is_half_at_twice_the_optimal_time_or_less(seconds, expected):
     assert barn_score(True, seconds, 12.0) == pytest.approx(expected)
 
 
@@ -173,7 +173,7 @@ def test_run_without_arrival_has_score_zero():
     assert barn_score(False, 7.0, 12.0) == 0.0
 
 
-def test_a_reference_of_negative_length_gives_no_score():
+def test_reference_path_of_negative_length_gives_no_score():
     """BARN's run.py takes -31 m in its dynamic branch: every success scores 0.125, after 12 s or after 99 s."""
     for length in (-31.0, 0.0, math.nan):
         with pytest.raises(ValueError, match="reference path"):
@@ -181,7 +181,7 @@ def test_a_reference_of_negative_length_gives_no_score():
     assert barn_score(True, 15.0, 31.0) > barn_score(True, 99.0, 31.0) > 0.125
 
 
-def test_a_run_has_a_score_when_it_has_one_goal():
+def test_only_runs_with_one_goal_have_a_score():
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 3, 4]], "events": ARRIVED}, GOAL)
     assert metrics["barn_score"] == pytest.approx(2.5 / 8.0)
     two = {"goals": [*GOAL["goals"], {"name": "b", "pose": [3, 4, 0]}], "shortest": {"a": 5.0, "b": 1.0}}
@@ -192,23 +192,23 @@ def test_a_run_has_a_score_when_it_has_one_goal():
 # -- motion
 
 
-def test_spinning_to_the_right_is_not_standing():
-    """HuNavSim's abs(r.angular_vel < 0.02) counts any turn to the right as standing."""
+def test_spinning_to_the_right_is_not_stationary():
+    """HuNavSim's abs(r.angular_vel < 0.02) counts any turn to the right as stationary."""
     truth = [[0, 0, 0, 0], [2, 0, 0, -3], [6, 0, 0, -3]]
     assert measured({"seconds": 6, "truth": truth})["time_not_moving"] == pytest.approx(4.0, abs=0.026)
 
 
 @pytest.mark.parametrize(
-    ("speed", "turn", "stands"),
+    ("speed", "turn", "is_stationary"),
     [(0.009, 0.019, True), (0.01, 0.0, False), (-0.01, 0.0, False), (0.0, 0.02, False), (0.0, -0.02, False)],
 )
-def test_definition_of_not_moving(speed, turn, stands):
+def test_definition_of_not_moving(speed, turn, is_stationary):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace = replace(trace, velocity=Samples(trace.truth.ticks, np.tile([speed, 0.0, turn], (41, 1))))
-    assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)
+    assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if is_stationary else 0.0)
 
 
-def test_jerk_of_a_trapezoid_is_at_its_corners():
+def test_trapezoidal_speed_has_jerk_at_its_corners():
     speeds = np.interp(np.arange(81) * STEP, [0, 0.5, 1.5, 2], [0, 1, 1, 0])
     metrics = compute_metrics(with_speeds(speeds), synthetic_case({})).values
     assert metrics["max_jerk"] == pytest.approx(2 / STEP)
@@ -216,13 +216,13 @@ def test_jerk_of_a_trapezoid_is_at_its_corners():
     assert metrics["max_speed"] == 1.0
 
 
-def test_sparc_and_ldlj_give_the_numbers_their_authors_print():
+def test_sparc_and_ldlj_equal_the_published_values():
     movement = np.exp(-5 * np.arange(-1, 1, 0.01) ** 2)
     assert f"{sparc(movement, 100.0):.5f}" == "-1.41403"
     assert f"{ldlj(movement, 100.0):.5f}" == "-5.81636"
 
 
-def test_they_are_of_the_speed_over_ground_at_the_rate_of_the_truth():
+def test_smoothness_is_computed_from_the_true_speed_at_its_sampling_rate():
     speeds = np.sin(np.linspace(0, math.pi, 201))
     metrics = compute_metrics(with_speeds(-speeds), synthetic_case({})).values
     assert metrics["sparc"] == sparc(speeds, 40.0)
@@ -237,7 +237,7 @@ def trapezoid(seconds, wobble=0.0, stop=False):
     return speeds * (1 + wobble * np.sin(2 * math.pi * times))
 
 
-def test_sparc_sees_a_wobble_and_hardly_a_stop_and_ldlj_sees_a_stop():
+def test_sparc_detects_oscillation_and_ldlj_detects_stops():
     plain, wobbling, stopping = trapezoid(20), trapezoid(20, wobble=0.2), trapezoid(20, stop=True)
     assert sparc(plain, 40.0) - sparc(wobbling, 40.0) > 0.5
     assert abs(sparc(plain, 40.0) - sparc(stopping, 40.0)) < 0.5
@@ -250,7 +250,7 @@ def test_smoothness_is_not_defined_without_motion(speeds):
     assert ldlj(np.array(speeds), 40.0) is None
 
 
-def test_a_constant_speed_has_no_ldlj_but_a_reason():
+def test_constant_speed_has_no_ldlj_with_a_reason():
     measures = compute_metrics(with_speeds(np.full(81, 0.5)), synthetic_case({}))
     assert measures.values["ldlj"] is None
     assert measures.undefined["ldlj"] == "the speed never changed"
@@ -260,7 +260,7 @@ def test_a_constant_speed_has_no_ldlj_but_a_reason():
 # -- surroundings
 
 
-def test_clearance_is_its_least_and_its_mean():
+def test_minimum_and_mean_clearance_are_reported():
     metrics = measured({"seconds": 2, "truth": [[0, 0, 0]], "clearance": [[0, 1.5], [2, 0.5]]})
     assert metrics["min_clearance"] == 0.5
     assert metrics["mean_clearance"] == pytest.approx(1.0)
@@ -306,7 +306,7 @@ def as_evo(poses):
 
 
 @pytest.mark.parametrize("ours", ["ape_trans", "ape_rot", "rpe_trans", "rpe_rot"])
-def test_pose_errors_are_those_of_evo_without_alignment(ours):
+def test_pose_errors_equal_those_of_evo_without_alignment(ours):
     evo = pytest.importorskip("evo.core.metrics", reason="evo asks for newer packages than make test-lowest has")
     kind, part = ours.split("_")
     relation = {"trans": evo.PoseRelation.translation_part, "rot": evo.PoseRelation.rotation_angle_rad}[part]
@@ -320,13 +320,13 @@ def test_pose_errors_are_those_of_evo_without_alignment(ours):
         assert metrics[f"{ours}_{name}"] == pytest.approx(expected[name], abs=1e-7), name
 
 
-def test_the_final_error_is_the_last():
+def test_final_error_is_that_of_the_last_sample():
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0]], "belief": [[0, 0, 0], [10, 3, 4]]})
     assert metrics["ape_trans_final"] == metrics["ape_trans_max"] == pytest.approx(5.0)
     assert metrics["ape_trans_median"] == pytest.approx(2.5)
 
 
-def test_a_short_drive_has_no_relative_error_but_a_reason():
+def test_short_drive_has_no_relative_error_with_a_reason():
     measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 0.9, 0]]}), synthetic_case({}))
     assert measures.undefined["rpe_trans_rmse"] == measures.undefined["rpe_rot_max"] == "the robot drove less than 1 m"
 
@@ -357,7 +357,7 @@ def test_nees_of_errors_drawn_from_the_covariance_is_three():
 @pytest.mark.parametrize(
     "covariance", [[0, 0, 0, 1, 0, 1], [1, 1, 0, 1, 0, 1], [1, 0, 1, 1, 0, 1], [1, 0, 0, 1, 0, 0], [0, 0, 0, 0, 0, 0]]
 )
-def test_a_depleted_particle_set_is_overconfident_not_a_number(covariance):
+def test_singular_covariance_is_reported_as_overconfident(covariance):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}})
     values = trace.belief.values.copy()
     values[3, 3:9] = covariance
@@ -366,7 +366,7 @@ def test_a_depleted_particle_set_is_overconfident_not_a_number(covariance):
     assert "overconfident" in measures.undefined["nees"]
 
 
-def test_a_run_without_belief_has_no_localization():
+def test_run_without_belief_has_no_localization_metrics():
     measures = compute_metrics(
         synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), synthetic_case({})
     )
@@ -374,7 +374,7 @@ def test_a_run_without_belief_has_no_localization():
     assert measures.undefined["nees"] == "the robot never reported an estimated pose"
 
 
-def test_a_signal_that_is_not_a_number_leaves_its_metrics_undefined_and_no_others():
+def test_nan_in_a_signal_makes_only_its_metrics_undefined():
     words = {"seconds": 2, "truth": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]], "clearance": 0.5}
     found = compute_metrics(synthetic_trace(words), synthetic_case({}))
     assert found.undefined["path_length"] == found.undefined["heading_change"]

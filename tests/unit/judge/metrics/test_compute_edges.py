@@ -16,7 +16,7 @@ GOALS = {
     "shortest": dict.fromkeys(NAMES, 1.0),
 }
 TOUR = {"seconds": 12, "truth": [[0, 0, 0], [2, 1, 0], [3, 1, 0], [4, 2, 0], [5, 2, 0], [9, 3, 0], [12, 3, 0]]}
-TOLD = [
+EVENTS = [
     [1, "goal.accepted", "a"],
     [2, "goal.reached", "a"],
     [3, "goal.accepted", "b"],
@@ -30,52 +30,52 @@ def measures(events=(), case=GOALS, **words):
     return compute_metrics(synthetic_trace({**TOUR, "events": list(events), **words}), synthetic_case(case))
 
 
-def test_the_time_is_from_the_first_acceptance_to_the_last_arrival():
-    found = measures(TOLD).values
+def test_time_to_goal_is_from_first_acceptance_to_last_arrival():
+    found = measures(EVENTS).values
     assert (found["time_to_goal"], found["success"]) == (8.0, 1.0)
-    assert measures([TOLD[0], *TOLD[2:]]).values["time_to_goal"] == 8.0
-    assert measures([*TOLD[:3], *TOLD[4:]]).values["time_to_goal"] == 8.0
+    assert measures([EVENTS[0], *EVENTS[2:]]).values["time_to_goal"] == 8.0
+    assert measures([*EVENTS[:3], *EVENTS[4:]]).values["time_to_goal"] == 8.0
 
 
-@pytest.mark.parametrize("events", [[], TOLD[:5], TOLD[:2], [TOLD[1], TOLD[3], TOLD[5]]])
-def test_without_the_last_arrival_or_any_acceptance_there_is_no_time(events):
+@pytest.mark.parametrize("events", [[], EVENTS[:5], EVENTS[:2], [EVENTS[1], EVENTS[3], EVENTS[5]]])
+def test_time_to_goal_needs_an_acceptance_and_the_last_arrival(events):
     found = measures(events)
     assert found.values["time_to_goal"] is None
     assert found.undefined["time_to_goal"] == "the last goal was not reached"
-    assert measures([*TOLD], case={}).values["time_to_goal"] is None
+    assert measures([*EVENTS], case={}).values["time_to_goal"] is None
 
 
-def test_one_goal_of_several_is_no_success():
-    assert measures(TOLD[:4]).values["success"] == 0.0
+def test_reaching_some_of_several_goals_is_no_success():
+    assert measures(EVENTS[:4]).values["success"] == 0.0
 
 
 def test_preempted_goal_is_not_required():
     case = {**GOALS, "sent": [{"name": "d", "pose": [3, 0, 0]}]}
     last = [[9, "goal.canceled", "c", {"preempted_by": "d"}], [9, "goal.accepted", "d"], [11, "goal.reached", "d"]]
-    assert measures([*TOLD[:5], *last], case).values["time_to_goal"] == 10.0
+    assert measures([*EVENTS[:5], *last], case).values["time_to_goal"] == 10.0
     dropped = [[7, "goal.accepted", "c"], [7, "goal.canceled", "c", {"preempted_by": "d"}]]
-    before = [*TOLD[:3], [5, "goal.accepted", "d"], [6, "goal.reached", "d"]]
+    before = [*EVENTS[:3], [5, "goal.accepted", "d"], [6, "goal.reached", "d"]]
     assert measures([*before, *dropped], case).values["time_to_goal"] == 5.0
 
 
-def test_soft_spl_is_of_the_last_goal_and_the_last_place():
+def test_soft_spl_is_computed_from_the_last_goal_and_final_position():
     found = measures(truth=[[0, 0, 0], [11.975, 0, 0], [12, 1.5, 0]])
     assert found.values["soft_spl"] == pytest.approx(0.5)
 
 
-def test_without_the_true_pose_there_is_no_soft_spl():
+def test_soft_spl_needs_the_true_pose():
     nothing = Samples(np.empty(0, np.int64), np.empty((0, 3)))
     found = compute_metrics(replace(synthetic_trace(TOUR), truth=nothing, velocity=nothing), synthetic_case(GOALS))
     assert found.undefined["soft_spl"] == "the true pose was not recorded"
     assert found.undefined["max_speed"] == found.undefined["sparc"] == "the true velocity was not recorded"
 
 
-def test_only_plans_for_another_reason_than_a_goal_are_replans():
-    plans = [[k, "plan.made", "", {"reason": why}] for k, why in enumerate(("goal", "timer", "blocked", "worse"))]
+def test_plans_for_new_goals_are_not_replans():
+    plans = [[k, "plan.made", "", {"reason": reason}] for k, reason in enumerate(("goal", "timer", "blocked", "worse"))]
     assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] == 3.0
 
 
-def test_ways_of_half_a_meter_have_a_score_too():
+def test_paths_of_half_a_meter_have_a_score():
     assert barn_score(True, 1.0, 0.5) == pytest.approx(0.25)
 
 
@@ -91,13 +91,13 @@ def test_a_centimeter_a_second_is_motion():
     assert with_speeds(np.full(81, 0.0099)).undefined["sparc"] == "the robot never moved"
 
 
-def test_smoothness_takes_two_samples_at_least():
+def test_smoothness_needs_at_least_two_samples():
     assert with_speeds(np.array([1.0, 0.5])).values["sparc"] == sparc(np.array([1.0, 0.5]), 40.0)
     one = with_speeds(np.array([1.0]))
     assert one.undefined["sparc"] == one.undefined["ldlj"] == "the run is too short: 1 sample of the truth"
 
 
-def test_a_velocity_that_is_recorded_later_is_as_smooth():
+def test_smoothness_uses_the_sampling_rate_not_the_start_time():
     speeds = np.array([1.0, *np.tile([0.5, 1.0], 20)])  # of 20 Hz, which is noise at this rate and no other
     assert sparc(speeds, 40.0) != sparc(speeds, 0.2)
     assert with_speeds(speeds, 600 + 6 * np.arange(41)).values["sparc"] == sparc(speeds, 40.0)
@@ -117,6 +117,6 @@ def contact(at, kind):
         ([contact(1, "ended"), contact(2, "ended"), contact(3, "started")], 1, 9.0),
     ],
 )
-def test_contacts_last_while_there_is_one(events, collisions, seconds):
+def test_contact_time_is_the_union_of_contacts(events, collisions, seconds):
     found = measures(events).values
     assert (found["collisions"], found["contact_time"]) == (collisions, seconds)

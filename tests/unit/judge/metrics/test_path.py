@@ -17,7 +17,7 @@ CORNER = [(5, 7), (6, 7), (6, 8)]
 
 
 def driven(points, events=(), plans=()):
-    """A trace whose robot is at one of the points (x, y) or (x, y, yaw) at each of its samples."""
+    """Return a trace with the robot at one of the points (x, y) or (x, y, yaw) at each of its samples."""
     poses = np.array([[*point, 0.0][:3] for point in points], dtype=np.float64)
     trace = synthetic_trace({"seconds": TICKS * (len(poses) - 1) / 240, "truth": [[0, 0, 0]], "events": list(events)})
     return replace(trace, truth=Samples(trace.truth.ticks, poses), plans=tuple(plans))
@@ -28,8 +28,8 @@ def shape(*points, **words):
     return path_metrics(trace, drive(trace))
 
 
-def placed(before):
-    """Set down elsewhere after the sample before this one."""
+def kidnapped(before):
+    """Return the event of a kidnapping between the sample before this one and this one."""
     return [[TICKS * (before - 1) / 240, "robot.placed"]]
 
 
@@ -38,7 +38,7 @@ def accepted(sample=0, name="a"):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_right_angle_of_two_meters(side):
+def test_path_with_a_right_angle_has_the_computed_metrics(side):
     metrics = shape((5, 7), (6, 7), (6, 7 + side, side * math.pi / 2))
     assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
     assert metrics["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
@@ -62,7 +62,7 @@ def test_sum_and_maximum_of_curvature_are_reported():
     assert metrics["aol"] == pytest.approx(math.pi / 4)
 
 
-def test_curvature_is_of_points_thirty_centimeters_from_the_one_before():
+def test_curvature_uses_points_at_least_30_cm_apart():
     assert shape((0, 0), (0.3, 0), (0.3, 0.3))["max_curvature"] == pytest.approx(math.sqrt(2) / 0.3)
     shaky = shape((5, 7), (5.2, 7.1), (5.4, 7), (5.4, 7.2), (5.4, 7.4), (5.41, 7.41))
     assert shaky["max_curvature"] == pytest.approx(math.sqrt(2) / 0.4)
@@ -74,19 +74,19 @@ def test_curvature_is_of_points_thirty_centimeters_from_the_one_before():
     )
 
 
-def test_each_piece_of_the_way_has_its_own_bends():
-    carried = placed(3)
-    metrics = shape(*CORNER, (0, 0), (2, 0), (2, 2), events=carried)
+def test_curvature_is_computed_for_each_path_segment():
+    kidnapping = kidnapped(3)
+    metrics = shape(*CORNER, (0, 0), (2, 0), (2, 2), events=kidnapping)
     assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
     assert metrics["norm_curvature"] == pytest.approx(4 * math.sqrt(2))
     assert metrics["aol"] == pytest.approx(math.pi / 6)
-    straight = shape(*CORNER, (0, 0), (2, 0), events=carried)
+    straight = shape(*CORNER, (0, 0), (2, 0), events=kidnapping)
     assert straight["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
     assert straight["aol"] == pytest.approx(math.pi / 2 / 4)
 
 
-def test_the_pieces_are_those_between_being_set_down():
-    trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*placed(3), *placed(5)])
+def test_kidnapping_splits_the_path_into_segments():
+    trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*kidnapped(3), *kidnapped(5)])
     assert [leg.tolist() for leg in path_segments(trace, drive(trace))] == [
         [[5, 7], [6, 7], [6, 8]],
         [[0, 0], [2, 0]],
@@ -94,12 +94,12 @@ def test_the_pieces_are_those_between_being_set_down():
     ]
 
 
-def test_a_way_of_eighths_of_a_meter_is_one_piece():
+def test_path_with_steps_of_an_eighth_of_a_meter_is_one_segment():
     metrics = shape((0, 0), (0.125, 0), (0.125, 0.125))
     assert metrics["aol"] == pytest.approx(math.pi / 2 / 0.25)
 
 
-def test_without_a_true_pose_there_is_no_shape():
+def test_path_metrics_need_the_true_pose():
     trace = replace(
         synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
     )
@@ -110,12 +110,12 @@ def test_without_a_true_pose_there_is_no_shape():
 
 
 @pytest.mark.parametrize(("before", "turned"), [(1, 0.6), (2, 0.5), (3, 0.3), (4, 0.7)])
-def test_being_turned_while_set_down_is_no_change_of_heading(before, turned):
+def test_rotation_by_kidnapping_is_no_heading_change(before, turned):
     yaws = [(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3), (0, 0, 0.7)]
-    assert shape(*yaws, events=placed(before))["heading_change"] == pytest.approx(turned)
+    assert shape(*yaws, events=kidnapped(before))["heading_change"] == pytest.approx(turned)
 
 
-def test_being_set_down_before_the_first_sample_changes_nothing():
+def test_kidnapping_before_the_first_sample_has_no_effect():
     trace = driven([(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3)], [[0, "robot.placed"]])
     late = replace(trace, truth=Samples(trace.truth.ticks + 1, trace.truth.values))
     assert path_metrics(late, drive(late))["heading_change"] == pytest.approx(0.3)
@@ -125,7 +125,7 @@ def plan(sample, *yaws):
     return Path(np.array([[0.0, 0.0, yaw] for yaw in yaws]), TICKS * sample)
 
 
-def test_the_first_plan_from_each_acceptance_on_is_what_had_to_be_turned():
+def test_irregularity_subtracts_the_first_plan_after_each_acceptance():
     spun = [(0, 0, 0.0), (0, 0, 1.0), (0, 0, 2.0), (0, 0, 3.0)]
     plans = [plan(0, 0, 0.9), plan(1, 0, -0.5), plan(1, 0, 0.1), plan(2, 0, 0.25, 0.0)]
     assert shape(*spun, events=[accepted(1)], plans=plans)["path_irregularity"] == pytest.approx(2.5)
@@ -134,8 +134,8 @@ def test_the_first_plan_from_each_acceptance_on_is_what_had_to_be_turned():
     assert shape(*spun, events=[accepted(0)], plans=[plan(0, 0, 2, 0, 2)])["path_irregularity"] == 0.0
 
 
-def test_a_goal_without_a_plan_or_none_at_all_leaves_it_undefined():
-    why = "there is no plan to each goal to compare with"
-    assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == why
+def test_irregularity_is_undefined_without_a_plan_for_each_goal():
+    reason = "there is no plan to each goal to compare with"
+    assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == reason
     twice = [accepted(0), accepted(2, "b")]
-    assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == why
+    assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == reason

@@ -20,8 +20,8 @@ CASE = synthetic_case({})
 BEFORE = MetricValues({"spl": 1.0}, {"ldlj": "no motion"})
 
 
-class Measured:
-    """A metric that returns or raises something."""
+class PluginMetric:
+    """Plug-in metric that returns or raises the given answer."""
 
     kind, plugin_suffix = "mine", " (my-package 1.0)"
 
@@ -32,7 +32,7 @@ class Measured:
     def measure(self) -> Any:
         outer = self
 
-        class Own:
+        class Measure:
             evidence = outer.evidence
 
             @staticmethod
@@ -42,42 +42,42 @@ class Measured:
                     raise outer.answer
                 return outer.answer
 
-        return Own
+        return Measure
 
 
-def added(measured: Measured, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
-    return add_plugin_metrics(BEFORE, [cast("AnyMeasure", measured)], TRACE, CASE, coverage)
+def add(metric: PluginMetric, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
+    return add_plugin_metrics(BEFORE, [cast("AnyMeasure", metric)], TRACE, CASE, coverage)
 
 
 @pytest.mark.parametrize("number", [2, 2.5, -1.0, 0.0])
 def test_a_number_is_added(number: float) -> None:
-    assert added(Measured(number)) == MetricValues({"spl": 1.0, "mine": float(number)}, {"ldlj": "no motion"})
+    assert add(PluginMetric(number)) == MetricValues({"spl": 1.0, "mine": float(number)}, {"ldlj": "no motion"})
 
 
 @pytest.mark.parametrize("answer", ["nothing to measure", MissingEvidence("nothing to measure")])
-def test_a_reason_is_added_where_there_is_no_number(answer: object) -> None:
-    found = added(Measured(answer))
+def test_reason_is_added_instead_of_a_number(answer: object) -> None:
+    found = add(PluginMetric(answer))
     assert found.values == {"spl": 1.0, "mine": None}
     assert found.undefined == {"ldlj": "no motion", "mine": "nothing to measure"}
 
 
 @pytest.mark.parametrize("answer", [True, math.nan, math.inf, -math.inf, None, "", [1.0], 1j])
-def test_anything_else_makes_the_run_an_error(answer: object) -> None:
+def test_invalid_metric_makes_the_run_an_error(answer: object) -> None:
     with pytest.raises(InvalidTrace, match=r"metric mine is not a finite number: .*\(my-package 1\.0\)"):
-        added(Measured(answer))
+        add(PluginMetric(answer))
 
 
-def test_an_exception_makes_the_run_an_error() -> None:
+def test_exception_in_a_metric_makes_the_run_an_error() -> None:
     with pytest.raises(InvalidTrace, match=r"metric mine: KeyError: 'x' \(my-package 1\.0\)"):
-        added(Measured(KeyError("x")))
+        add(PluginMetric(KeyError("x")))
 
 
 def test_missing_evidence_is_a_reason_if_the_metric_needs_it() -> None:
     coverage = LogCoverage({Evidence.SCANS: "", Evidence.TRUTH: ""})
     reason = "the log lacks the true pose of the robot and the times of the scans"
-    assert added(Measured(1.0, None), coverage).undefined["mine"] == reason
-    assert added(Measured(1.0, frozenset({Evidence.COMMANDS})), coverage).values["mine"] == 1.0
-    only = added(Measured(1.0, frozenset({Evidence.SCANS})), coverage).undefined["mine"]
+    assert add(PluginMetric(1.0, None), coverage).undefined["mine"] == reason
+    assert add(PluginMetric(1.0, frozenset({Evidence.COMMANDS})), coverage).values["mine"] == 1.0
+    only = add(PluginMetric(1.0, frozenset({Evidence.SCANS})), coverage).undefined["mine"]
     assert only == "the log lacks the times of the scans"
 
 
@@ -89,7 +89,7 @@ def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRA
 
 
 @pytest.mark.parametrize("zone", ZONES)
-def test_a_zone_begins_with_its_first_distance_and_ends_before_its_last(monkeypatch: Any, zone: str) -> None:
+def test_zone_includes_its_lower_limit_and_excludes_its_upper(monkeypatch: Any, zone: str) -> None:
     low, high = ZONES[zone]
     assert zones(monkeypatch, [low])[f"intrusion_{zone}"] == 1.0
     assert zones(monkeypatch, [high])[f"intrusion_{zone}"] == 0.0
@@ -103,7 +103,7 @@ def test_contact_with_a_person_is_zero_distance(monkeypatch: pytest.MonkeyPatch)
     )
 
 
-def test_a_run_of_one_tick_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_of_one_tick_is_entirely_in_a_zone(monkeypatch: pytest.MonkeyPatch) -> None:
     first = TRACE.truth
     short = replace(TRACE, truth=replace(first, ticks=first.ticks[:1], values=first.values[:1]), end=1)
     assert zones(monkeypatch, [0.1], short)["intrusion_intimate"] == 1.0

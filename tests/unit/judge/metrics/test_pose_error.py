@@ -1,4 +1,4 @@
-"""Pose errors in closed form."""
+"""Tests of pose errors in closed form."""
 
 from dataclasses import replace
 
@@ -10,15 +10,15 @@ from simscen.judge.metrics.trajectory import pose_metrics
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
-def located(ticks, true, told, believed):
-    """A trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
+def located(ticks, true, belief_ticks, believed):
+    """Return a trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
     trace = synthetic_trace({"seconds": max(ticks) / 240, "truth": [[0, 0, 0]]})
     beliefs = np.array([[*pose, 1, 0, 0, 1, 0, 1] for pose in believed], dtype=np.float64)
     truth = Samples(np.array(ticks), np.array(true, dtype=np.float64))
-    return replace(trace, truth=truth, belief=Samples(np.array(told), beliefs))
+    return replace(trace, truth=truth, belief=Samples(np.array(belief_ticks), beliefs))
 
 
-def test_relative_errors_are_over_each_meter_from_where_the_last_one_ended():
+def test_relative_errors_are_over_consecutive_meters():
     steps = [0.5, 0.4375, 0.0625] * 3
     ways = np.concatenate(([0.0], np.cumsum(steps)))
     believed = np.add(ways, [0, 5, 7, 0.2, -9, 8, 0.1, 6, -5, 0.5])
@@ -32,20 +32,20 @@ def test_relative_errors_are_over_each_meter_from_where_the_last_one_ended():
     assert metrics["ape_trans_final"] == pytest.approx(0.5)
 
 
-def test_a_turn_is_no_way():
+def test_turning_in_place_adds_no_distance():
     ticks = [0, 6, 12]
     poses = [(0, 0, 0), (0.1, 0, 3.0), (0.2, 0, 0)]
     assert pose_metrics(located(ticks, poses, ticks, poses))["rpe_trans_max"] == "the robot drove less than 1 m"
 
 
-def test_between_two_samples_the_truth_turns_the_shorter_way():
+def test_true_heading_is_interpolated_along_the_shorter_arc():
     true = [(0, 0, 0), (0.5, 0, 0), (1.0, 0, 3.1), (1.5, 0, 2 * np.pi - 3.1 - 2 * np.pi)]
     metrics = pose_metrics(located([0, 6, 12, 18], true, [0, 15], [(0, 0, 0), (1.25, 0, np.pi - 0.1)]))
     assert metrics["rpe_rot_max"] == pytest.approx(0.1)
     assert metrics["rpe_trans_max"] == pytest.approx(0.0)
 
 
-def test_relative_errors_are_seen_from_the_robot():
+def test_relative_errors_are_in_the_frame_of_the_robot():
     quarter = np.pi / 2
     true = [(2, 3, 0.0), (2, 4, quarter)]
     believed = [(5, 5, quarter), (4, 5, 2 * quarter + 0.2)]
@@ -54,7 +54,7 @@ def test_relative_errors_are_seen_from_the_robot():
     assert metrics["rpe_rot_max"] == pytest.approx(0.2)
 
 
-def test_a_belief_without_covariance_has_no_nees_but_a_reason():
+def test_belief_without_covariance_has_no_nees_with_a_reason():
     trace = located([0, 6], [(0, 0, 0)] * 2, [0, 6], [(0, 0, 0)] * 2)
     bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
     assert pose_metrics(bare)["nees"] == "the belief has no covariance"

@@ -32,7 +32,7 @@ RUNS = [
 ]
 
 
-def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
+def test_rates_are_over_all_runs_and_means_over_runs_with_the_metric():
     figures = summarize_session(RUNS)
     assert figures.success_rate == 0.5
     assert figures.success_interval == pytest.approx((0.15, 0.85), abs=0.01)
@@ -41,7 +41,7 @@ def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
     assert (figures.runs, figures.measured_runs, figures.kilometers, figures.hours) == (4, 3, 2.0, 1.5)
 
 
-def test_the_order_of_the_runs_changes_nothing():
+def test_order_of_runs_does_not_change_the_summary():
     assert summarize_session(RUNS) == summarize_session(reversed(RUNS))
 
 
@@ -53,7 +53,7 @@ def test_summary_line_has_the_numbers_of_runs():
     assert session_summary_line(summarize_session(RUNS[2:3])) == "success 100% of 1 run (21% … 100%)"
 
 
-def test_without_runs_there_are_no_rates():
+def test_summary_without_runs_has_no_rates():
     figures = summarize_session([])
     assert session_summary_line(figures) == ""
     data = session_summary_data(figures)
@@ -62,18 +62,18 @@ def test_without_runs_there_are_no_rates():
         assert data[name] is None
 
 
-def test_runs_that_all_broke_did_not_succeed():
+def test_runs_with_errors_did_not_succeed():
     figures = summarize_session(RUNS[3:])
     assert (figures.success_rate, figures.measured_runs, figures.collisions_per_km) == (0.0, 0, None)
     assert figures.collisions_per_hour is None
 
 
-def test_a_short_way_and_a_short_time_have_rates_too():
+def test_short_paths_and_times_have_rates():
     figures = summarize_session([run(1, simulated=36.0, success=0.0, collisions=2.0, path_length=10.0)])
     assert (figures.collisions_per_km, figures.collisions_per_hour) == (200.0, 200.0)
 
 
-def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all_do():
+def test_distances_and_collisions_of_robots_are_added_and_all_must_succeed():
     metrics = {
         "a/spl": 0.5,
         "b/spl": None,
@@ -89,7 +89,7 @@ def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all
     assert (figures.collisions, figures.kilometers, figures.hours) == (3, 2.0, 1.0)
 
 
-def test_the_order_of_the_runs_changes_not_even_the_last_bit() -> None:
+def test_summary_is_bit_identical_in_any_order_of_runs() -> None:
     lengths = {1: 1e16, 2: 1.0, 3: 1.0}  # 1e16 + 1 + 1 = 1e16, but 1 + 1 + 1e16 > 1e16
     results = [
         RunResult(RunKey("a", seed), "a", Outcome.PASSED, metrics={"path_length": length})

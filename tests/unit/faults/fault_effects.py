@@ -1,4 +1,4 @@
-"""Faults at work, with a clock that tests turn by hand."""
+"""Started faults with a manual clock, and messages for them."""
 
 import math
 
@@ -12,8 +12,8 @@ from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
 from simscen.faults.base import AnyFault, FaultSetting, FaultTarget
 
 
-class Hand:
-    """What time it is, in ticks of 1/240 s."""
+class ManualClock:
+    """Clock whose ticks of 1/240 s are set by tests."""
 
     tick = 0
 
@@ -21,7 +21,7 @@ class Hand:
         return self.tick
 
 
-def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, simulator=None):
+def start(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, simulator=None):
     setting = FaultSetting(separation, Clock(240), now, kind, simulator)
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
 
@@ -39,8 +39,8 @@ def odometry(pose=Pose2(0, 0), tick=0, twist=STOP) -> Odometry:
     return Odometry("odom", tick, pose, twist)
 
 
-def imu(tick=0, turning=(0.0, 0.0, 0.2), pushing=(0.1, 0.0, 9.81)) -> Imu:
-    return Imu("imu", tick, turning, pushing)
+def imu(tick=0, rates=(0.0, 0.0, 0.2), accelerations=(0.1, 0.0, 9.81)) -> Imu:
+    return Imu("imu", tick, rates, accelerations)
 
 
 def image(depth, tick=0, gray=100) -> Image:
@@ -49,5 +49,5 @@ def image(depth, tick=0, gray=100) -> Image:
 
 
 def belief(pose: Pose2, odom: Pose2) -> Belief:
-    """A belief at `pose` in the map when odometry says `odom`."""
+    """Return a belief with this pose in the map and in the odom frame."""
     return Belief(pose, np.eye(3), pose.compose(odom.inverse()))
