@@ -1,4 +1,4 @@
-"""Settings of all tests, and packages that add to simscen, laid out as an installer leaves them."""
+"""Settings of all tests, and fixtures that install plugin packages."""
 
 import gc
 import os
@@ -16,7 +16,7 @@ from simscen.core.cpu_kernels import pin_kernels
 from simscen.spec import choice, registry
 
 pin_kernels()  # before the tests import NumPy, so that runs in this process are the same as on the command line
-Lay = Callable[..., Path]
+Install = Callable[..., Path]
 QUICK_EXAMPLES = 25
 """Examples of each property in `make test`; `make test-all` tries 100."""
 
@@ -39,7 +39,7 @@ sys.dont_write_bytecode = False
 gc.disable()
 
 LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
-"""Tests that start first because they take longest, so that no worker is left alone with them at the end."""
+"""Tests that start first because they take longest, so that the other workers do not wait for them at the end."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -91,23 +91,23 @@ def _by_function(items: list[pytest.Item]) -> dict[str, list[pytest.Item]]:
     return functions
 
 
-def lay(site: Path, name: str, version: str, points: Mapping[str, Mapping[str, str]], **modules: str) -> Path:
-    """Write modules and the package's dist-info into a folder: `points` are entry points by kind, then by name."""
+def install(site: Path, name: str, version: str, points: Mapping[str, Mapping[str, str]], **modules: str) -> Path:
+    """Install modules and a dist-info into the folder `site`; `points` are entry points by kind, then by name."""
     site.mkdir(parents=True, exist_ok=True)
-    about = site / f"{name.replace('-', '_')}-{version}.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    info = site / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
     groups = [
         f"[simscen.{kind}]\n" + "".join(f"{key} = {value}\n" for key, value in those.items())
         for kind, those in points.items()
     ]
-    (about / "entry_points.txt").write_text("\n".join(groups))
+    (info / "entry_points.txt").write_text("\n".join(groups))
     for module, text in modules.items():
         (site / f"{module}.py").write_text(text)
     return site
 
 
-def lay_out(folder: Path, site: Path) -> Path:
+def install_folder(folder: Path, site: Path) -> Path:
     """Install a package from its folder, as `pip install --target` would: its modules, and what pyproject.toml says."""
     text = (folder / "pyproject.toml").read_text()
     name, version = (re.findall(rf'^{key} = "(.*)"$', text, re.MULTILINE)[0] for key in ("name", "version"))
@@ -115,36 +115,36 @@ def lay_out(folder: Path, site: Path) -> Path:
         kind: dict(re.findall(r'^(\w+) = "(.*)"$', rows, re.MULTILINE))
         for kind, rows in re.findall(r'^\[project.entry-points."simscen.(\w+)"\]\n((?:.+\n)*)', text, re.MULTILINE)
     }
-    lay(site, name, version, points)
+    install(site, name, version, points)
     module = name.replace("-", "_")
     shutil.copytree(folder / module, site / module, ignore=shutil.ignore_patterns("__pycache__"))
     return site
 
 
-def forget() -> None:
-    """Let the next look for packages see what is there then."""
+def clear_package_caches() -> None:
+    """Clear the caches of installed packages."""
     for known in (registry._installed_entries, registry._load, choice.with_installed_choices):
         known.cache_clear()
 
 
 @pytest.fixture
-def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lay]:
-    """`packages(name, version, points, module="…")` installs a package for this test, in a folder that it returns."""
+def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Return `packages(name, version, points, module="…")`, which installs a package for this test."""
     site, before = tmp_path / "site", set(sys.modules)
     site.mkdir()
     monkeypatch.syspath_prepend(str(site))
-    forget()
+    clear_package_caches()
 
     def add(name: str, version: str, points: Mapping[str, Mapping[str, str]], **modules: str) -> Path:
-        forget()
-        return lay(site, name, version, points, **modules)
+        clear_package_caches()
+        return install(site, name, version, points, **modules)
 
-    add.site, add.lay = site, lay  # type: ignore[attr-defined]
+    add.site, add.install = site, install  # type: ignore[attr-defined]
     yield add
     for module in set(sys.modules) - before:
         if str(getattr(sys.modules[module], "__file__", "")).startswith(str(site)):
             del sys.modules[module]
-    forget()
+    clear_package_caches()
 
 
 @pytest.fixture(scope="session")
@@ -154,18 +154,18 @@ def is_quick(request: pytest.FixtureRequest) -> bool:
 
 
 @pytest.fixture
-def yardwork(packages: Lay) -> Path:
-    """The package tests/plugins/yardwork, installed for this test; where it is."""
-    return lay_out(Path(__file__).parent / "plugins" / "yardwork", packages.site)  # type: ignore[attr-defined]
+def yardwork(packages: Install) -> Path:
+    """Install the package tests/plugins/yardwork for this test; return its folder."""
+    return install_folder(Path(__file__).parent / "plugins" / "yardwork", packages.site)  # type: ignore[attr-defined]
 
 
-@pytest.fixture(scope="session", name="lay_out")
-def how_to_lay_out() -> Callable[[Path, Path], Path]:
-    """`lay_out(folder, site)`, for tests that start commands of their own."""
-    return lay_out
+@pytest.fixture(scope="session", name="install_folder")
+def install_folder_fixture() -> Callable[[Path, Path], Path]:
+    """Return `install_folder(folder, site)`, for tests that start commands."""
+    return install_folder
 
 
-@pytest.fixture(name="lay")
-def how_to_lay() -> Lay:
-    """`lay(site, name, version, points, module="…")`, for tests that start commands of their own."""
-    return lay
+@pytest.fixture(name="install")
+def install_fixture() -> Install:
+    """Return `install(site, name, version, points, module="…")`, for tests that start commands."""
+    return install

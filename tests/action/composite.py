@@ -15,13 +15,13 @@ INPUTS = {
     "actions/cache@v4": {"path", "key", "restore-keys"},
     "actions/upload-artifact@v4": {"name", "path", "retention-days", "if-no-files-found"},
 }
-"""What the actions take that are used, of what their action.yml declare."""
+"""Declared inputs that action.yml uses, by the action that it calls."""
 _EXPRESSION = re.compile(r"\$\{\{\s*(.*?)\s*\}\}")
 
 
 @dataclass
-class Ran:
-    """What came of it: the steps that were done, the outputs of the action, and what is printed and uploaded."""
+class CompletedAction:
+    """Outcomes of the steps, outputs of the action, printed text, step summary, and inputs of called actions."""
 
     outcomes: dict[str, str] = field(default_factory=dict)
     outputs: dict[str, str] = field(default_factory=dict)
@@ -31,12 +31,12 @@ class Ran:
 
     @property
     def failed(self) -> bool:
-        """Whether the job is red."""
+        """Whether a step failed."""
         return "failure" in self.outcomes.values()
 
 
 class Composite:
-    """An action in the folder `action`, called in the checkout `workspace`; `temp` is the runner's."""
+    """An action in the folder `action`, called in the checkout `workspace`; `temp` is RUNNER_TEMP."""
 
     def __init__(self, action: Path, workspace: Path, temp: Path, environ: Mapping[str, str]) -> None:
         self._action, self._workspace, self._temp = action, workspace, temp
@@ -44,8 +44,8 @@ class Composite:
         self._environ = dict(environ)
         self._steps: dict[str, dict[str, Any]] = {}
 
-    def run(self, **inputs: str) -> Ran:
-        """Do the steps."""
+    def run(self, **inputs: str) -> CompletedAction:
+        """Run the steps whose conditions hold, and return the result."""
         declared = self._definition["inputs"]
         assert inputs.keys() <= declared.keys()
         values = {name: inputs.get(name, one["default"]) for name, one in declared.items()}
@@ -56,24 +56,24 @@ class Composite:
             "runner.os": "Linux",
             "runner.arch": "X64",
         }
-        ran = Ran()
+        ran = CompletedAction()
         for number, step in enumerate(self._definition["runs"]["steps"]):
             name = step.get("id", str(number))
             self._steps[name] = {"outcome": "skipped", "outputs": {}}
-            if self._wanted(step.get("if", "success()"), ran):
-                done = self._uses(step, ran) if "uses" in step else self._runs(name, step, ran)
+            if self._should_run(step.get("if", "success()"), ran):
+                done = self._call_action(step, ran) if "uses" in step else self._run_script(name, step, ran)
                 self._steps[name]["outcome"] = ran.outcomes[name] = "success" if done else "failure"
                 if step.get("uses", "").startswith("actions/upload-artifact"):
                     self._steps[name]["outputs"]["artifact-url"] = "https://example.org/artifact"
-        ran.outputs = {name: self._filled(one["value"]) for name, one in self._definition["outputs"].items()}
+        ran.outputs = {name: self._substituted(one["value"]) for name, one in self._definition["outputs"].items()}
         return ran
 
-    def _wanted(self, condition: str, ran: Ran) -> bool:
-        """Of conditions only what stands in this action: calls and comparisons that are joined by `&&`."""
+    def _should_run(self, condition: str, ran: CompletedAction) -> bool:
+        """Evaluate a condition: calls of status functions and comparisons, joined by `&&`."""
         parts = [part.strip() for part in _EXPRESSION.sub(r"\1", condition).split("&&")]
-        return all(self._holds(part, ran) for part in parts) and ("always()" in parts or not ran.failed)
+        return all(self._is_true(part, ran) for part in parts) and ("always()" in parts or not ran.failed)
 
-    def _holds(self, part: str, ran: Ran) -> bool:
+    def _is_true(self, part: str, ran: CompletedAction) -> bool:
         if part in ("always()", "success()"):
             return True
         compared = re.fullmatch(r"(\S+) (==|!=) '(.*)'", part)
@@ -86,24 +86,24 @@ class Composite:
             return str(step["outputs"].get(found[2], "") if found[2] else step["outcome"])
         return self._context[name]
 
-    def _filled(self, text: str) -> str:
+    def _substituted(self, text: str) -> str:
         return _EXPRESSION.sub(lambda match: self._value(match[1]), str(text))
 
-    def _uses(self, step: dict[str, Any], ran: Ran) -> bool:
-        given = {name: self._filled(value) for name, value in step.get("with", {}).items()}
+    def _call_action(self, step: dict[str, Any], ran: CompletedAction) -> bool:
+        given = {name: self._substituted(value) for name, value in step.get("with", {}).items()}
         assert given.keys() <= INPUTS[step["uses"]], step
         ran.used[step["uses"]] = given
         return True
 
-    def _runs(self, name: str, step: dict[str, Any], ran: Ran) -> bool:
-        assert "${{" not in step["run"], "what others write into an expression would be run"
+    def _run_script(self, name: str, step: dict[str, Any], ran: CompletedAction) -> bool:
+        assert "${{" not in step["run"], "an expression in a script allows script injection"
         assert step["shell"] == "bash"
         files = {kind: self._temp / f"{name}.{kind}" for kind in ("OUTPUT", "PATH", "ENV", "STEP_SUMMARY")}
         for file in files.values():
             file.touch()
         script = self._temp / f"{name}.sh"
         script.write_text(step["run"])
-        variables = {key: self._filled(value) for key, value in step.get("env", {}).items()}
+        variables = {key: self._substituted(value) for key, value in step.get("env", {}).items()}
         github = {f"GITHUB_{kind}": str(file) for kind, file in files.items()}
         done = subprocess.run(
             ["bash", "--noprofile", "--norc", "-e", "-o", "pipefail", str(script)],

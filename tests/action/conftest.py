@@ -1,4 +1,4 @@
-"""The runner of composite actions is found by the tests beside it."""
+"""Make composite.py importable in the tests of this folder."""
 
 import sys
 from pathlib import Path

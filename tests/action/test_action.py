@@ -24,7 +24,7 @@ pass: [{collisions: {max: 0}}]
 PYTHON = """\
 #!/bin/sh
 {python} "$@" || exit
-if [ "$2" = venv ]; then printf '{packages}\\n' > "$(echo "$3"/lib/python*/site-packages)/borrowed.pth"; fi
+if [ "$2" = venv ]; then printf '{packages}\\n' > "$(echo "$3"/lib/python*/site-packages)/packages.pth"; fi
 """
 PACKAGES = [path for path in sys.path if path.endswith("site-packages")]
 FAILING = ROOM.replace("collisions: {max: 0}", "clearance: {min: 2}")
@@ -32,7 +32,7 @@ FAILING = ROOM.replace("collisions: {max: 0}", "clearance: {min: 2}")
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What GitHub fetches for `uses: simscen/simscen@main`, of all that is installed from it."""
+    """Copy the files that `uses: simscen/simscen@main` installs; return the folder."""
     folder = tmp_path_factory.mktemp("actions") / "simscen"
     folder.mkdir()
     for name in ("action.yml", "pyproject.toml", "README.md", "LICENSE"):
@@ -43,9 +43,9 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def action(clone: Path, tmp_path: Path):
-    """`action()` calls it in a checkout with a scenario that passes and one that fails.
+    """Return a function that runs the action in a checkout with a scenario that passes and one that fails.
 
-    Nothing is downloaded: the environments that the runner's Python makes have what simscen needs and what builds it.
+    Nothing is downloaded: virtual environments of the runner's Python get the packages of this one.
     """
     workspace, temp, server = (tmp_path / name for name in ("work", "temp", "server"))
     (workspace / "scenarios").mkdir(parents=True)
@@ -103,13 +103,12 @@ def test_invalid_file_fails_the_job_without_reports(action, tmp_path: Path) -> N
 
 
 def test_actionlint_accepts_action_workflows_and_guide(tmp_path: Path) -> None:
-    """As actionlint sees it, which knows the action's inputs."""
     (tmp_path / ".github/workflows").mkdir(parents=True)
     shutil.copy(ROOT / "action.yml", tmp_path)
     workflows = sorted((ROOT / ".github/workflows").glob("*.yml"))
     for file in workflows:
         shutil.copy(file, tmp_path / ".github/workflows")
-    for number, block in enumerate(whole_workflows()):
+    for number, block in enumerate(workflows_in_the_guide()):
         text = block.replace("uses: simscen/simscen@main", "uses: ./")
         assert text != block or "simscen/simscen" not in block
         (tmp_path / f".github/workflows/shown-{number}.yml").write_text(text)
@@ -121,15 +120,15 @@ def test_actionlint_accepts_action_workflows_and_guide(tmp_path: Path) -> None:
 
 
 def as_workflow() -> dict[str, object]:
-    """The steps of the action as those of a workflow: actionlint looks into these."""
+    """Return a workflow with the steps of the action, because actionlint does not check steps in action.yml."""
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     inputs = {name: {"type": "string", "default": one["default"]} for name, one in action["inputs"].items()}
     job = {"runs-on": "ubuntu-latest", "steps": action["runs"]["steps"]}
     return {"on": {"workflow_call": {"inputs": inputs}}, "jobs": {"steps": job}}
 
 
-def whole_workflows() -> list[str]:
-    """The workflows in the guide; each is one as it stands."""
+def workflows_in_the_guide() -> list[str]:
+    """Return the complete workflows in the guide."""
     text = (ROOT / "docs/guides/github-actions.md").read_text()
     found = [block for block in re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL) if "jobs:" in block]
     assert found

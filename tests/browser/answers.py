@@ -1,4 +1,4 @@
-"""A session's answers, made up: passed, failed and broken runs, with names that try to break out."""
+"""Invented results of a session: passed, failed, and crashed runs, with names that contain HTML."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +14,8 @@ from simscen.report.session_history import PastOutcome, PastSession
 EVIL = "\"'><script>document.title='owned'</script><img src=x onerror=alert(1)>"
 
 
-def run(scenario: str, seed: int = 1, left: float = 0.5, seconds: float = 20.0, **told: object) -> RunFinished:
-    """One that has `left` of a limit of 10 m; it failed where that is negative."""
+def run(scenario: str, seed: int = 1, left: float = 0.5, seconds: float = 20.0, **more: object) -> RunFinished:
+    """Return a run with the relative margin `left` to a limit of 10 m; it failed if `left` is negative."""
     status = Status.PASS if left >= 0 else Status.FAIL
     finding = Finding(
         status, "path_length", f"{10 - 10 * left:.2f} m", "≤ 10.00 m", 10 * left, "m", 10 - 10 * left, 2400, (1.0, 2.0),
@@ -23,7 +23,7 @@ def run(scenario: str, seed: int = 1, left: float = 0.5, seconds: float = 20.0, 
     )  # fmt: skip
     fell = DisturbanceOutcome(Disturbance("pallet falls", "event", "time: 3 s"), (720,), True, "spawned pallet", 720)
     result = RunResult(
-        RunKey(scenario, seed, str(told.get("variation", "")), str(told.get("stack", ""))),
+        RunKey(scenario, seed, str(more.get("variation", "")), str(more.get("stack", ""))),
         f"{scenario}.scenario.yaml",
         Outcome.PASSED if left >= 0 else Outcome.FAILED,
         (Verdict("path_length", "path_length", "fail", (finding,)),),
@@ -33,29 +33,29 @@ def run(scenario: str, seed: int = 1, left: float = 0.5, seconds: float = 20.0, 
         ended="navigation ended",
         simulated=seconds,
     )
-    tags = told.get("tags", ())
+    tags = more.get("tags", ())
     assert isinstance(tags, tuple)
     return RunFinished(result, 0.5, again=f"simscen run {scenario}.scenario.yaml --seed {seed}", tags=tags)
 
 
-def broken(scenario: str) -> RunFinished:
-    """One that crashed, and printed what nobody should obey."""
+def crashed(scenario: str) -> RunFinished:
+    """Return a crashed run, with escape sequences and HTML in its output."""
     error = RunFailure("crashed", f"crashed: SIGSEGV {EVIL}", f"{EVIL}\n\x1b[31mSegmentation fault")
     result = RunResult(RunKey(scenario, 1), f"{scenario}.scenario.yaml", Outcome.ERROR, error=error)
     return RunFinished(result, 1.0, again=EVIL)
 
 
 def session(folder: Path) -> list[RunFinished]:
-    """Eight runs; the one that failed has a picture and a page to play it."""
-    place = folder / "runs/doors/shuts/seed-1"
-    place.mkdir(parents=True)
-    Image.new("RGB", (300, 200), (226, 223, 216)).save(place / "map.png")
-    (place / "replay.html").write_text("<!doctype html><title>replay</title>")
-    files = Artifacts(str(place), "", str(place / "map.png"), "", str(place / "replay.html"))
+    """Return eight runs, of which the first failed one has a picture and a replay page."""
+    run_folder = folder / "runs/doors/shuts/seed-1"
+    run_folder.mkdir(parents=True)
+    Image.new("RGB", (300, 200), (226, 223, 216)).save(run_folder / "map.png")
+    (run_folder / "replay.html").write_text("<!doctype html><title>replay</title>")
+    files = Artifacts(str(run_folder), "", str(run_folder / "map.png"), "", str(run_folder / "replay.html"))
     return [
         replace(run("scenarios/doors/shuts", left=-0.2, seconds=31.0, tags=("door", "smoke")), artifacts=files),
         run("scenarios/doors/opens", left=0.02, seconds=12.0, tags=("door",)),
-        broken(f"scenarios/evil/{EVIL}"),
+        crashed(f"scenarios/evil/{EVIL}"),
         *(run("scenarios/speeds", seed, 0.3, 15.0 + seed, variation="fast") for seed in (1, 2, 3)),
         run("scenarios/speeds", 4, -0.1, 40.0, variation="slow"),
         run("scenarios/zones/ward", left=0.9, seconds=8.0, tags=("zones", EVIL)),
@@ -63,6 +63,6 @@ def session(folder: Path) -> list[RunFinished]:
 
 
 def past(answers: list[RunFinished]) -> list[PastSession]:
-    """Two sessions in which everything passed that now failed."""
+    """Return two earlier sessions in which all runs passed."""
     before = {answer.key: PastOutcome(Outcome.PASSED, answer.result.simulated * 0.9) for answer in answers}
     return [PastSession("20260102T000000Z-beef", before), PastSession(f"20260101T000000Z-{EVIL}", before)]

@@ -1,6 +1,6 @@
-"""Pages in a real browser: Debian's Chromium, driven by Playwright; axe-core from npm in a folder of its own.
+"""Pages in a real browser: Chromium, driven by Playwright, with axe-core from npm.
 
-Where there is no Chromium the tests skip, but for CI with root rights: there it is installed.
+Without Chromium, the tests are skipped; in CI with root rights, it is installed.
 """
 
 import fcntl
@@ -34,7 +34,7 @@ NPM = ["npm", "install", "--no-audit", "--no-fund", "--no-save", "--ignore-scrip
 
 @pytest.fixture(scope="session")
 def chromium() -> str:
-    """The path of a Chromium."""
+    """Return the path of Chromium; skip the test if there is none."""
     found = next(filter(None, map(shutil.which, NAMES)), None)
     if found is None and os.environ.get("CI") == "true" and os.geteuid() == 0 and shutil.which("apt-get"):
         with _locked():
@@ -53,7 +53,7 @@ def chromium() -> str:
 
 @pytest.fixture(scope="session")
 def browser(chromium: str) -> Iterator[Any]:
-    """A browser of this process of pytest."""
+    """Start one browser for all tests of this pytest process."""
     driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with driver.sync_playwright() as playwright:
         arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
@@ -64,7 +64,7 @@ def browser(chromium: str) -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Opener]:
-    """Opens files in the browser; afterwards none of them may have logged an error or asked for anything else."""
+    """Return a function that opens files; at the end, check for logged errors and requests of other files."""
     opened: list[Opened] = []
 
     def open_(file: Path | str, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
@@ -78,7 +78,7 @@ def open_page(browser: Any) -> Iterator[Opener]:
 
 @pytest.fixture(scope="session")
 def axe() -> str:
-    """axe-core as a script to be put into a page."""
+    """Return the script of axe-core."""
     if shutil.which("npm") is None:
         pytest.skip("there is no npm to install axe-core with")
     script = FOLDER / "node_modules" / "axe-core" / "axe.min.js"
@@ -94,7 +94,7 @@ def axe() -> str:
 
 
 class _locked:
-    """Several processes of pytest would install the same at once."""
+    """Lock against installations by other pytest processes."""
 
     def __enter__(self) -> None:
         FOLDER.mkdir(exist_ok=True)
@@ -107,7 +107,7 @@ class _locked:
 
 @pytest.fixture
 def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
-    """Opens a file in the editor."""
+    """Return a function that opens a file in the editor."""
     servers: list[EditorServer] = []
 
     def open_(file: Path, kind: str = "scenario", root: Path | None = None, **given: Any) -> Opened:

@@ -1,11 +1,11 @@
-"""A short drive on which much happens and something fails, for pages to show."""
+"""A short run with events, faults, and a failed criterion, for tests of pages."""
 
 from pathlib import Path
 
 SCENARIO = """\
 simscen: 1
-name: a bit of everything
-# what this team wants to know
+name: many features
+# a comment
 world:
   simscen: 1
   name: hall
@@ -22,7 +22,7 @@ events:
     do:
       - spawn: {name: pallet, box: [0.5, 0.6, 0.5], pose: {x: 4.5, y: 1.0}}
       - mark: {name: bang}
-  - name: somebody walks by
+  - name: pedestrian walks by
     when: {time: 1 s}
     do: {pedestrian: {name: anna, pose: {x: 7.5, y: 4.5, yaw: 180 deg}, goals: [[2, 4.6]]}}
 faults:
@@ -36,7 +36,7 @@ pass:
 
 
 def drive(folder: Path, seed: int = 1) -> Path:
-    """Run it; the log."""
+    """Run the scenario, and return its log."""
     from simscen.loading.scenario import load_scenario
     from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate

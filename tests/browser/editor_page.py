@@ -1,4 +1,4 @@
-"""What tests of the editor do on its page, and the scenario that they edit."""
+"""Helpers of the editor tests: mouse actions, text, and the edited scenario."""
 
 import re
 import sys
@@ -38,7 +38,7 @@ Edit = Callable[..., Opened]
 
 
 def settle(opened: Opened) -> None:
-    """Wait until the page has nothing to do any more."""
+    """Wait until the page has finished all updates."""
     opened.until(
         "!editor.keyMove && !editor.previewing && document.documentElement.dataset.checked === "
         "String(editor.history.before.length)"
@@ -46,7 +46,7 @@ def settle(opened: Opened) -> None:
 
 
 def pixel(opened: Opened, x: float, y: float) -> tuple[float, float]:
-    """The position of a point of the world on the screen."""
+    """Return the screen position of a point in the world."""
     script = (
         "([x, y]) => { const b = editor.view.canvas.getBoundingClientRect(); const [u, v] = editor.view.pixel(x, y);"
     )
@@ -74,7 +74,7 @@ def text(opened: Opened) -> str:
 
 
 def changes(before: str, after: str) -> list[tuple[str, str]]:
-    """The pieces of the text that differ, by whole words."""
+    """Return pairs of old and new words where the texts differ."""
     words = [re.findall(r"[\w.-]+|\W", one) for one in (before, after)]
     steps = SequenceMatcher(None, *words, autojunk=False).get_opcodes()
     return [("".join(words[0][a:b]), "".join(words[1][c:d])) for what, a, b, c, d in steps if what != "equal"]

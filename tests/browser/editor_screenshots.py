@@ -1,4 +1,4 @@
-"""Takes the picture of the editor that the docs show: `make screenshots`."""
+"""Take the screenshot of the editor for the docs (`make screenshots`)."""
 
 import sys
 import threading
@@ -37,7 +37,7 @@ pass:
 
 
 def main() -> None:
-    """Open a scenario in the editor and take its picture, in light."""
+    """Open a scenario in the editor, and take a screenshot with the light theme."""
     file = ROOT / "scenarios" / "house.scenario.yaml"
     session = EditorSession(EditedFile(file, "scenario", ROOT), lambda: backend_of(SessionOptions()), TEXT)
     with EditorServer(session) as server, browser() as running:

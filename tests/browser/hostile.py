@@ -1,4 +1,4 @@
-"""A log whose every name tries to break out of a page."""
+"""A log with HTML and escape sequences in every name."""
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
@@ -15,7 +15,7 @@ TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'
 
 
 def hostile_log() -> tuple[Log, RunResult]:
-    """The log, and a result that fails."""
+    """Return the log and a failed result."""
     trace = synthetic_trace(
         {
             "seconds": 4,
@@ -30,10 +30,10 @@ def hostile_log() -> tuple[Log, RunResult]:
         }
     )
     case = Case(Pose2(0, 0), (Goal(EVIL, Pose2(2, 0)),), regions={EVIL: ((0, 0), (1, 0), (1, 1))})
-    about = LogHeader(EVIL, 1, case, TEXT, facts={"stack": EVIL, "variation": EVIL})
+    header = LogHeader(EVIL, 1, case, TEXT, facts={"stack": EVIL, "variation": EVIL})
     finding = Finding(Status.FAIL, EVIL, EVIL, EVIL, -1.0, "m", 2.0, 480, (1.0, 0.0), (EVIL,))
     verdicts = (Verdict(EVIL, EVIL, "fail", (finding,)),)
     result = RunResult(
         RunKey(EVIL, 1, EVIL, EVIL), EVIL, outcome_of_verdicts(verdicts), verdicts, ended=EVIL, simulated=4.0
     )
-    return Log(about, trace, "", True), result
+    return Log(header, trace, "", True), result

@@ -1,17 +1,17 @@
-"""A file that is open in a browser, with all that it complains about."""
+"""A page that is open in a browser, and its errors and requests."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 Opener = Callable[..., "Opened"]
-PATIENCE = 30_000
-"""Milliseconds until a page that does nothing is taken for dead: no measure of its speed."""
+TIMEOUT_MS = 30_000
+"""Time in ms until a page counts as hanging."""
 GRAVE = ("serious", "critical")
 
 
 class Opened:
-    """A page in a context of its own, from a file or from a local server. `page` is Playwright's."""
+    """A page from a file or local server in a new browser context; `page` is the page object of Playwright."""
 
     def __init__(self, browser: Any, file: Path | str, size: tuple[int, int], dark: bool, where: str) -> None:
         scheme = "dark" if dark else "light"
@@ -19,33 +19,33 @@ class Opened:
         self._context = browser.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=False, offline=False
         )
-        self._context.set_default_timeout(PATIENCE)
+        self._context.set_default_timeout(TIMEOUT_MS)
         self.page = self._context.new_page()
         self._complaints: list[str] = []
         self._uri = file if isinstance(file, str) else file.resolve().as_uri()
-        self.page.on("console", self._heard)
+        self.page.on("console", self._on_console)
         self.page.on("pageerror", lambda error: self._complaints.append(f"error: {error}"))
-        self.page.on("request", self._requested)
+        self.page.on("request", self._on_request)
         self.page.on("dialog", lambda dialog: (self._complaints.append(f"dialog: {dialog.message}"), dialog.dismiss()))
         self.page.goto(self._uri + where)
 
-    def until(self, holds: str) -> None:
-        """Wait until an expression holds; Playwright's own way needs `eval`, which a strict policy forbids."""
-        from playwright.sync_api import Error  # those who have no browser skip
+    def until(self, condition: str) -> None:
+        """Wait until an expression is true. Playwright's wait needs `eval`, which the page's policy forbids."""
+        from playwright.sync_api import Error  # tests are skipped without Playwright
 
-        for _ in range(PATIENCE // 20):
+        for _ in range(TIMEOUT_MS // 20):
             try:
-                if self.page.evaluate(holds):
+                if self.page.evaluate(condition):
                     return
             except Error as error:
-                if "context was destroyed" not in str(error):  # a page that loads itself anew
+                if "context was destroyed" not in str(error):  # the page reloads itself
                     raise
             self.page.wait_for_timeout(20)
-        raise AssertionError(f"never held: {holds}")
+        raise AssertionError(f"never true: {condition}")
 
     def grave_findings(self, axe: str) -> list[str]:
-        """What axe-core finds serious or critical: rule, element, and what it says."""
-        self.page.evaluate(axe)  # put in by the driver, so the page's policy stays as it is
+        """Return the serious and critical findings of axe-core: rule, element, and summary."""
+        self.page.evaluate(axe)  # injected by the driver, so that the page's policy is not changed
         found = self.page.evaluate("axe.run(document, {resultTypes: ['violations']})")
         return [
             f"{one['id']}: {node['target']} {node['failureSummary']}"
@@ -54,25 +54,25 @@ class Opened:
             for node in one["nodes"]
         ]
 
-    def forgive(self, start: str) -> None:
-        """Take back the complaints that begin so, for a test that provokes them; there has to be one."""
-        assert any(complaint.startswith(start) for complaint in self._complaints)
-        self._complaints = [complaint for complaint in self._complaints if not complaint.startswith(start)]
+    def forgive(self, prefix: str) -> None:
+        """Remove the complaints with this prefix, of which there must be one, for a test that causes them."""
+        assert any(complaint.startswith(prefix) for complaint in self._complaints)
+        self._complaints = [complaint for complaint in self._complaints if not complaint.startswith(prefix)]
 
     def close(self) -> list[str]:
-        """Close it; all that it complained about and asked for."""
+        """Close the page, and return its errors, warnings, dialogs, and requests of other files."""
         self._context.close()
         return self._complaints
 
-    def _heard(self, message: Any) -> None:
+    def _on_console(self, message: Any) -> None:
         if message.type in ("error", "warning"):
             self._complaints.append(f"console: {message.text}")
 
-    def _requested(self, request: Any) -> None:
-        own = (
+    def _on_request(self, request: Any) -> None:
+        is_own = (
             request.url.startswith(self._uri)
             if self._uri.startswith("http:")
             else request.url.split("#")[0] == self._uri
         )
-        if not own and not request.url.startswith(("data:", "blob:")):
+        if not is_own and not request.url.startswith(("data:", "blob:")):
             self._complaints.append(f"request: {request.url}")

@@ -1,4 +1,4 @@
-"""Takes the pictures of the replay page that the docs show: `make screenshots`.
+"""Take the screenshots of the replay page for the docs (`make screenshots`).
 
 A shipped scenario, made harder, is run with seeds until one fails and one passes.
 """
@@ -31,7 +31,7 @@ SEEDS = range(2, 12)
 
 
 def main() -> None:
-    """Run, make the pages, and take their pictures."""
+    """Run the scenario, write the replay pages, and take their screenshots."""
     with tempfile.TemporaryDirectory() as folder, browser() as running:
         failed, passed = _runs(Path(folder))
         pages = {"replay-failure": [failed], "replay-against": [failed, passed]}
@@ -44,7 +44,7 @@ def main() -> None:
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """A Chromium to take pictures with."""
+    """Start Chromium."""
     found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if found is None:
         sys.exit("there is no Chromium to take pictures with")
@@ -56,13 +56,13 @@ def browser() -> Iterator[Any]:
 
 
 def save(picture: "Image.Image | bytes", file: Path) -> None:
-    """In 256 colors, which nobody sees and a third of the bytes hold."""
+    """Save a picture with 256 colors, which reduces the size to a third without a visible difference."""
     image = Image.open(BytesIO(picture)) if isinstance(picture, bytes) else picture
     image.quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
 def _runs(folder: Path) -> tuple[Path, Path]:
-    """A log that failed and one that passed."""
+    """Return the logs of a failed and a passed run."""
     text = SCENARIO.read_text()
     for before, after in HARDER.items():
         assert before in text, before
@@ -79,7 +79,7 @@ def _runs(folder: Path) -> tuple[Path, Path]:
 
 
 def _shoot(browser: Any, page: Path, name: str, where: str) -> None:
-    """In light, and of one run in dark, too."""
+    """Take a screenshot with the light theme, and of the failed run also with the dark one."""
     for scheme in ("light", "dark") if name == "replay-failure" else ("light",):
         context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
         shown = context.new_page()

@@ -1,6 +1,6 @@
-"""Takes the pictures of the suite page and of runs that the docs show: `make screenshots`.
+"""Take the screenshots of the report page and of runs for the docs (`make screenshots`).
 
-Some shipped scenarios run in two sessions; in the second one of them is made harder, so that it fails.
+Some shipped scenarios run in two sessions. In the second session, one of them is changed so that it fails.
 """
 
 import shutil
@@ -23,19 +23,19 @@ SCENARIOS = (
     "zones/keepout_lifted",
     "zones/slow_zone_begins",
 )
-PATIENT = "timeout: 150 s"
+TIMEOUT = "timeout: 150 s"
 WIDE, NARROW = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 
 
 def main() -> None:
-    """Run, and take the pictures."""
+    """Run the sessions, and take the screenshots."""
     with tempfile.TemporaryDirectory() as folder, browser() as running:
         home = Path(folder)
         _scenarios(home)
         _run(home, "20260101T080000Z-1a2b")
         harder = home / "scenarios/obstacles/door_closes.scenario.yaml"
-        assert PATIENT in harder.read_text()
-        harder.write_text(harder.read_text().replace(PATIENT, "timeout: 30 s"))
+        assert TIMEOUT in harder.read_text()
+        harder.write_text(harder.read_text().replace(TIMEOUT, "timeout: 30 s"))
         _run(home, "20260102T080000Z-3c4d")
         last = home / "simscen-out/20260102T080000Z-3c4d"
         for name, run in (("patrol", "navigation/patrol"), ("picture-failure", "obstacles/door_closes")):

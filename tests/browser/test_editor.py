@@ -1,4 +1,4 @@
-"""The editor in a browser: mouse and keyboard change the map, and only the values in the file that they are about."""
+"""Tests of the editor in a browser: edits change the map, and only the affected values of the file."""
 
 import re
 import shutil
@@ -14,7 +14,7 @@ from editor_page import TEXT, Edit, changes, drag, pixel, settle, text
 ROOT = Path(__file__).parents[2]
 
 
-def test_typing_moves_the_map_and_shows_problems_where_they_are(edit: Edit, hall: Path) -> None:
+def test_typing_updates_the_map_and_shows_problems_at_their_lines(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     opened.page.fill("#text", TEXT.replace("x: 7.5, y: 2.2", "x: 4.5, y: 3.9"))
     opened.until("editor.problems.length > 0")
@@ -26,7 +26,7 @@ def test_typing_moves_the_map_and_shows_problems_where_they_are(edit: Edit, hall
     opened.until("editor.problems.some((one) => one.code === 'SC012')")
 
 
-def test_saving_writes_the_bytes_of_the_text_and_nothing_before(edit: Edit, hall: Path) -> None:
+def test_file_is_written_only_when_saved_with_the_exact_text(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     drag(opened, (7.5, 2.2), (7.0, 1.2))
     assert hall.read_text() == TEXT
@@ -35,7 +35,7 @@ def test_saving_writes_the_bytes_of_the_text_and_nothing_before(edit: Edit, hall
     assert changes(TEXT, hall.read_text()) == [("7.5", "7.0"), ("2.2", "1.2")]
 
 
-def test_a_file_that_changed_meanwhile_is_not_overwritten_unasked(edit: Edit, hall: Path) -> None:
+def test_file_changed_by_another_program_is_overwritten_only_after_confirmation(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     drag(opened, (7.5, 2.2), (7.0, 1.2))
     hall.write_text("theirs: 1\n")
@@ -49,7 +49,7 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten_unasked(edit: Edit, ha
     opened.forgive("console: Failed to load resource: the server responded with a status of 409")
 
 
-def test_a_form_changes_one_value_and_a_new_key_comes_with_help(edit: Edit, hall: Path) -> None:
+def test_form_changes_one_value_and_shows_help_for_a_new_key(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     opened.page.get_by_role("button", name="anna at").click()
     opened.page.get_by_label("Add a key to pedestrian").select_option(label="speed")
@@ -64,7 +64,7 @@ def test_a_form_changes_one_value_and_a_new_key_comes_with_help(edit: Edit, hall
     assert "Preferred speed" in opened.page.inner_text("#details")
 
 
-def test_adding_and_deleting_with_the_mouse_and_the_keyboard(edit: Edit, hall: Path) -> None:
+def test_objects_are_added_and_deleted_by_mouse_and_keyboard(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     opened.page.select_option("#add", "Goal")
     opened.page.click("#place")
@@ -80,7 +80,7 @@ def test_adding_and_deleting_with_the_mouse_and_the_keyboard(edit: Edit, hall: P
     assert text(opened) == TEXT
 
 
-def test_a_run_shows_its_verdicts_and_the_replay_beside_the_map(edit: Edit, hall: Path) -> None:
+def test_run_shows_its_verdicts_and_replay_next_to_the_map(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     opened.page.click("#run")
     opened.until("document.getElementById('outcome') !== null")
@@ -91,7 +91,7 @@ def test_a_run_shows_its_verdicts_and_the_replay_beside_the_map(edit: Edit, hall
     assert hall.read_text() == TEXT
 
 
-def test_things_of_a_world_in_another_file_are_edited_on_their_own_page(edit: Edit, tmp_path: Path) -> None:
+def test_objects_of_another_world_file_are_edited_on_its_own_page(edit: Edit, tmp_path: Path) -> None:
     (tmp_path / "hall.world.yaml").write_text(
         "simscen: 1\nobstacles: [{name: rack, box: [1, 1, 1], pose: {x: 4, y: 4}}]\n"
     )
@@ -147,7 +147,7 @@ MOVABLE = (
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SHIPPED)
-def test_editing_a_shipped_file_changes_no_byte_that_was_not_edited(edit: Edit, tmp_path: Path, name: str) -> None:
+def test_edit_of_a_shipped_file_changes_only_the_edited_bytes(edit: Edit, tmp_path: Path, name: str) -> None:
     for folder in ("scenarios", "worlds"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     file = tmp_path / name
@@ -176,7 +176,7 @@ def test_editing_a_shipped_file_changes_no_byte_that_was_not_edited(edit: Edit, 
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
-def test_the_modules_that_need_no_page() -> None:
+def test_javascript_modules_of_the_editor_pass_their_tests() -> None:
     command = ["node", "--test", "--test-reporter=tap", str(ROOT / "tests/browser/editor.test.mjs")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stdout

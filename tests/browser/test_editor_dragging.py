@@ -1,4 +1,4 @@
-"""The map of the editor in a browser: mouse and keyboard move things, and change only their values in the text."""
+"""Tests of the map of the editor in a browser: mouse and keyboard move objects and change only their values."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from editor_page import TEXT, Edit, drag, pixel, settle, text
 
 
-def test_dragging_the_robot_changes_its_two_numbers_and_keeps_their_notation(edit: Edit, hall: Path) -> None:
+def test_dragging_the_robot_changes_its_coordinates_and_keeps_their_notation(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     drag(opened, (1, 2), (2.5, 1.5))
     assert text(opened) == TEXT.replace("x: 1.00 m, y: 2,", "x: 2.50 m, y: 1.5,")
@@ -95,7 +95,7 @@ pass: []
         ]
     ),
 )
-def test_everything_that_has_a_place_can_be_dragged(
+def test_all_kinds_of_objects_can_be_dragged(
     edit: Edit, tmp_path: Path, start: tuple[float, float], end: tuple[float, float], before: str, after: str
 ) -> None:
     file = tmp_path / "a.scenario.yaml"
@@ -161,7 +161,7 @@ def test_the_shortest_path_and_the_clearance_follow_while_dragging(edit: Edit, h
     assert text(opened) == TEXT
 
 
-def test_steps_of_the_keys_add_up_however_fast_they_come(edit: Edit, hall: Path) -> None:
+def test_fast_arrow_keys_add_up(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     opened.page.get_by_role("button", name="goal shelf").click()
     for count in range(12):

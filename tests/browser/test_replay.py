@@ -25,11 +25,11 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="session")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Two seeds of a drive."""
+    """Return the logs of two seeds of the run in drive.py."""
     return [drive(tmp_path_factory.mktemp(f"seed-{seed}"), seed) for seed in (1, 2)]
 
 
-def made(page: Path, logs: list[Path]) -> Path:
+def write_page(page: Path, logs: list[Path]) -> Path:
     read = [read_run(log, with_sensors=True) for log in logs]
     write_replay(page, [(log, from_json(log.result)) for log in read])
     return page
@@ -37,12 +37,12 @@ def made(page: Path, logs: list[Path]) -> Path:
 
 @pytest.fixture(scope="session")
 def one(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made(tmp_path_factory.mktemp("one") / "replay.html", logs[:1])
+    return write_page(tmp_path_factory.mktemp("one") / "replay.html", logs[:1])
 
 
 @pytest.fixture(scope="session")
 def two(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made(tmp_path_factory.mktemp("two") / "replay.html", logs)
+    return write_page(tmp_path_factory.mktemp("two") / "replay.html", logs)
 
 
 @pytest.fixture(scope="session")
@@ -73,7 +73,7 @@ COLORS = """([x, y, reach]) => {
 
 
 def colors(opened: Opened, x: float, y: float, reach: float = 0.35) -> int:
-    """How many colors there are on the map around a point."""
+    """Return the number of colors on the map around a point."""
     return int(opened.page.evaluate(COLORS, [x, y, reach]))
 
 
@@ -187,7 +187,7 @@ def test_two_runs_play_with_the_same_clock(open_page: Opener, two: Path, logs: l
     assert opened.grave_findings(axe) == []
 
 
-def test_names_cannot_break_out(open_page: Opener, tmp_path: Path) -> None:
+def test_names_in_a_log_are_escaped(open_page: Opener, tmp_path: Path) -> None:
     log, result = hostile_log()
     page = tmp_path / "replay.html"
     write_replay(page, [(log, result)])
@@ -208,7 +208,7 @@ def test_content_security_policy_allows_only_own_parts(open_page: Opener, one: P
     assert policy.startswith("default-src 'none'; script-src 'sha256-") and "unsafe" not in policy
     blocked = opened.page.evaluate("fetch('data:text/plain,hello').then(() => 'fetched', () => 'refused')")
     assert blocked == "refused"
-    opened.forgive("console: ")  # the refusal is told there
+    opened.forgive("console: ")  # the browser logs the refusal
 
 
 def test_page_opens_within_a_second(open_page: Opener, one: Path, record_property, capsys) -> None:
@@ -231,7 +231,7 @@ def test_javascript_modules_compute_correct_values() -> None:
 
 
 def test_equal_logs_make_equal_pages(one: Path, logs: list[Path], tmp_path: Path) -> None:
-    assert made(tmp_path / "again.html", logs[:1]).read_bytes() == one.read_bytes()
+    assert write_page(tmp_path / "again.html", logs[:1]).read_bytes() == one.read_bytes()
 
 
 def test_log_without_ground_truth_shows_the_estimated_pose(open_page: Opener, tmp_path: Path) -> None:

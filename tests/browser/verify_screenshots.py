@@ -1,4 +1,4 @@
-"""Takes the picture of the page of `simscen new --from-log --verify` that the docs show: `make screenshots`."""
+"""Take the screenshot of the page of `simscen new --from-log --verify` for the docs (`make screenshots`)."""
 
 import sys
 import tempfile
@@ -18,7 +18,7 @@ SCENARIO = ROOT / "scenarios" / "corner_cases" / "goal_blocked_for_good.scenario
 
 
 def main() -> None:
-    """Run a shipped scenario, reconstruct it from its log, run that, and take the picture of the page, in light."""
+    """Run a shipped scenario, reconstruct it from its log, run that, and take the screenshot of the page."""
     with tempfile.TemporaryDirectory(dir=ROOT / "scenarios") as folder, browser() as running:
         log, again, page = (Path(folder) / name for name in ("run.mcap", "again.mcap", "page.html"))
         simulate(prepare(load_scenario(SCENARIO, ROOT)), log=log)

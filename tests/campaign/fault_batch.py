@@ -1,7 +1,7 @@
-"""A batch of runs a tenth of which go wrong: `python tests/campaign/fault_batch.py [RUNS] [SEED]`, or `make campaign`.
+"""Run a batch with a fault in each tenth run: `python tests/campaign/fault_batch.py [RUNS] [SEED]`, or `make campaign`.
 
-Every run must be answered once and as what it is, nothing may be left behind, and the innocent runs must have the bytes
-that they have in a batch without faults. Exit code 1 when any of that does not hold.
+Every run must have exactly one result, of the right kind. No process may be left behind. Runs without a fault must have
+the same logs and results as in a batch without faults. The exit code is 1 if any of this does not hold.
 """
 
 import json
@@ -31,7 +31,7 @@ FAULTS = {
     "exception": "crashed",
     "grandchild": "crashed",
     "daemon": "crashed",
-    "flood": "passed",  # what a run prints is no verdict on the robot
+    "flood": "passed",  # output does not affect the verdict
     "crash-to-prepare": "crashed",
 }
 SCENARIO = """\
@@ -46,44 +46,44 @@ pass: [{{goals_reached: {{}}}}]
 """
 
 
-def write(folder: Path, runs: int, rng: random.Random) -> dict[str, str]:
-    """Scenarios, and for each the fault that it has; "" = none."""
+def write_scenarios(folder: Path, runs: int, rng: random.Random) -> dict[str, str]:
+    """Write the scenarios; return the fault of each, "" for none."""
     folder.mkdir()
     faults: dict[str, str] = {}
     for number in range(runs):
         fault = rng.choice(sorted(FAULTS)) if rng.random() < 0.1 else ""
         when = ".at.0" if fault and "prepare" not in fault and rng.random() < 0.5 else ""
         x = round(rng.uniform(0.8, 1.5), 2)
-        text = SCENARIO.format(seed=number + 1, tag=fault + when or "innocent", x=x, goal=round(x + 0.5, 2))
+        text = SCENARIO.format(seed=number + 1, tag=fault + when or "fault-free", x=x, goal=round(x + 0.5, 2))
         (folder / f"{number:04}.scenario.yaml").write_text(text)
         faults[f"{number:04}"] = fault
     return faults
 
 
-def batch(folder: Path) -> tuple[dict[str, str], Path, float]:
-    """Run all: how each came out, or the kind of its error; the output folder; seconds."""
-    begun = time.monotonic()
+def run_batch(folder: Path) -> tuple[dict[str, str], Path, float]:
+    """Run all scenarios; return the outcome or kind of error of each, the output folder, and the duration in s."""
+    start = time.monotonic()
     command = [sys.executable, "-c", SIMSCEN, "run", str(folder), "--out", str(folder / "out"), "-j", "2"]
     done = subprocess.run([*command, "--wall-limit", "20"], capture_output=True, text=True, check=False)
-    seconds = time.monotonic() - begun
+    seconds = time.monotonic() - start
     runs = json.loads((folder / "out/results.json").read_text())["runs"]
     cases = [case for suite in JUnitXml.fromfile(str(folder / "out/junit.xml")) for case in suite]
-    came_out = {run["scenario"]: run["error"]["kind"] if run["error"] else run["outcome"] for run in runs}
-    assert len(runs) == len(cases) == len(came_out), "a run was answered twice, or in one report only"
-    assert done.returncode == (3 if set(came_out.values()) - {"passed", "failed"} else 0), done.stderr
-    return came_out, folder / "out", seconds
+    outcomes = {run["scenario"]: run["error"]["kind"] if run["error"] else run["outcome"] for run in runs}
+    assert len(runs) == len(cases) == len(outcomes), "a run has two results, or is in one report only"
+    assert done.returncode == (3 if set(outcomes.values()) - {"passed", "failed"} else 0), done.stderr
+    return outcomes, folder / "out", seconds
 
 
 def files(out: Path) -> dict[str, tuple[bytes, bytes]]:
-    """Log and result of each run that has them, by scenario."""
+    """Return the log and result of each run with a log, by scenario."""
     return {
         log.parent.parent.name: (log.read_bytes(), (log.parent / "result.json").read_bytes())
         for log in out.rglob("run.mcap")
     }
 
 
-def left_behind() -> list[str]:
-    """Processes of this campaign that still run."""
+def remaining_processes() -> list[str]:
+    """Return the command lines of processes of this campaign that still run."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -96,32 +96,32 @@ def left_behind() -> list[str]:
 
 
 def main() -> int:
-    """Run the batch, then its innocent part alone, compare, and print the figures."""
+    """Run the batch, then only its runs without a fault, compare both, and print the numbers."""
     runs, seed = (int(word) for word in (*sys.argv[1:], *("500", "1")[len(sys.argv) - 1 :]))
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
-        faults = write(Path(name) / "batch", runs, rng)
-        came_out, out, seconds = batch(Path(name) / "batch")
+        faults = write_scenarios(Path(name) / "batch", runs, rng)
+        outcomes, out, seconds = run_batch(Path(name) / "batch")
         clean = Path(name) / "clean"
         clean.mkdir()
-        innocent = sorted(scenario for scenario, fault in faults.items() if not fault)
-        for scenario in innocent:
+        fault_free = sorted(scenario for scenario, fault in faults.items() if not fault)
+        for scenario in fault_free:
             (clean / f"{scenario}.scenario.yaml").write_bytes((out.parent / f"{scenario}.scenario.yaml").read_bytes())
-        alone, clean_out, _ = batch(clean)
-        dirty, reference = files(out), files(clean_out)
+        clean_outcomes, clean_out, _ = run_batch(clean)
+        with_faults, reference = files(out), files(clean_out)
     expected = {scenario: FAULTS.get(fault, "passed") for scenario, fault in faults.items()}
-    wrong = {scenario: (faults[scenario], found) for scenario, found in came_out.items() if found != expected[scenario]}
-    other = [scenario for scenario in innocent if dirty.get(scenario) != reference.get(scenario)]
-    missing, orphans = sorted(faults.keys() - came_out.keys()), left_behind()
-    passes = [scenario for scenario, found in came_out.items() if found == "passed" and expected[scenario] != "passed"]
-    print(f"{len(came_out)} of {runs} runs answered once, in {seconds:.0f} s at -j2 (seed {seed})")
+    wrong = {scenario: (faults[scenario], found) for scenario, found in outcomes.items() if found != expected[scenario]}
+    differing = [scenario for scenario in fault_free if with_faults.get(scenario) != reference.get(scenario)]
+    missing, orphans = sorted(faults.keys() - outcomes.keys()), remaining_processes()
+    passes = [scenario for scenario, found in outcomes.items() if found == "passed" and expected[scenario] != "passed"]
+    print(f"{len(outcomes)} of {runs} runs have one result, in {seconds:.0f} s at -j2 (seed {seed})")
     print(
         "faults:", ", ".join(f"{count} {fault}" for fault, count in sorted(Counter(faults.values()).items()) if fault)
     )
-    print(f"wrong passes: {len(passes)}, other answers than due: {wrong or 0}, missing: {missing or 0}")
-    print(f"innocent: {len(innocent)}, of which other bytes than alone: {other or 0}; passed alone: {len(alone)}")
+    print(f"wrong passes: {len(passes)}, unexpected results: {wrong or 0}, missing: {missing or 0}")
+    print(f"fault-free: {len(fault_free)}, not as in clean batch: {differing or 0}; clean batch: {len(clean_outcomes)}")
     print(f"processes left behind: {orphans or 0}")
-    return int(bool(wrong or other or missing or orphans or passes or set(alone.values()) != {"passed"}))
+    return int(bool(wrong or differing or missing or orphans or passes or set(clean_outcomes.values()) != {"passed"}))
 
 
 if __name__ == "__main__":

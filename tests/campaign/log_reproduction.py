@@ -1,4 +1,4 @@
-"""Reproduction of failed runs: reconstruct scenarios from their logs alone, run those, and see whether they fail again.
+"""Reproduction of failed runs: reconstruct scenarios from only their logs, run these, and compare the failures.
 
 `python tests/campaign/log_reproduction.py [RUNS] [-k TEXT]` prints a table. RUNS is an output folder of `simscen run`;
 without it, the broken scenarios of tests/scenarios/can_fail are run first. Each run of a reconstructed scenario is
@@ -43,14 +43,14 @@ Loader.yaml_implicit_resolvers = {
 
 
 def write_broken_scenarios(root: Path) -> None:
-    """Write the scenarios of can_fail in which something else than a criterion is changed."""
+    """Write the scenarios of can_fail in which something other than a criterion is changed."""
     shutil.copytree(ROOT / "worlds", root / "worlds")
     for file in sorted(CAN_FAIL.glob("*.yaml")):
         if file.stem == "multi_robot":
             continue
-        for name, ways in yaml.safe_load(file.read_text()).items():
-            for number, way in enumerate(ways):
-                for criterion, values in way.items():
+        for name, all_changes in yaml.safe_load(file.read_text()).items():
+            for number, changes_by_criterion in enumerate(all_changes):
+                for criterion, values in changes_by_criterion.items():
                     if values and not any(str(path).startswith("pass") for path in values):
                         target = root / "scenarios" / file.stem / f"{name}-{number}-{criterion}.scenario.yaml"
                         target.parent.mkdir(parents=True, exist_ok=True)
@@ -61,8 +61,8 @@ def write_broken_scenarios(root: Path) -> None:
 def remove_refused(root: Path) -> None:
     """Remove the scenarios that are refused before they run, such as those with too short a timeout."""
     command = [sys.executable, "-m", "simscen", "validate", str(root / "scenarios"), "--root", str(root)]
-    told = subprocess.run([*command, "--format", "json"], check=False, cwd=root, capture_output=True, text=True)
-    for problem in json.loads(told.stdout)["problems"]:
+    validated = subprocess.run([*command, "--format", "json"], check=False, cwd=root, capture_output=True, text=True)
+    for problem in json.loads(validated.stdout)["problems"]:
         if problem["severity"] == "error":
             (root / problem["path"]).unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""Round trip of shipped scenarios: run, reconstruct from the log alone, and compare with what was ordered.
+"""Round trip of shipped scenarios: run, reconstruct from only the log, and compare both scenarios.
 
 `python tests/campaign/log_round_trip.py [RUNS] [-k TEXT]` prints a table. RUNS is the output folder of
 `simscen run scenarios`; without it, the scenarios are run first. Exit code 1 if fewer scenarios agree than required.
@@ -39,7 +39,7 @@ SAME_KINDS = {
 
 @dataclass
 class Row:
-    """What came of one scenario; `objects` are RMSE in m, error of the time in s, and share of the time covered.
+    """Comparison for one scenario; `objects` are RMSE in m, error of the time in s, and share of the time covered.
 
     `pedestrians` are the objects that are written as pedestrians.
     """
@@ -56,12 +56,12 @@ class Row:
 
     @property
     def poses_agree(self) -> bool:
-        """Whether the start and all goals are where they were ordered."""
+        """Whether the start and all goals have the same poses."""
         return not self.problem and max(self.start, self.goals) <= MAX_POSE_ERROR_M
 
     @property
     def objects_agree(self) -> bool:
-        """Whether all objects that the lidar saw moving were found, where and when they were."""
+        """Whether all moving objects that the lidar saw were found, at the right positions and times."""
         return not self.problem and all(
             rmse <= MAX_OBJECT_RMSE_M and late <= MAX_TIME_ERROR_S and covered >= MIN_COVERED
             for rmse, late, covered in self.objects.values()
@@ -69,18 +69,18 @@ class Row:
 
     @property
     def missing(self) -> set[tuple[str, str]]:
-        """Ordered faults that were not found."""
+        """Faults of the scenario that were not found."""
         return {kind for kind in self.ordered if not ({kind, *SAME_KINDS.get(kind, ())} & self.found)}
 
     @property
     def extra(self) -> set[tuple[str, str]]:
-        """Faults that were found but not ordered."""
+        """Found faults that the scenario does not have."""
         allowed = self.ordered.union(*(SAME_KINDS.get(kind, set()) for kind in self.ordered))
         return self.found - allowed
 
     @property
     def faults_agree(self) -> bool:
-        """Whether the faults that were found are those that were ordered."""
+        """Whether the found faults are those of the scenario."""
         return not self.problem and not self.missing and not self.extra
 
 
@@ -114,13 +114,13 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
 
 def _compare_objects(row: Row, log: Log, made: Reconstruction) -> None:
     moved = {name: track for name, track in log.trace.objects.items() if _moved(track)}
-    moving = [thing for thing in made.estimated.objects if thing.is_moving]
+    moving = [found for found in made.estimated.objects if found.is_moving]
     for name, track in sorted(moved.items()):
         seen = _times_seen(track, log, made)
         if len(seen) * 0.1 >= MIN_SEEN_S and _moved_while(track, log, seen):
-            fits = [_fit(thing, track, log, seen) for thing in moving]
+            fits = [_fit(found, track, log, seen) for found in moving]
             row.objects[name] = min(fits, key=_rank, default=(float("inf"), float("inf"), 0.0))
-    row.pedestrians = sum(thing.pedestrian is not None for thing in moving)
+    row.pedestrians = sum(found.pedestrian is not None for found in moving)
     row.spurious = max(0, len(moving) - len(moved))
 
 
@@ -154,14 +154,14 @@ def _times_seen(track: Samples, log: Log, made: Reconstruction) -> np.ndarray:
     return times[(distance < free) & (distance < 8.0)]
 
 
-def _fit(thing: FoundObject, track: Samples, log: Log, seen: np.ndarray) -> tuple[float, float, float]:
+def _fit(found: FoundObject, track: Samples, log: Log, seen: np.ndarray) -> tuple[float, float, float]:
     """Return the RMSE in m, the best time shift in s, and the covered share of the times seen.
 
     Of a pedestrian, the simulated motion counts, and not the track.
     """
-    frames = np.array([frame[:3] for frame in thing.keyframes])
-    if thing.pedestrian is not None:
-        frames = np.column_stack((thing.pedestrian.times, thing.pedestrian.positions))
+    frames = np.array([frame[:3] for frame in found.keyframes])
+    if found.pedestrian is not None:
+        frames = np.column_stack((found.pedestrian.times, found.pedestrian.positions))
     inside = seen[(seen >= frames[0, 0]) & (seen <= frames[-1, 0])]
     if len(inside) < 5:
         return float("inf"), float("inf"), 0.0

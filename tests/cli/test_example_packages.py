@@ -16,11 +16,11 @@ NAMES = ("theta_star", "vfh_plus")
 
 
 @pytest.fixture
-def call(tmp_path: Path, lay_out):
+def call(tmp_path: Path, install_folder):
     """Calls Python where both packages are installed."""
     site = tmp_path / "site"
     for name in NAMES:
-        lay_out(PLUGINS / name, site)
+        install_folder(PLUGINS / name, site)
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])}
 
     def run(*arguments: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
@@ -118,8 +118,8 @@ class Planner:
 
 
 @pytest.mark.slow
-def test_broken_planner_is_an_error_of_its_run_only(call, lay, tmp_path: Path) -> None:
-    lay(tmp_path / "site", "nan-planner", "0.9", {"planner": {"nan": "nan_planner:Nan"}}, nan_planner=BROKEN)
+def test_broken_planner_is_an_error_of_its_run_only(call, install, tmp_path: Path) -> None:
+    install(tmp_path / "site", "nan-planner", "0.9", {"planner": {"nan": "nan_planner:Nan"}}, nan_planner=BROKEN)
     (tmp_path / "nan.stack.yaml").write_text("simscen: 1\nstack: {planner: {type: nan}}\n")
     stacks = ("--stack", f"nan={tmp_path}/nan.stack.yaml", "--stack", "reference=reference")
     done = call(

@@ -1,4 +1,4 @@
-"""The front door: `simscen validate` and `simscen run` as a user calls them, in a folder with small valid files."""
+"""Fixtures that call `simscen` as a user does, in a folder with small valid files."""
 
 import os
 import re
@@ -42,7 +42,7 @@ _PLACE = re.compile(r"^(?P<path>\S.*?)(?P<place>(:\d+:\d+)?): ((error|warning)\[
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
+    """Exit code and output of a command."""
 
     code: int
     out: str
@@ -61,7 +61,7 @@ def texts() -> dict[str, str]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str]) -> Path:
-    """The working folder: a world, a robot and a scenario, all of them valid."""
+    """Change into a folder with a valid world, robot, and scenario; return the folder."""
     home = tmp_path / "home"
     home.mkdir()
     for name, text in texts.items():
@@ -72,7 +72,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str
 
 @pytest.fixture
 def simscen(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Simscen:
-    """Calls the command line without a new process."""
+    """Return a function that runs the command line in this process."""
 
     def call(*arguments: object) -> Ended:
         monkeypatch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
@@ -89,23 +89,23 @@ def simscen(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest
 
 @pytest.fixture
 def refused(simscen: Simscen) -> Refused:
-    """What `validate` and `run` both say about something that cannot be used: the same, and nothing is run."""
+    """Return a function that checks that `validate` and `run` report the same errors, and returns them as text."""
 
     def call(*arguments: object) -> str:
-        told, ran = simscen("validate", *arguments), simscen("run", *arguments, "--out", "out")
-        assert (told.code, ran.code) == (2, 2), told.out + ran.out + told.err + ran.err
-        problems = re.sub(r"\d+ problems? in \d+ of \d+ files?\n$", "", told.out) + told.err
+        validated, ran = simscen("validate", *arguments), simscen("run", *arguments, "--out", "out")
+        assert (validated.code, ran.code) == (2, 2), (validated, ran)
+        problems = re.sub(r"\d+ problems? in \d+ of \d+ files?\n$", "", validated.out) + validated.err
         assert ran.err == problems
         assert (ran.out, Path("out").exists()) == ("", False)
         assert "Traceback" not in problems
-        _every_problem_has_a_place(problems)
+        _check_paths_of_problems(problems)
         return problems
 
     return call
 
 
-def _every_problem_has_a_place(problems: str) -> None:
-    """A path that opens from the working folder, or that was given and is not there."""
+def _check_paths_of_problems(problems: str) -> None:
+    """Check that each problem starts with a path, which exists if the problem has a line and column."""
     heads = [line for line in problems.splitlines() if not line.startswith("    ") and line]
     for head in heads:
         match = _PLACE.match(head)
@@ -115,7 +115,7 @@ def _every_problem_has_a_place(problems: str) -> None:
 
 @pytest.fixture
 def with_scenario(folder: Path, refused: Refused) -> Refused:
-    """Writes `bad.scenario.yaml` and calls `refused` with it; `replace` swaps parts of the valid scenario."""
+    """Return a function that writes `bad.scenario.yaml` and calls `refused`; `replace` changes the valid scenario."""
 
     def call(text: str | bytes | None = None, *arguments: object, replace: dict[str, str] | None = None) -> str:
         if text is None:
@@ -131,7 +131,7 @@ def with_scenario(folder: Path, refused: Refused) -> Refused:
 
 @pytest.fixture
 def with_world(folder: Path, with_scenario: Refused) -> Refused:
-    """Writes the world file `name`, and calls `refused` with a scenario that uses it; the robot stands at (1, 1)."""
+    """Return a function that writes a world file, and calls `refused` for a scenario with it and a robot at (1, 1)."""
 
     def call(content: str | bytes, name: str = "bad.world.yaml") -> str:
         (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
@@ -153,7 +153,7 @@ finally:
 
 @pytest.fixture
 def peak_memory(folder: Path) -> Callable[..., tuple[int, float, str]]:
-    """Runs a command in a process of its own; returns its exit code, peak memory in MiB, and output."""
+    """Return a function that runs a command in a new process: exit code, peak memory in MiB, and output."""
 
     def call(*arguments: object) -> tuple[int, float, str]:
         command = [sys.executable, "-c", MEASURED, *map(str, arguments)]
@@ -165,7 +165,7 @@ def peak_memory(folder: Path) -> Callable[..., tuple[int, float, str]]:
 
 
 def cases_of(nodeid: str) -> set[int]:
-    """The numbers (CASES.md) that a test is about, by its name and its parameters: `test_59_…`, `[59 a daemon]`."""
+    """Return the numbers of the cases (CASES.md) in a test's name and parameter ids: `test_59_…`, `[59 a daemon]`."""
     name = nodeid.rpartition("::")[2]
     head = re.match(r"test_((?:\d+_(?:and_)?)+)", name)
     parameters = re.findall(r"[\[-](\d+)(?= |\])", name)
@@ -173,7 +173,7 @@ def cases_of(nodeid: str) -> set[int]:
 
 
 class Tally:
-    """How each case came out, to be printed at the end."""
+    """Counts the passed, failed, and skipped cases, and prints them at the end."""
 
     def __init__(self) -> None:
         self.held: set[int] = set()
@@ -181,7 +181,7 @@ class Tally:
         self.skipped: dict[int, str] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Count a test, wherever it ran."""
+        """Count a test, in whichever worker it ran."""
         if "conformance/" not in report.nodeid:
             return
         for case in cases_of(report.nodeid):
@@ -193,16 +193,16 @@ class Tally:
                 self.held.add(case)
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Say how many cases held."""
+        """Print the number of cases that passed."""
         held, skipped = self.held - self.broken, sorted(self.skipped.keys() - self.held - self.broken)
         if held or skipped or self.broken:
             why = "; ".join(f"{case}: {self.skipped[case].removeprefix('Skipped: ')}" for case in skipped)
             broken = f", broken: {', '.join(map(str, sorted(self.broken)))}" if self.broken else ""
-            told = f"conformance: {len(held)} cases held, {len(skipped)} skipped{why and f' ({why})'}{broken}"
-            terminalreporter.write_line(told)
+            line = f"conformance: {len(held)} cases held, {len(skipped)} skipped{why and f' ({why})'}{broken}"
+            terminalreporter.write_line(line)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Count, but only where the results come together."""
+    """Count the cases, except in the workers of pytest-xdist."""
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Tally())

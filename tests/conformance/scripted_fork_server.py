@@ -1,6 +1,6 @@
-"""A fork server whose runs do what the scenario's first tag says, before they begin or mid-run.
+"""A fork server that injects the fault named by the first tag of a scenario, before or during the run.
 
-`segfault` strikes before the run, `segfault.at.5` from inside the lockstep when five simulated seconds have gone by.
+`segfault` crashes before the run, `segfault.at.5` in the lockstep loop after 5 s of simulated time.
 """
 
 import contextlib
@@ -18,31 +18,31 @@ import pybullet
 from simscen.cli.session import fork_server_main
 from simscen.stack.localizers import sensor_models
 
-FLOOD = 200  # MiB
-perform = fork_server_main._execute
-prepared = fork_server_main._SCENARIOS.get_or_prepare
+FLOOD_MIB = 200
+execute = fork_server_main._execute
+prepare = fork_server_main._SCENARIOS.get_or_prepare
 
 
 def spin():
-    """A loop in C that holds Python's lock and never looks for signals. It hardly uses the processor."""
+    """Loop in C forever, holding the GIL and not handling signals, with little CPU load."""
     sum(map(ctypes.PyDLL(None).usleep, itertools.repeat(10_000)))
 
 
-def swell():
-    """Memory as an engine in C++ takes it: until malloc gives no more, and then as if it had."""
+def leak():
+    """Allocate memory until malloc fails, then abort, as an engine in C++ does."""
     while ctypes.CDLL(None).malloc(ctypes.c_size_t(1 << 28)):
         pass
     ctypes.CDLL(None).abort()
 
 
-def flood():
-    os.write(1, b"the beginning\n")
-    for _ in range(FLOOD):
+def print_flood():
+    os.write(1, b"start of the output\n")
+    for _ in range(FLOOD_MIB):
         os.write(1, b"x" * (1 << 20))
 
 
 def fork_a_daemon():
-    """A process that left group, session and parent behind."""
+    """Start a process that is in another process group and session, and has no living parent."""
     if os.fork() == 0:
         os.setsid()
         if os.fork() == 0:
@@ -52,18 +52,18 @@ def fork_a_daemon():
     time.sleep(0.1)
 
 
-def be_deaf():
+def ignore_sigterm():
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     while True:
         time.sleep(1)
 
 
-def lose_the_robot():
-    """The pose that an engine gives after dividing by zero."""
+def return_nan_poses():
+    """Make the engine return a pose of NaN."""
     pybullet.getBasePositionAndOrientation = lambda *_, **__: ((float("nan"),) * 3, (0.0, 0.0, 0.0, 1.0))
 
 
-def lose_all_weight():
+def make_weights_zero():
     sensor_models.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), -np.inf)
 
 
@@ -71,12 +71,12 @@ def make_weights_nan():
     sensor_models.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), np.nan)
 
 
-def chatter():
+def print_hostile_text():
     os.write(2, b"::set-output name=x::y\n##[error]boo\n]]>\x1b[31m</system-err><script>\xff\n")
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def stray_bytes():
+def write_stray_bytes():
     for pipe in range(3, 256):
         with contextlib.suppress(OSError):
             os.write(pipe, b"\xff[[[ stray {\n" + b"[" * 100_000 + b'\n[1]\n{"end": 1}\n')
@@ -84,59 +84,59 @@ def stray_bytes():
 
 FAULTS = {
     "environment": lambda: print(dict(os.environ)),
-    "chatter": chatter,
+    "chatter": print_hostile_text,
     "crash": lambda: ctypes.string_at(0),
     "segfault": lambda: ctypes.string_at(0),
     "sigkill": lambda: os.kill(os.getpid(), signal.SIGKILL),
     "exit-0": lambda: os._exit(0),
     "sys-exit": lambda: sys.exit(0),
     "spin": spin,
-    "deaf": be_deaf,
+    "deaf": ignore_sigterm,
     "hang": lambda: time.sleep(600),
     "memory": lambda: [bytes(1 << 28) for _ in range(1 << 10)],
-    "swell": swell,
+    "swell": leak,
     "grandchild": lambda: subprocess.Popen(["sleep", "61.5"]),
     "daemon": fork_a_daemon,
-    "flood": flood,
+    "flood": print_flood,
     "exception": lambda: 1 / 0,
-    "nan": lose_the_robot,
-    "weightless": lose_all_weight,
+    "nan": return_nan_poses,
+    "weightless": make_weights_zero,
     "nan-weights": make_weights_nan,
-    "stray-bytes": stray_bytes,
+    "stray-bytes": write_stray_bytes,
     "kill-preparer": lambda: os.kill(os.getppid(), signal.SIGKILL),
     "stop-preparer": lambda: os.kill(os.getppid(), signal.SIGSTOP),
 }
 
 
-def misbehave(job, tell):
+def execute_with_fault(job, report_time):
     fault, _, at = next(iter(job.scenario.spec.tags), "").partition(".at.")
     if fault not in FAULTS:
-        return perform(job, tell)
+        return execute(job, report_time)
     if not at:
         FAULTS[fault]()
-        return perform(job, tell)
-    left = [FAULTS[fault]]
+        return execute(job, report_time)
+    pending = [FAULTS[fault]]
 
-    def tell_and_fail(seconds):
-        tell(seconds)
-        if seconds >= float(at) and left:
-            left.pop()()
+    def report_time_and_fail(seconds):
+        report_time(seconds)
+        if seconds >= float(at) and pending:
+            pending.pop()()
 
-    return perform(job, tell_and_fail)
+    return execute(job, report_time_and_fail)
 
 
-def slow_to_prepare(scenario):
+def prepare_with_fault(scenario):
     match next(iter(scenario.spec.tags), ""):
         case "slow-to-prepare":
             time.sleep(60)
         case "crash-to-prepare":
             ctypes.string_at(0)
         case "swell-to-prepare":
-            swell()
-    return prepared(scenario)
+            leak()
+    return prepare(scenario)
 
 
 if __name__ == "__main__":
-    fork_server_main._execute = misbehave
-    fork_server_main._SCENARIOS.get_or_prepare = slow_to_prepare
+    fork_server_main._execute = execute_with_fault
+    fork_server_main._SCENARIOS.get_or_prepare = prepare_with_fault
     fork_server_main.main()

@@ -34,7 +34,7 @@ BOX = '<box size="0.3 0.2 0.3"/>'
 
 @pytest.fixture
 def with_urdf(folder: Path, with_scenario):
-    """`refused` for a scenario whose robot has such a URDF."""
+    """Return `refused` for a scenario with a robot that has the given URDF."""
 
     def call(urdf: str | bytes) -> str:
         (folder / "cube.urdf").write_bytes(urdf.encode() if isinstance(urdf, str) else urdf)
@@ -51,11 +51,11 @@ def test_base_urdf_is_valid(simscen, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "told"),
+    ("written", "message"),
     [
         pytest.param("../../etc/passwd", "outside the scenario root", id="31 to etc"),
-        pytest.param("../secret.world.yaml", "outside the scenario root", id="31 to a file that is there"),
-        pytest.param("../nothing.world.yaml", "outside the scenario root", id="31 to a file that is not there"),
+        pytest.param("../secret.world.yaml", "outside the scenario root", id="31 to an existing file"),
+        pytest.param("../nothing.world.yaml", "outside the scenario root", id="31 to a missing file"),
         pytest.param("/etc/passwd", "is an absolute path", id="32"),
         pytest.param("~/x.yaml", "is an absolute path", id="32 home"),
         pytest.param("file:///etc/passwd", "is a URL", id="32 URL"),
@@ -69,18 +69,18 @@ def test_base_urdf_is_valid(simscen, folder: Path) -> None:
         pytest.param(".", "not a regular file", id="a folder"),
     ],
 )
-@pytest.mark.parametrize("named", ["world", "robot"])
-def test_unusable_path_is_an_error(with_scenario, folder: Path, named: str, written: str, told: str) -> None:
+@pytest.mark.parametrize("referrer", ["world", "robot"])
+def test_unusable_path_is_an_error(with_scenario, folder: Path, referrer: str, written: str, message: str) -> None:
     (folder / "../secret.world.yaml").write_text("password: 1234\n")
     (folder / "away.yaml").symlink_to("../secret.world.yaml")
     (folder / "away").symlink_to("..")
     (folder / "loop.yaml").symlink_to("loop.yaml")
-    if "/" not in written and ".yaml" not in written and named == "robot":
+    if "/" not in written and ".yaml" not in written and referrer == "robot":
         written = f"./{written}"
-    old, place = {"world": ("room.world.yaml", "3:8"), "robot": ("cube.robot.yaml", "4:16")}[named]
+    old, place = {"world": ("room.world.yaml", "3:8"), "robot": ("cube.robot.yaml", "4:16")}[referrer]
     problems = with_scenario(replace={old: written})
     assert problems.startswith(f"bad.scenario.yaml:{place}: error[SC0")
-    assert told in problems.splitlines()[0]
+    assert message in problems.splitlines()[0]
     assert "1234" not in problems
     assert "root:" not in problems
 
@@ -106,15 +106,15 @@ def test_31_other_paths_outside_the_root_are_errors(with_scenario, folder: Path,
 def test_33_scenario_and_defaults_cannot_be_links_outside_the_root(with_scenario, refused, folder: Path) -> None:
     (folder / "../secret.yaml").write_text("password: 1234\n")
     (folder / "link.scenario.yaml").symlink_to("../secret.yaml")
-    told = refused("link.scenario.yaml")
-    assert "link.scenario.yaml: error[SC020] the file is outside the scenario root" in told
+    message = refused("link.scenario.yaml")
+    assert "link.scenario.yaml: error[SC020] the file is outside the scenario root" in message
     (folder / "defaults.yaml").symlink_to("../secret.yaml")
-    told += with_scenario(replace={})
-    assert "defaults.yaml: error[SC020] the file is outside the scenario root" in told
-    assert "1234" not in told
+    message += with_scenario(replace={})
+    assert "defaults.yaml: error[SC020] the file is outside the scenario root" in message
+    assert "1234" not in message
 
 
-def test_35_files_that_extend_each_other(refused, folder: Path) -> None:
+def test_35_circular_extends_is_an_error(refused, folder: Path) -> None:
     for name, base in (("one", "two"), ("two", "three"), ("three", "one")):
         (folder / f"{name}.scenario.yaml").write_text(f"simscen: 1\nextends: {base}.scenario.yaml\n")
     chain = "one.scenario.yaml → two.scenario.yaml → three.scenario.yaml → one.scenario.yaml"
@@ -122,12 +122,12 @@ def test_35_files_that_extend_each_other(refused, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["x" * 300 + ".scenario.yaml", "x" * 5000])
-def test_36_an_argument_longer_than_names_can_be(refused, name: str) -> None:
+def test_36_too_long_argument_is_an_error(refused, name: str) -> None:
     assert "the name is too long" in refused(name)
 
 
 @pytest.mark.parametrize(
-    ("mesh", "told"),
+    ("mesh", "message"),
     [
         pytest.param("gone.stl", "no such file or directory", id="37"),
         pytest.param("../secret.stl", "outside the scenario root", id="38 up"),
@@ -142,7 +142,7 @@ def test_36_an_argument_longer_than_names_can_be(refused, name: str) -> None:
         pytest.param("text.obj", "not a readable OBJ file", id="41 not a mesh"),
     ],
 )
-def test_unusable_mesh_of_a_urdf_is_an_error(with_urdf, folder: Path, mesh: str, told: str) -> None:
+def test_unusable_mesh_of_a_urdf_is_an_error(with_urdf, folder: Path, mesh: str, message: str) -> None:
     triangle = struct.pack("<12fH", *[0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], 0)
     (folder / "lying.stl").write_bytes(bytes(80) + struct.pack("<I", 4_000_000_000) + triangle)
     (folder / "nan.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[float("nan")] * 12, 0))
@@ -155,10 +155,10 @@ def test_unusable_mesh_of_a_urdf_is_an_error(with_urdf, folder: Path, mesh: str,
     head = with_urdf(URDF.replace(BOX, f'<mesh filename="{mesh}"/>')).splitlines()[0]
     assert head.startswith("cube.urdf:5:17: error[SC400]")
     assert mesh in head
-    assert told in head
+    assert message in head
 
 
-def test_39_a_urdf_that_is_a_folder(with_scenario, folder: Path) -> None:
+def test_39_urdf_must_be_a_regular_file(with_scenario, folder: Path) -> None:
     (folder / "cube.urdf").mkdir()
     (folder / "cube.robot.yaml").write_text(URDF_ROBOT)
     assert "cube.robot.yaml:3:7: error[SC001] not a regular file: `cube.urdf`" in with_scenario(replace={})
@@ -168,8 +168,8 @@ def test_dragging_robot_in_another_folder_is_reported_with_a_valid_path(with_sce
     (folder / "robots").mkdir()
     text = (folder / "cube.robot.yaml").read_text()
     (folder / "robots/cube.robot.yaml").write_text(text.replace("z: 4 cm", "z: 0"))
-    told = with_scenario(replace={"cube.robot.yaml": "robots/cube.robot.yaml"})
-    assert told.startswith("robots/cube.robot.yaml: error[SC401] a part of the body of 'cube' reaches the ground")
+    message = with_scenario(replace={"cube.robot.yaml": "robots/cube.robot.yaml"})
+    assert message.startswith("robots/cube.robot.yaml: error[SC401] a part of the body of 'cube' reaches the ground")
 
 
 def linked(count: int) -> str:
@@ -178,7 +178,7 @@ def linked(count: int) -> str:
 
 
 @pytest.mark.parametrize(
-    ("urdf", "place", "told"),
+    ("urdf", "place", "message"),
     [
         pytest.param(
             URDF.replace("<robot", '<!DOCTYPE r [<!ENTITY e SYSTEM "/etc/passwd">]>\n<robot', 1), "2:1",
@@ -193,10 +193,10 @@ def linked(count: int) -> str:
         pytest.param(URDF.replace('mass value="5"', 'mass value="nan"'), "7:15", "finite number", id="50 nan"),
     ],
 )  # fmt: skip
-def test_unusable_urdf_is_an_error(with_urdf, urdf: str, place: str, told: str) -> None:
+def test_unusable_urdf_is_an_error(with_urdf, urdf: str, place: str, message: str) -> None:
     head = with_urdf(urdf).splitlines()[0]
     assert head.startswith(f"cube.urdf:{place}")
-    assert told in head
+    assert message in head
     assert "root:" not in head
 
 
@@ -222,5 +222,5 @@ def test_problem_in_a_world_path_folder_has_a_valid_path(folder: Path, refused) 
         ("cube.robot.yaml", "bad.robot.yaml", "cube.urdf"),
     ):
         (folder / "bad.scenario.yaml").write_text(text.replace(old, new))
-        told = refused("bad.scenario.yaml", "--world-path", away)
-        assert told.startswith(f"../away/{file}:")
+        message = refused("bad.scenario.yaml", "--world-path", away)
+        assert message.startswith(f"../away/{file}:")

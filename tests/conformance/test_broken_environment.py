@@ -29,10 +29,10 @@ start()
 
 
 def shell(script: str, folder: Path, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """What a shell makes of `script`; $simscen is the command."""
-    surroundings = {**os.environ, "simscen": SIMSCEN, **environment}
+    """Run `script` in a shell; $simscen is the path of the command."""
+    environ = {**os.environ, "simscen": SIMSCEN, **environment}
     return subprocess.run(
-        ["sh", "-c", script], cwd=folder, capture_output=True, text=True, timeout=60, check=False, env=surroundings
+        ["sh", "-c", script], cwd=folder, capture_output=True, text=True, timeout=60, check=False, env=environ
     )
 
 
@@ -47,7 +47,7 @@ def test_91_closed_file_descriptor_has_no_effect_on_runs(folder: Path, closed: s
     assert (done.returncode, done.stderr) == (0, "")
     assert outcomes(folder / "out") == ["passed"]
     journal = (folder / "out/events.jsonl").read_text().splitlines()
-    assert all(json.loads(line) for line in journal), "nothing else got its descriptor"
+    assert all(json.loads(line) for line in journal), "a report was written to the closed descriptor"
 
 
 @pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema"])
@@ -121,13 +121,13 @@ def test_95_log_without_ground_truth_is_an_error(simscen, folder: Path, command:
 @pytest.mark.parametrize("command", ["judge", "plot", "log recover"])
 @pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
 def test_96_log_must_be_a_regular_file(simscen, folder: Path, command: str, kind: str) -> None:
-    odd = folder / "run.mcap"
+    special_file = folder / "run.mcap"
     if kind == "fifo":
-        os.mkfifo(odd)
+        os.mkfifo(special_file)
     elif kind == "device":
-        odd.symlink_to("/dev/zero")
+        special_file.symlink_to("/dev/zero")
     else:
-        odd.mkdir()
+        special_file.mkdir()
     ended = simscen(*command.split(), "run.mcap")
     if (command, kind) == ("judge", "folder"):  # which is searched
         assert (ended.code, "no logs found" in ended.err) == (5, True)
@@ -136,7 +136,7 @@ def test_96_log_must_be_a_regular_file(simscen, folder: Path, command: str, kind
     assert "error[SC800]" in ended.err
 
 
-def test_97_the_command_that_repeats_a_run_is_quoted_for_a_shell(simscen, folder: Path) -> None:
+def test_97_command_to_repeat_a_run_is_quoted_for_a_shell(simscen, folder: Path) -> None:
     name = "a;touch marker;$(touch marker) b.scenario.yaml"
     (folder / "a.scenario.yaml").rename(folder / name)
     assert simscen("run", name, "--out", "out").code == 0

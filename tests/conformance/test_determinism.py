@@ -24,7 +24,7 @@ stack: {localizer: {type: scan_matching_amcl, max_particles: 500}}
 
 
 def results(out: Path) -> dict[str, tuple[bytes, str]]:
-    """Of each run its result and its log's hash."""
+    """Return the result and the hash of the log of each run, by its folder."""
     return {
         log.parent.relative_to(out).as_posix(): (
             (log.parent / "result.json").read_bytes(),
@@ -36,16 +36,16 @@ def results(out: Path) -> dict[str, tuple[bytes, str]]:
 
 @pytest.fixture
 def pair(folder: Path) -> Path:
-    """A plain scenario, and one in which everything that is random takes part."""
+    """Write a scenario without and one with random noise, slip, and localization; return the folder."""
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "b.scenario.yaml").write_text(text + NOISY)
     return folder
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Path:
-    """The output of the pair run one after the other in a folder of their own, once for all who compare with it."""
-    home = tmp_path_factory.mktemp("once") / "home"
+def reference_out(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Path:
+    """Run the scenarios of `pair` one after the other in another folder, once for all tests; return the output."""
+    home = tmp_path_factory.mktemp("reference") / "home"
     home.mkdir()
     for name, text in {**texts, "b.scenario.yaml": texts["a.scenario.yaml"] + NOISY}.items():
         (home / name).write_text(text)
@@ -56,21 +56,21 @@ def once(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Pat
 
 
 @pytest.fixture
-def reference(once: Path) -> dict[str, tuple[bytes, str]]:
-    """Of each run its result and its log's hash."""
-    found = results(once)
+def reference(reference_out: Path) -> dict[str, tuple[bytes, str]]:
+    """Return the result and the hash of the log of both runs in `reference_out`."""
+    found = results(reference_out)
     assert len(found) == 2
     return found
 
 
-def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, once, pair: Path) -> None:
-    elsewhere = pair.parent / "elsewhere"
-    elsewhere.mkdir()
+def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, reference_out, pair: Path) -> None:
+    other_folder = pair.parent / "other_folder"
+    other_folder.mkdir()
     busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
     try:
         done = subprocess.run(
             [SIMSCEN, "run", "../home/b.scenario.yaml", "../home/a.scenario.yaml", "-j", "2", "--out", "out"],
-            cwd=elsewhere, capture_output=True, text=True, timeout=120, check=False,
+            cwd=other_folder, capture_output=True, text=True, timeout=120, check=False,
             env={**os.environ, "PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "4", "LC_ALL": "C", "TZ": "Asia/Tokyo"},
         )  # fmt: skip
     finally:
@@ -78,8 +78,8 @@ def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, 
             process.kill()
             process.wait()
     assert done.returncode == 0, done.stdout + done.stderr
-    assert results(elsewhere / "out") == reference
-    assert (elsewhere / "out/results.json").read_bytes() == (once / "results.json").read_bytes()
+    assert results(other_folder / "out") == reference
+    assert (other_folder / "out/results.json").read_bytes() == (reference_out / "results.json").read_bytes()
 
 
 def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, monkeypatch) -> None:
@@ -115,12 +115,12 @@ def test_89_another_seed_gives_another_run_and_seed_0_is_an_error(reference, pai
 
 @pytest.mark.slow
 def test_90_verdicts_are_equal_without_fused_multiply_add(reference, pair: Path, simscen, monkeypatch) -> None:
-    plain = {
+    without_fma = {
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
     }
     environment = supervisor.clean_environment()
-    monkeypatch.setattr(supervisor, "clean_environment", lambda: {**environment, **plain})
+    monkeypatch.setattr(supervisor, "clean_environment", lambda: {**environment, **without_fma})
     assert simscen("run", ".", "--out", "out").code == 0
     assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
     assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(
@@ -137,15 +137,15 @@ def test_90_verdicts_are_equal_without_fused_multiply_add(reference, pair: Path,
 def test_run_that_differs_from_another_session_is_an_error(pair: Path, simscen) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     assert simscen("run", "a.scenario.yaml", "--out", "same", "--check-against", "out").code == 0
-    asked = ("run", "a.scenario.yaml", "--check-determinism", "out", "--out", "alike")
-    assert simscen(*asked).code == 0, "an output folder is what to compare with, not where to look for scenarios"
+    command = ("run", "a.scenario.yaml", "--check-determinism", "out", "--out", "alike")
+    assert simscen(*command).code == 0, "an output folder is what to compare with, not where to look for scenarios"
     file = pair / "a.scenario.yaml"
     file.write_text(file.read_text().replace("pose: {x: 1,", "pose: {x: 1.01,"))
-    moved = simscen("run", "a.scenario.yaml", "--out", "moved", "--check-against", "out")
-    assert moved.code == 3
-    assert "nondeterministic: not as in out: tick 0 (t = 0.000 s): the true pose differs by 0.01 m" in moved.out
+    changed = simscen("run", "a.scenario.yaml", "--out", "changed", "--check-against", "out")
+    assert changed.code == 3
+    assert "nondeterministic: not as in out: tick 0 (t = 0.000 s): the true pose differs by 0.01 m" in changed.out
     missing = simscen("run", "a.scenario.yaml", "--seed", "99", "--out", "missing", "--check-against", "out")
     assert missing.code == 3
     assert "seed-99/run.mcap: No such file or directory" in missing.out
-    nowhere = simscen("run", "a.scenario.yaml", "--out", "never", "--check-against", "nowhere")
-    assert (nowhere.code, nowhere.err) == (2, "simscen: --check-against nowhere: the folder contains no runs\n")
+    no_folder = simscen("run", "a.scenario.yaml", "--out", "never", "--check-against", "no_folder")
+    assert (no_folder.code, no_folder.err) == (2, "simscen: --check-against nowhere: the folder contains no runs\n")

@@ -27,7 +27,7 @@ def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, co
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "told"),
+    ("text", "place", "message"),
     [
         pytest.param("", "", "the file is empty", id="3 empty"),
         pytest.param("# nothing\n\n# yet\n", "", "the file is empty", id="3 only comments"),
@@ -55,16 +55,16 @@ def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, co
         pytest.param("simscen: 1\nname: a\u202eb\n", "2:8", "control character U+202E", id="18 bidirectional"),
     ],
 )  # fmt: skip
-def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, text, place: str, told: str) -> None:
+def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, text, place: str, message: str) -> None:
     head = with_scenario(text).splitlines()[0]
     where = f"bad.scenario.yaml:{place}" if place else "bad.scenario.yaml"
     assert head.startswith(f"{where}: error[SC")
-    assert told in head
+    assert message in head
     assert not (folder / "marker").exists()
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "place", "told"),
+    ("old", "new", "place", "message"),
     [
         pytest.param("time_limit", "tiem_limit", "6:1", "unknown key `tiem_limit`", id="9"),
         pytest.param("time_limit", "zzz", "6:1", "unknown key `zzz`", id="10"),
@@ -100,10 +100,10 @@ def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, te
                      id="limit of particles"),
     ],
 )  # fmt: skip
-def test_invalid_value_is_an_error(with_scenario, old: str, new: str, place: str, told: str) -> None:
+def test_invalid_value_is_an_error(with_scenario, old: str, new: str, place: str, message: str) -> None:
     head = with_scenario(replace={old: new}).splitlines()[0]
     assert head.startswith(f"bad.scenario.yaml:{place}: error[SC")
-    assert told in head
+    assert message in head
 
 
 def test_9_and_10_unknown_key_gets_a_suggestion_or_the_valid_keys(with_scenario) -> None:
@@ -113,9 +113,9 @@ def test_9_and_10_unknown_key_gets_a_suggestion_or_the_valid_keys(with_scenario)
 
 def test_20_alias_bomb_is_refused_and_ordinary_aliases_work(peak_memory, simscen, folder: Path) -> None:
     (folder / "bomb.scenario.yaml").write_text(LAUGHS)
-    code, peak, told = peak_memory("validate", "bomb.scenario.yaml")
+    code, peak, message = peak_memory("validate", "bomb.scenario.yaml")
     assert code == 2
-    assert "aliases" in told
+    assert "aliases" in message
     assert peak < 100
     good = (folder / "a.scenario.yaml").read_text()
     good = good.replace("pose: {x: 1, y: 1}", "pose: &start {x: 1, y: 1}").replace(
@@ -133,8 +133,8 @@ def test_22_file_of_100_mb_is_refused(peak_memory, refused, folder: Path) -> Non
     assert peak < 100
 
 
-def odd(folder: Path, kind: str, name: str) -> None:
-    """Something in `folder` that is not a regular file."""
+def create_special_file(folder: Path, kind: str, name: str) -> None:
+    """Create a folder, FIFO, link to a device, or socket called `name`."""
     if kind == "folder":
         (folder / name).mkdir()
     elif kind == "fifo":
@@ -146,55 +146,55 @@ def odd(folder: Path, kind: str, name: str) -> None:
             end.bind(name)
 
 
-ODD = ["folder", "fifo", "device", "socket"]
+SPECIAL_KINDS = ["folder", "fifo", "device", "socket"]
 
 
-@pytest.mark.parametrize("kind", ODD[1:])
+@pytest.mark.parametrize("kind", SPECIAL_KINDS[1:])
 def test_26_only_regular_files_are_read(refused, folder: Path, kind: str) -> None:
-    odd(folder, kind, "odd.scenario.yaml")
-    told = refused("odd.scenario.yaml")
-    assert re.match(r"odd.scenario.yaml: error\[SC0(01|20)\] (not a regular file|the file is outside)", told)
+    create_special_file(folder, kind, "special.scenario.yaml")
+    message = refused("special.scenario.yaml")
+    assert re.match(r"special.scenario.yaml: error\[SC0(01|20)\] (not a regular file|the file is outside)", message)
 
 
 def test_26_a_folder_with_the_name_of_a_scenario_is_an_error_with_its_name(simscen, folder: Path) -> None:
-    (folder / "odd.scenario.yaml").mkdir()
-    ended = simscen("validate", "odd.scenario.yaml")
+    (folder / "special.scenario.yaml").mkdir()
+    ended = simscen("validate", "special.scenario.yaml")
     assert ended.code == 2
-    assert "odd.scenario.yaml: error[SC001] is a folder" in ended.err
+    assert "special.scenario.yaml: error[SC001] is a folder" in ended.err
     assert simscen("validate", ".").code == 0
 
 
-@pytest.mark.parametrize("kind", ODD[1:])
+@pytest.mark.parametrize("kind", SPECIAL_KINDS[1:])
 def test_26_search_reads_only_regular_files(refused, folder: Path, kind: str) -> None:
-    odd(folder, kind, "odd.scenario.yaml")
-    assert "odd.scenario.yaml: error[SC0" in refused(".")
+    create_special_file(folder, kind, "special.scenario.yaml")
+    assert "special.scenario.yaml: error[SC0" in refused(".")
 
 
-@pytest.mark.parametrize("kind", ODD)
+@pytest.mark.parametrize("kind", SPECIAL_KINDS)
 @pytest.mark.parametrize(
     ("old", "place"), [("room.world.yaml", "3:8"), ("cube.robot.yaml", "4:16")], ids=["world", "robot"]
 )
-def test_26_scenario_can_refer_to_plain_files(with_scenario, folder: Path, kind: str, old: str, place: str) -> None:
-    odd(folder, kind, "odd.yaml")
-    told = with_scenario(replace={old: "odd.yaml"})
+def test_26_world_and_robot_must_be_regular_files(with_scenario, folder: Path, kind: str, old: str, place: str) -> None:
+    create_special_file(folder, kind, "special.yaml")
+    message = with_scenario(replace={old: "special.yaml"})
     expected = "outside the scenario root" if kind == "device" else "not a regular file"
-    assert told.startswith(f"bad.scenario.yaml:{place}: error[SC0")
-    assert expected in told
+    assert message.startswith(f"bad.scenario.yaml:{place}: error[SC0")
+    assert expected in message
 
 
-@pytest.mark.parametrize("kind", ODD)
+@pytest.mark.parametrize("kind", SPECIAL_KINDS)
 def test_26_defaults_and_bases_must_be_regular_files(with_scenario, folder: Path, kind: str) -> None:
-    odd(folder, kind, "odd.yaml")
-    assert "odd.yaml" in with_scenario("extends: odd.yaml\n")
-    (folder / "odd.yaml").rename(folder / "defaults.yaml")
+    create_special_file(folder, kind, "special.yaml")
+    assert "special.yaml" in with_scenario("extends: special.yaml\n")
+    (folder / "special.yaml").rename(folder / "defaults.yaml")
     assert "defaults.yaml: error[SC0" in with_scenario(replace={})
 
 
 @pytest.fixture
-def everyman(refused, simscen):
-    """A folder that everybody may enter, and no longer the rights of root, who may read everything."""
+def unprivileged_folder(refused, simscen):
+    """Change into a folder with mode 777, as an unprivileged user even if the tests run as root."""
     before = Path.cwd()
-    # Python itself may lie where only root can read, so that everything must be imported by now.
+    # Import everything before: Python may be installed where only root can read.
     simscen("validate", ".")
     refused("nowhere.scenario.yaml")
     with tempfile.TemporaryDirectory() as name:
@@ -211,21 +211,21 @@ def everyman(refused, simscen):
             os.chdir(before)
 
 
-def test_27_unreadable_file_is_an_error(refused, everyman: Path) -> None:
-    (everyman / "locked.scenario.yaml").write_text("simscen: 1")
-    (everyman / "locked.scenario.yaml").chmod(0)
+def test_27_unreadable_file_is_an_error(refused, unprivileged_folder: Path) -> None:
+    (unprivileged_folder / "locked.scenario.yaml").write_text("simscen: 1")
+    (unprivileged_folder / "locked.scenario.yaml").chmod(0)
     assert refused("locked.scenario.yaml") == "locked.scenario.yaml: error[SC001] permission denied\n"
 
 
-def test_27_unsearchable_folder_is_an_error(refused, everyman: Path) -> None:
-    (everyman / "locked").mkdir(mode=0)
-    told = refused("locked/a.scenario.yaml")
-    assert told == "locked/a.scenario.yaml: error[SC001] permission denied\n"
+def test_27_unsearchable_folder_is_an_error(refused, unprivileged_folder: Path) -> None:
+    (unprivileged_folder / "locked").mkdir(mode=0)
+    message = refused("locked/a.scenario.yaml")
+    assert message == "locked/a.scenario.yaml: error[SC001] permission denied\n"
 
 
-def test_27_unsearchable_subfolder_is_an_error(refused, everyman: Path) -> None:
-    (everyman / "a.scenario.yaml").write_text(SCENARIO)
-    (everyman / "locked").mkdir(mode=0)
+def test_27_unsearchable_subfolder_is_an_error(refused, unprivileged_folder: Path) -> None:
+    (unprivileged_folder / "a.scenario.yaml").write_text(SCENARIO)
+    (unprivileged_folder / "locked").mkdir(mode=0)
     assert refused(".") == "./locked: error[SC001] permission denied\n"
 
 
@@ -241,8 +241,8 @@ def test_29_one_invalid_file_prevents_all_runs(refused, folder: Path) -> None:
     good = (folder / "a.scenario.yaml").read_text()
     for name in "bcde":
         (folder / f"{name}.scenario.yaml").write_text(good.replace("seed: 7", "seed: x") if name in "bd" else good)
-    told = refused(".")
-    assert [line.split(":")[0] for line in told.splitlines() if "error[" in line] == [
+    message = refused(".")
+    assert [line.split(":")[0] for line in message.splitlines() if "error[" in line] == [
         "b.scenario.yaml", "d.scenario.yaml"
     ]  # fmt: skip
 

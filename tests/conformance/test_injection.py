@@ -20,7 +20,7 @@ HOSTILE = [
 ]  # fmt: skip
 COMMAND = re.compile(r"^\s*::|##\w*\[", re.MULTILINE)
 ANNOTATION = re.compile(r"::(error|warning) (file|line|col|title)=[^:,]*(,(file|line|col|title)=[^:,]*)*::[^\r\n]*")
-LIVELESS = {
+ALLOWED_TAGS = {
     "html", "head", "meta", "title", "style", "body", "h1", "p", "details", "summary", "span", "div", "table",
     "tr", "th", "td", "img", "code", "pre", "b", "a", "header", "main", "section", "svg", "rect", "thead", "tbody",
     "ul", "li", "form", "label", "fieldset", "legend", "input", "select", "option", "button", "kbd",
@@ -30,7 +30,7 @@ SCRIPTED_FORK_SERVER = str(Path(__file__).with_name("scripted_fork_server.py"))
 
 @pytest.fixture
 def hostile(folder: Path) -> str:
-    """A scenario that fails, and whatever has a name in it has a hostile one."""
+    """Write a scenario that fails, with hostile names for the file, goals, events, and objects; return its path."""
     goals = [{"name": "near", "pose": {"x": 1.8, "y": 1}}]
     goals += [
         {"name": name, "pose": {"x": 5, "y": 1 + number % 2 * 2}, "timeout": 0.1} for number, name in enumerate(HOSTILE)
@@ -54,7 +54,7 @@ def hostile(folder: Path) -> str:
 
 
 class Tags(HTMLParser):
-    """What a browser would take for elements and attributes."""
+    """Elements, attributes, links, and text of a page, as an HTML parser finds them."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -73,15 +73,15 @@ class Tags(HTMLParser):
         self.text += data
 
 
-def without_its_own(page: str) -> str:
-    """The page without its script, which has to be there once."""
+def without_own_script(page: str) -> str:
+    """Return the page without its script, which it must contain exactly once."""
     script = f"<script>{files('simscen').joinpath('data').joinpath('suite').joinpath('suite.js').read_text()}</script>"
     assert page.count(script) == 1
     return page.replace(script, "")
 
 
 def check_reports(out: Path) -> str:
-    """They are well-formed, attach nothing from elsewhere, and hold no live element; gives the text of failures."""
+    """Check that reports are well-formed, attach only own files, and have only ALLOWED_TAGS; return the failures."""
     junit = ElementTree.fromstring((out / "junit.xml").read_bytes())
     attached = [
         path for text in junit.iter("system-out") for path in re.findall(r"\[\[ATTACHMENT\|(.*?)\]\]", text.text)
@@ -89,8 +89,8 @@ def check_reports(out: Path) -> str:
     assert attached
     assert [path for path in attached if not Path(path).resolve().is_relative_to(out.resolve())] == []
     json.loads((out / "results.json").read_text())
-    page = Tags(without_its_own((out / "report.html").read_text()))
-    assert page.tags <= LIVELESS
+    page = Tags(without_own_script((out / "report.html").read_text()))
+    assert page.tags <= ALLOWED_TAGS
     assert [name for name in page.attributes if name.startswith("on") or name in ("style", "srcdoc", "action")] == []
     assert [
         link for link in page.links if not re.fullmatch(r"\./[\w./%=@-]+|#run-[\w.=-]+|[a-z]+\.(xml|json)", link)
@@ -103,8 +103,8 @@ def test_81_text_is_escaped_on_the_console_and_in_reports(simscen, hostile: str,
     ended = simscen("run", hostile, "--out", "out")
     assert (ended.code, ended.err) == (1, "")
     assert not COMMAND.search(ended.out)
-    told = check_reports(folder / "out")
-    assert [name for name in HOSTILE if name not in told] == []
+    failures = check_reports(folder / "out")
+    assert [name for name in HOSTILE if name not in failures] == []
     assert all(name in ended.out for name in ("[/red]", "[link=https://example.org]here[/link]", "]]>", "=cmd()"))
 
 
@@ -156,14 +156,14 @@ def test_81_text_is_escaped_on_a_terminal(hostile: str, folder: Path) -> None:
 @pytest.mark.parametrize("name", ["[red]a", "]]>", "&amp;", "=cmd()", "%0A::x", "-x", "機械", "a,b"])
 def test_81_file_names_are_escaped(simscen, folder: Path, name: str) -> None:
     (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
-    told, listed = simscen("validate", "."), simscen("list", ".")
-    assert (told.code, listed.code) == (0, 0)
+    validated, listed = simscen("validate", "."), simscen("list", ".")
+    assert (validated.code, listed.code) == (0, 0)
     assert name in listed.out
-    assert not COMMAND.search(told.out + listed.out)
+    assert not COMMAND.search(validated.out + listed.out)
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "message"),
     [
         ("a b\u202ec", "control character U+202E in the file name"),
         ("a\nb", "control character U+000A in the file name"),
@@ -171,12 +171,12 @@ def test_81_file_names_are_escaped(simscen, folder: Path, name: str) -> None:
         ("caf\udce9", "the file name is not valid UTF-8"),
     ],
 )
-def test_81_unprintable_names_are_refused(refused, simscen, folder: Path, name: str, told: str) -> None:
+def test_81_unprintable_names_are_refused(refused, simscen, folder: Path, name: str, message: str) -> None:
     (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
     problems = refused(".")
-    assert told in problems
+    assert message in problems
     assert problems.isprintable() or problems.count("\n") == 2
-    assert json.loads(simscen("validate", ".", "--format", "json").out)["problems"][0]["message"] == told
+    assert json.loads(simscen("validate", ".", "--format", "json").out)["problems"][0]["message"] == message
 
 
 def test_81_names_of_logs_stay_on_one_line(simscen, folder: Path) -> None:
@@ -205,8 +205,8 @@ def test_82_output_of_a_crashed_worker_is_quoted(simscen, folder: Path, monkeypa
         assert "\x1b" not in ended.out
     junit = ElementTree.fromstring((folder / "text/junit.xml").read_bytes())
     assert "::set-output name=x::y" in junit.find(".//error").text
-    page = Tags(without_its_own((folder / "text/report.html").read_text()))
-    assert page.tags <= LIVELESS
+    page = Tags(without_own_script((folder / "text/report.html").read_text()))
+    assert page.tags <= ALLOWED_TAGS
 
 
 def test_83_annotations_of_validate_escape_what_github_reads(simscen, folder: Path) -> None:

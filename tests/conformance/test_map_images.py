@@ -12,7 +12,7 @@ MAP = "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n"
 
 @pytest.fixture
 def with_map(folder: Path, with_world):
-    """`refused` for a scenario whose world is a ROS map with such an image."""
+    """Return `refused` for a scenario with a ROS map that has the given image as its world."""
 
     def call(image: bytes, name: str = "map.pgm", lines: str = "") -> str:
         (folder / name).write_bytes(image)
@@ -33,7 +33,7 @@ BOMB = png(13000, 13000, zlib.compress(bytes(13001) * 1000, 9))
 
 
 @pytest.mark.parametrize(
-    ("name", "image", "told"),
+    ("name", "image", "message"),
     [
         pytest.param("map.pgm", b"P5 100000 100000 255\n" + bytes(100), "map too large: 100000 x 100000", id="45"),
         pytest.param("map.pgm", b"P5 4 4 255\n" + bytes(15), "the PGM is truncated: 15 of 16", id="46 short"),
@@ -52,10 +52,10 @@ BOMB = png(13000, 13000, zlib.compress(bytes(13001) * 1000, 9))
         pytest.param("map.bmp", b"BM" + bytes(12) + struct.pack("<Iii", 40, 99999, 99999), "too large", id="47 BMP"),
     ],
 )  # fmt: skip
-def test_invalid_map_image_is_an_error(with_map, name: str, image: bytes, told: str) -> None:
+def test_invalid_map_image_is_an_error(with_map, name: str, image: bytes, message: str) -> None:
     head = with_map(image, name).splitlines()[0]
     assert head.startswith(f"{name}: error[SC320]")
-    assert told in head
+    assert message in head
 
 
 @pytest.mark.parametrize(
@@ -64,13 +64,13 @@ def test_invalid_map_image_is_an_error(with_map, name: str, image: bytes, told: 
 def test_too_large_map_is_an_error_without_using_memory(peak_memory, folder: Path, name: str, image: bytes) -> None:
     (folder / name).write_bytes(image)
     (folder / "room.world.yaml").write_text(MAP.replace("map.pgm", name))
-    code, peak, told = peak_memory("validate", "a.scenario.yaml")
-    assert (code, "too large" in told) == (2, True)
+    code, peak, message = peak_memory("validate", "a.scenario.yaml")
+    assert (code, "too large" in message) == (2, True)
     assert peak < 150
 
 
 @pytest.mark.parametrize("kind", ["fifo", "folder", "device"])
-def test_26_an_image_that_is_not_a_regular_file(with_world, folder: Path, kind: str) -> None:
+def test_26_map_image_must_be_a_regular_file(with_world, folder: Path, kind: str) -> None:
     if kind == "fifo":
         os.mkfifo(folder / "map.pgm")
     elif kind == "folder":
@@ -81,7 +81,7 @@ def test_26_an_image_that_is_not_a_regular_file(with_world, folder: Path, kind: 
 
 
 @pytest.mark.parametrize(
-    ("lines", "place", "told"),
+    ("lines", "place", "message"),
     [
         ("occupied_thresh: 0.2\nfree_thresh: 0.6\n", "5:14", "must be less than occupied_thresh"),
         ("occupied_thresh: 0.2\n", "1:1", "must be less than occupied_thresh"),
@@ -89,27 +89,27 @@ def test_26_an_image_that_is_not_a_regular_file(with_world, folder: Path, kind: 
         ("negate: 2\n", "4:9", ""),
     ],
 )
-def test_invalid_map_yaml_is_an_error(with_map, lines: str, place: str, told: str) -> None:
+def test_invalid_map_yaml_is_an_error(with_map, lines: str, place: str, message: str) -> None:
     head = with_map(b"P5 4 4 255\n" + bytes(16), lines=lines).splitlines()[0]
     assert head.startswith(f"map.yaml:{place}: error[SC0")
-    assert told in head
+    assert message in head
 
 
 def test_map_with_huge_resolution_is_an_error(with_world, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
-    told = with_world(MAP.replace("0.05", "1000"), "map.yaml")
-    assert told.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m extend to 40000 m")
+    message = with_world(MAP.replace("0.05", "1000"), "map.yaml")
+    assert message.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m extend to 40000 m")
 
 
 def test_world_with_a_too_large_map_is_an_error(with_world) -> None:
-    told = with_world("simscen: 1\nwalls: [{points: [[-9000, -9000], [9000, 9000]]}]\n")
-    assert told.startswith("bad.scenario.yaml:3:8: error[SC330] map too large: 360042 x 360042 cells")
+    message = with_world("simscen: 1\nwalls: [{points: [[-9000, -9000], [9000, 9000]]}]\n")
+    assert message.startswith("bad.scenario.yaml:3:8: error[SC330] map too large: 360042 x 360042 cells")
 
 
 def test_49_goal_outside_the_robots_map_is_an_error(with_scenario, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     (folder / "old.yaml").write_text(MAP)
-    told = with_scenario(replace={"seed: 7": "map: old.yaml", "x: 1.5, y: 1": "x: 4, y: 3"})
-    assert told.startswith(
+    message = with_scenario(replace={"seed: 7": "map: old.yaml", "x: 1.5, y: 1": "x: 4, y: 3"})
+    assert message.startswith(
         "bad.scenario.yaml:5:16: error[SC301] goal `goal-1` (4, 3) is outside the map (2 m x 2 m from"
     )

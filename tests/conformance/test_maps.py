@@ -17,7 +17,7 @@ map.yaml:5:1: warning[SC311] `moed` has no meaning in a ROS map
 
 @pytest.fixture
 def hall(folder):
-    """An empty hall of 6 m x 4 m."""
+    """Write the map of an empty hall of 6 m x 4 m; return the folder."""
     rows = [bytes(60), *[b"\0" + b"\xfe" * 58 + b"\0"] * 38, bytes(60)]
     (folder / "map.pgm").write_bytes(b"P5 60 40 255\n" + b"".join(rows))
     (folder / "map.yaml").write_text(MAP)
@@ -40,7 +40,7 @@ def test_run_with_unknown_map_keys_succeeds(hall, simscen):
     assert (ended.code, ended.err) == (0, NOTES)
 
 
-def test_a_map_on_its_own_is_read_with_its_image(hall, simscen):
+def test_validate_reads_a_map_and_its_image(hall, simscen):
     ended = simscen("validate", "map.yaml")
     assert (ended.code, ended.out) == (0, NOTES + "1 map is valid\n")
     (hall / "map.pgm").write_bytes(b"P5 60 40 255\n")

@@ -15,7 +15,7 @@ from simscen.record.log_reader import read_log
 
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 SCRIPTED_FORK_SERVER = Path(__file__).with_name("scripted_fork_server.py")
-IMPATIENT = f"""
+SHORT_SILENCE = f"""
 import simscen.cli.session.backends
 from simscen.cli.main import main
 from simscen.run.process import supervisor
@@ -28,10 +28,10 @@ Mounted = Callable[[str, str], "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture
 def mounted(folder: Path) -> Mounted:
-    """Runs a script with a small disk of its own at `disk`; `saved` keeps what the script copies there."""
+    """Return a function that runs a script in a folder with a tmpfs at `disk`, mounted with `options`."""
     can_mount = ["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"]
     if subprocess.run(can_mount, capture_output=True, check=False).returncode:
-        pytest.skip("needs a user namespace in which it may mount")
+        pytest.skip("needs permission to mount in a user namespace")
     (folder / "disk").mkdir()
 
     def call(options: str, script: str) -> "subprocess.CompletedProcess[str]":
@@ -51,8 +51,8 @@ def contents(folder: Path) -> dict[str, str]:
 
 def test_72_read_only_disk_is_an_error_before_any_run(mounted: Mounted) -> None:
     done = mounted("ro", '"$simscen" run . --out disk/out')
-    told = "simscen: cannot use the output folder disk/out: Read-only file system\n"
-    assert (done.returncode, done.stderr) == (2, told)
+    message = "simscen: cannot use the output folder disk/out: Read-only file system\n"
+    assert (done.returncode, done.stderr) == (2, message)
 
 
 @pytest.mark.parametrize("out", ["a.scenario.yaml/out", "/proc/out", "/dev/null/out"])
@@ -67,10 +67,10 @@ def test_73_full_disk_is_an_error_of_each_affected_run(mounted: Mounted, folder:
     text = (folder / "a.scenario.yaml").read_text()
     for name in "bc":
         (folder / f"{name}.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 5, y: 3"))
-    script = '"$simscen" run . --out disk/out -j 1 --format json > told.json; code=$?; cp -r disk/out saved; exit $code'
+    script = '"$simscen" run . --out disk/out -j 1 --format json > all.json; code=$?; cp -r disk/out saved; exit $code'
     done = mounted("size=600k", script)
     assert done.returncode == 3
-    runs = {run["scenario"]: run for run in json.loads((folder / "told.json").read_text())["runs"]}
+    runs = {run["scenario"]: run for run in json.loads((folder / "all.json").read_text())["runs"]}
     assert [run["outcome"] for run in runs.values()] == ["passed", "error", "error"]
     for name in "bc":
         assert runs[name]["error"]["kind"] == "output"
@@ -128,8 +128,8 @@ def test_102_stopped_fork_server_is_replaced(folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))
     (folder / "b.scenario.yaml").write_text(text)
-    # it is stopped by the run that it forked, maybe before it says so: who prepares is given the limit of a run besides
-    command = [sys.executable, "-c", IMPATIENT, "run", ".", "--out", "out", "-j", "1", "--wall-limit", "15"]
+    # The run may stop the fork server before it reports the run, so that the wall limit of a run applies as well.
+    command = [sys.executable, "-c", SHORT_SILENCE, "run", ".", "--out", "out", "-j", "1", "--wall-limit", "15"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (3, "")
     runs = {run["scenario"]: run for run in json.loads((folder / "out/results.json").read_text())["runs"]}

@@ -16,7 +16,7 @@ faults: [{sensor: lidar, noise: {std: 5 cm}}]
 
 @pytest.fixture
 def scenario(folder: Path) -> Path:
-    """A way round the crate, with chance in the planner, the localizer and a fault."""
+    """Write a scenario around the crate with a randomized planner, localizer, and fault; return its path."""
     text = (folder / "a.scenario.yaml").read_text().replace("{x: 1.5, y: 1}", "{x: 4.6, y: 2.6}")
     (folder / "b.scenario.yaml").write_text(text + PLANNED)
     return folder / "b.scenario.yaml"

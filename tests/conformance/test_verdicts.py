@@ -1,4 +1,4 @@
-"""Verdicts of the command line: nothing is reported as passed that was not shown."""
+"""Conformance tests of verdicts: a criterion never passes without evidence in the log."""
 
 import json
 import subprocess
@@ -131,8 +131,8 @@ def test_104_a_run_ends_at_its_time_limit(simscen, folder: Path) -> None:
 
 
 def test_104_a_run_of_a_single_sample_is_refused(with_scenario) -> None:
-    told = with_scenario(f"simscen: 1\n{ROOM}time_limit: 20 ms\npass: [{{collisions: {{max: 0}}}}]\n")
-    assert "bad.scenario.yaml:4:13: error[SC036] nothing can be judged: the second sample" in told
+    message = with_scenario(f"simscen: 1\n{ROOM}time_limit: 20 ms\npass: [{{collisions: {{max: 0}}}}]\n")
+    assert "bad.scenario.yaml:4:13: error[SC036] nothing can be judged: the second sample" in message
 
 
 @pytest.mark.sample(2)
@@ -145,7 +145,7 @@ def test_104_a_run_of_a_single_sample_is_refused(with_scenario) -> None:
         "whenever: {eventually: {signal: speed, op: '>', value: 5, within: 9 s}}\n"
         "    then: {signal: speed, op: '<', value: 9}",
     ],
-    ids=["alone", "nested", "nested twice", "premise looks beyond the end"],
+    ids=["top level", "nested", "nested twice", "premise looks beyond the end"],
 )
 def test_105_a_premise_that_was_never_known_to_be_true_is_inconclusive(simscen, folder: Path, criterion: str) -> None:
     head, _, rest = criterion.partition("\n    ")
@@ -179,7 +179,7 @@ def test_106_an_object_that_turns_too_far_in_a_tick_is_refused(simscen, folder: 
     ],
     ids=["version", "digits", "name"],
 )
-def test_107_values_that_look_right(with_scenario, old: str, new: str) -> None:
+def test_107_almost_valid_values_are_errors(with_scenario, old: str, new: str) -> None:
     assert "error[SC" in with_scenario(replace={old: new})
 
 
@@ -246,7 +246,7 @@ def test_108_logs_of_real_robots_are_judged(simscen, folder: Path, name: str) ->
     assert simscen("judge", bag, "--truth", "/truth", "--scenario", "tight.yaml").code == 1
 
 
-def test_109_a_comparison_with_sparse_references_says_how_much_was_compared(simscen, folder: Path) -> None:
+def test_109_localize_reports_the_share_of_beliefs_with_a_reference(simscen, folder: Path) -> None:
     write_map(folder)
     write_csv(folder)
     rows = (folder / "drive.csv").read_text().splitlines()
@@ -260,7 +260,7 @@ def test_109_a_comparison_with_sparse_references_says_how_much_was_compared(sims
 
 
 @pytest.mark.slow
-def test_110_a_run_whose_log_was_deleted_or_replaced_is_repeated(folder: Path) -> None:
+def test_110_resume_repeats_a_run_if_its_log_was_deleted_or_replaced(folder: Path) -> None:
     def run(*options: str) -> None:
         command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", *options]
         assert subprocess.run(command, cwd=folder, capture_output=True, timeout=60, check=False).returncode == 0

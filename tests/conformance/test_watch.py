@@ -20,7 +20,7 @@ pass: [{collisions: {max: 0}}]
 
 
 class Watch:
-    """A `simscen run --watch` that is read until it says what is expected."""
+    """A `simscen run --watch` process: read its output until a text, and press keys."""
 
     def __init__(self, folder: Path) -> None:
         command = [sys.executable, "-m", "simscen.cli.main", "run", ".", "-j", "1", "--watch"]
@@ -30,12 +30,12 @@ class Watch:
 
     def until(self, text: str) -> str:
         assert self.process.stdout is not None
-        told = b""
-        while text.encode() not in told:
+        output = b""
+        while text.encode() not in output:
             piece = os.read(self.process.stdout.fileno(), 4096)
-            assert piece, f"it ended without {text!r}:\n{told.decode()}"
-            told += piece
-        return told.decode()
+            assert piece, f"it ended without {text!r}:\n{output.decode()}"
+            output += piece
+        return output.decode()
 
     def press(self, key: str) -> None:
         assert self.process.stdin is not None
@@ -60,13 +60,13 @@ def test_watch_reruns_affected_scenarios_and_reacts_to_keys(watch: Watch, tmp_pa
     (tmp_path / "other.world.yaml").write_text(ROOM.replace("walls", "wals"))
     assert "unknown key `wals`" in watch.until("q = quit")
     (tmp_path / "other.world.yaml").write_text(ROOM.replace("[6, 0]", "[6.5, 0]"))
-    told = watch.until("q = quit")
-    assert "1 scenario ·" in told and "✓ b" in told
+    output = watch.until("q = quit")
+    assert "1 scenario ·" in output and "✓ b" in output
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("collisions: {max: 0}", "clearance: {min: 2}"))
     assert "0 passed, 1 failed" in watch.until("f = run those that did not pass (1), q = quit")
     watch.press("f")
-    told = watch.until("q = quit")
-    assert "0 passed, 1 failed" in told and "1 scenario ·" in told
+    output = watch.until("q = quit")
+    assert "0 passed, 1 failed" in output and "1 scenario ·" in output
     watch.press("a")
     assert "1 passed, 1 failed" in watch.until("q = quit")
     watch.press("q")

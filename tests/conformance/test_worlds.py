@@ -20,7 +20,7 @@ SDF = """\
 
 
 @pytest.mark.parametrize(
-    ("geometry", "told"),
+    ("geometry", "message"),
     [
         pytest.param("<heightmap><uri>terrain.png</uri><size>9 9 1</size></heightmap>", "3000 x 3000 pixels", id="48"),
         pytest.param("<mesh><uri>gone.stl</uri></mesh>", "gone.stl: no such file or directory", id="37 in SDF"),
@@ -30,16 +30,16 @@ SDF = """\
         pytest.param("<box><size>1 -1 1</size></box>", "1 -1 1", id="50 size in SDF"),
     ],
 )  # fmt: skip
-def test_unusable_sdf_geometry_is_an_error(with_world, folder: Path, geometry: str, told: str) -> None:
+def test_unusable_sdf_geometry_is_an_error(with_world, folder: Path, geometry: str, message: str) -> None:
     Image.new("1", (3000, 3000)).save(folder / "terrain.png")
     (folder / "lying.stl").write_bytes(bytes(80) + struct.pack("<I", 9))
     os.mkfifo(folder / "fifo.stl")
     head = with_world(SDF.format(geometry=geometry), "bad.sdf").splitlines()[0]
     assert head.startswith("bad.sdf:5:")
-    assert told in head
+    assert message in head
 
 
-def test_50_a_quaternion_of_zeros(with_world) -> None:
+def test_50_zero_quaternion_is_an_error(with_world) -> None:
     pose = '<model name="thing"><pose rotation_format="quat_xyzw">0 0 0  0 0 0 0</pose>'
     text = (
         SDF.replace('<model name="thing">', pose).replace("1.7", "1.9").format(geometry="<box><size>1 1 1</size></box>")
@@ -50,21 +50,21 @@ def test_50_a_quaternion_of_zeros(with_world) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "place", "told"),
+    ("content", "place", "message"),
     [
         pytest.param("<sdf", "1:", "", id="43 truncated SDF"),
         pytest.param("", "1:", "", id="43 empty SDF"),
         pytest.param(SDF.replace("<sdf", "<!DOCTYPE sdf>\n<sdf"), "2:1", "DOCTYPE", id="42 in SDF"),
     ],
 )
-def test_unreadable_sdf_is_an_error(with_world, content: str, place: str, told: str) -> None:
+def test_unreadable_sdf_is_an_error(with_world, content: str, place: str, message: str) -> None:
     head = with_world(content, "bad.sdf").splitlines()[0]
     assert head.startswith(f"bad.sdf:{place}")
-    assert told in head
+    assert message in head
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "place", "told"),
+    ("old", "new", "place", "message"),
     [
         pytest.param("x: 1.5, y: 1", "x: 3.2, y: 2.1", "5:16", 'goal `goal-1` (3.2, 2.1) is inside obstacle "crate"',
                      id="goal in obstacle"),
@@ -77,22 +77,22 @@ def test_unreadable_sdf_is_an_error(with_world, content: str, place: str, told: 
         pytest.param("{x: 1, y: 1}", "{x: -9, y: 2}", "4:39", "the robot's start (-9, 2) is", id="start outside"),
     ],
 )  # fmt: skip
-def test_49_impossible_start_or_goal_is_an_error(with_scenario, old: str, new: str, place: str, told: str) -> None:
+def test_49_impossible_start_or_goal_is_an_error(with_scenario, old: str, new: str, place: str, message: str) -> None:
     head = with_scenario(replace={old: new}).splitlines()[0]
     assert head.startswith(f"bad.scenario.yaml:{place}: error[SC301]")
-    assert told in head
+    assert message in head
 
 
 @pytest.mark.parametrize(
-    "thing",
+    "item",
     [
         "objects: [{name: cart, box: [0.4, 0.4, 1], pose: {x: 1, y: 1}}]",
         "doors: [{name: cart, points: [[0.5, 1], [1.5, 1]], closed: true}]",
     ],
 )
-def test_49_start_inside_a_movable_object_is_an_error(with_world, thing: str) -> None:
-    told = with_world(f"simscen: 1\nwalls: [{{points: [[0, 0], [6, 0], [6, 4]]}}]\n{thing}\n")
-    assert told.startswith('bad.scenario.yaml:4:39: error[SC301] the robot\'s start (1, 1) is inside obstacle "cart"')
+def test_49_start_inside_a_movable_object_is_an_error(with_world, item: str) -> None:
+    text = with_world(f"simscen: 1\nwalls: [{{points: [[0, 0], [6, 0], [6, 4]]}}]\n{item}\n")
+    assert text.startswith('bad.scenario.yaml:4:39: error[SC301] the robot\'s start (1, 1) is inside obstacle "cart"')
 
 
 def test_49_goal_without_a_map_can_be_beyond_the_obstacles(simscen, folder: Path) -> None:
@@ -112,7 +112,7 @@ def test_49_impossible_goal_is_an_error(simscen, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("world", "place", "told"),
+    ("world", "place", "message"),
     [
         ("obstacles: [{name: a, box: [1, -1, 1], pose: {x: 3, y: 2}}]", "2:32", "must be greater than 0"),
         ("obstacles: [{name: a, cylinder: [0, 1], pose: {x: 3, y: 2}}]", "2:34", "must be greater than 0"),
@@ -121,10 +121,10 @@ def test_49_impossible_goal_is_an_error(simscen, folder: Path) -> None:
         ("walls: [{points: [[0, 0]]}]", "2:18", "expected 2 or more values, got 1"),
     ],
 )
-def test_50_objects_without_size_are_errors(with_world, world: str, place: str, told: str) -> None:
+def test_50_objects_without_size_are_errors(with_world, world: str, place: str, message: str) -> None:
     head = with_world(f"simscen: 1\n{world}\n").splitlines()[0]
     assert head.startswith(f"bad.world.yaml:{place}: error[SC0")
-    assert told in head
+    assert message in head
 
 
 def test_51_ids_that_differ_only_in_case_are_errors(refused, folder: Path) -> None:

@@ -8,13 +8,13 @@ from simscen.testing import Promise, promises_of
 
 SPECS = {
     "spin": Spin(),
-    "spin the other way": Spin(spin_dist=-3.0, max_rotational_vel=0.5),
+    "spin clockwise": Spin(spin_dist=-3.0, max_rotational_vel=0.5),
     "wait": Wait(),
     "backup": BackUp(),
     "retrace": Retrace(),
     "clear_costmap": ClearCostmap(),
     "simple": SimpleGoalChecker(),
-    "forgetful": SimpleGoalChecker(stateful=False),
+    "simple, not stateful": SimpleGoalChecker(stateful=False),
 }
 
 

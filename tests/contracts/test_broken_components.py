@@ -8,11 +8,11 @@ from tests.contracts.broken import (
     behaviors,
     controllers,
     goal_checkers,
+    language,
     localizers,
     planners,
     sensors,
     stacks,
-    words,
 )
 from tests.contracts.broken.cases import CASES, Case
 
@@ -24,8 +24,8 @@ ROUND = {"round": round_robot()}
 def test_broken_component_fails_its_contract_test(case: Case) -> None:
     (promise,) = [each for each in promises_of(case.spec, robots=ROUND) if each.name.startswith(case.promise)]
     with pytest.raises(PromiseBroken) as broken:
-        promise.check(limit=1.0 if case.name == "NeverGivesUp" else 60.0)
-    assert case.seen in str(broken.value)
+        promise.check(limit=1.0 if case.name == "NeverReturns" else 60.0)
+    assert case.message in str(broken.value)
 
 
 def test_every_contract_test_has_a_broken_component() -> None:
@@ -38,11 +38,11 @@ def test_every_contract_test_has_a_broken_component() -> None:
         goal_checkers.CHECKER,
         stacks.STACK,
         sensors.SENSOR,
-        words.NeedsABelief(),
-        words.OnScans(),
-        words.Meddles(),
-        words.SaysNothing(),
-        words.HasNoUnit(),
+        language.RequiresBelief(),
+        language.ScanFault(),
+        language.TriggerChangesWorld(),
+        language.HasNoDescription(),
+        language.HasNoUnit(),
     )
     every = {promise.name for spec in specs for promise in promises_of(spec, robots=ROUND)}
     assert [name for name in sorted(every) if not any(name.startswith(each) for each in caught)] == []

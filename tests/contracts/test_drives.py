@@ -41,7 +41,7 @@ def test_drive_respects_speed_and_acceleration_limits(robot):
         simulation.drive(Twist(*(rng.uniform(-9, 9) for _ in range(3))))
         simulation.step(24)
         now = simulation.truth().twist
-        # Wheels that slip sideways let a base swing out a little further than was asked of it.
+        # A base with wheels that slip sideways turns a little further than commanded.
         assert -(limits.reverse or limits.linear) * 1.05 <= now.vx <= limits.linear * 1.05
         assert abs(now.wz) <= limits.angular * 1.3
         if isinstance(spec.drive, Holonomic):

@@ -21,7 +21,7 @@ SPECS: dict[str, LocalizerSpec] = {
     "amcl prob": Amcl(laser_model_type="likelihood_field_prob", do_beamskip=True, selective_resampling=True),
     "amcl beam": Amcl(laser_model_type="beam", min_particles=100, max_particles=300, resample_interval=2),
     "amcl recovering": Amcl(recovery_alpha_slow=0.001, recovery_alpha_fast=0.1),
-    "amcl cocksure": Amcl(laser_model_type="likelihood_field_prob", z_rand=0.0, sigma_hit=0.001, max_beams=2000),
+    "amcl narrow": Amcl(laser_model_type="likelihood_field_prob", z_rand=0.0, sigma_hit=0.001, max_beams=2000),
     "ekf": Ekf(type="ekf"),
     "slip_ekf": SlipEkf(type="slip_ekf"),
     "slip_ekf with laser odometry": SlipEkf(type="slip_ekf", match_scans=True),

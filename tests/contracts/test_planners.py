@@ -40,7 +40,7 @@ def test_component_meets_its_contract(promise: Promise) -> None:
 @pytest.mark.parametrize("kind", ["bit_star", "aorrtc", "rrt_star", "kpiece"])
 @pytest.mark.parametrize("space", ["reeds_shepp", "dubins"])
 def test_path_of_a_car_keeps_its_turning_radius(space: str, kind: str) -> None:
-    """Also where the direction of travel changes."""
+    """This includes poses at which the direction of travel changes."""
     contract = PlannerContract(
         Spec(type=kind, state_space=space, max_iterations=2000, improving_iterations=100), robot=CAR
     )

@@ -35,7 +35,7 @@ def load(name):
 
 
 def without_noise(spec):
-    """The same robot with perfect sensors."""
+    """Return the robot with sensors without noise."""
     quiet = {
         "lidar": {"noise": 0.0},
         "odometry": {"translation_noise": 0.0, "rotation_noise": 0.0, "drift_noise": 0.0},
@@ -56,7 +56,7 @@ class Rig:
         self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation.robot, RayScene(ROOM))
 
     def drive(self, twist, ticks):
-        """All readings on the way."""
+        """Drive for some ticks; return the readings of all sensors."""
         readings = []
         self.simulation.drive(twist)
         for _ in range(ticks // 2):

@@ -20,10 +20,10 @@ def test_message_states_the_problem_and_its_position(case: Path) -> None:
     problems = try_scenario(case, HERE)
     assert isinstance(problems, list), "the file is valid"
     expected = case.with_name(case.name.replace(".scenario.yaml", ".txt"))
-    told = as_text(problems) + "\n"
+    text = as_text(problems) + "\n"
     if os.environ.get("SIMSCEN_UPDATE"):
-        expected.write_text(told, encoding="utf-8")
-    assert told == expected.read_text(encoding="utf-8")
+        expected.write_text(text, encoding="utf-8")
+    assert text == expected.read_text(encoding="utf-8")
 
 
 def test_every_message_file_has_a_case() -> None:

@@ -20,29 +20,29 @@ OTHERS = {"SC014", "SC016", "SC030", "SC031", "SC032", "SC033", "SC035", "SC313"
 
 
 @pytest.fixture(scope="module")
-def told() -> dict[Path, list[Problem]]:
-    """What is said of each file; all of them share one small world."""
+def found() -> dict[Path, list[Problem]]:
+    """Return the problems of each file; all files use the same small world."""
     return {case: CHECKER.check_scenario(case)[1] for case in CASES}
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda path: path.name.split(".")[0])
-def test_message_states_the_meaningless_part_and_its_position(case: Path, told: dict[Path, list[Problem]]) -> None:
-    assert told[case], "nobody would notice that this file means nothing"
+def test_message_states_the_meaningless_part_and_its_position(case: Path, found: dict[Path, list[Problem]]) -> None:
+    assert found[case], "no problem is reported for this file"
     expected = case.with_name(case.name.replace(".scenario.yaml", ".txt"))
-    text = as_text(told[case]) + "\n"
+    text = as_text(found[case]) + "\n"
     if os.environ.get("SIMSCEN_UPDATE"):
         expected.write_text(text, encoding="utf-8")
     assert text == expected.read_text(encoding="utf-8")
 
 
-def test_at_least_seventy_cases_are_reported(told: dict[Path, list[Problem]]) -> None:
-    assert [case.name for case, problems in told.items() if not problems] == []
-    assert len(told) >= 70
+def test_at_least_seventy_cases_are_reported(found: dict[Path, list[Problem]]) -> None:
+    assert [case.name for case, problems in found.items() if not problems] == []
+    assert len(found) >= 70
 
 
-def test_every_semantic_check_has_a_case(told: dict[Path, list[Problem]]) -> None:
-    meant = {code for code in CODES if code.startswith("SC05") or "SC301" <= code <= "SC304" or code in OTHERS}
-    assert meant - {problem.code for problems in told.values() for problem in problems} == set()
+def test_every_semantic_check_has_a_case(found: dict[Path, list[Problem]]) -> None:
+    expected = {code for code in CODES if code.startswith("SC05") or "SC301" <= code <= "SC304" or code in OTHERS}
+    assert expected - {problem.code for problems in found.values() for problem in problems} == set()
 
 
 def test_every_message_file_has_a_case() -> None:

@@ -29,7 +29,7 @@ def blocks(page: str, language: str) -> list[str]:
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository whose scenario is right."""
+    """Create a Git repository with a valid scenario."""
     subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios/good.scenario.yaml").write_text(GOOD)
@@ -51,12 +51,12 @@ def test_pre_commit_hooks_find_mistakes(repository: Path) -> None:
     hooks = [{**hook, "language": "system"} for hook in yaml.safe_load(manifest.read_text())]
     config = repository / ".pre-commit-config.yaml"
     config.write_text(yaml.safe_dump({"repos": [{"repo": "local", "hooks": hooks}]}))
-    code, told = pre_commit(repository, "run", "--all-files")
-    assert (code, told.count("Passed")) == (0, 2), told
+    code, output = pre_commit(repository, "run", "--all-files")
+    assert (code, output.count("Passed")) == (0, 2), output
     (repository / "scenarios/room.world.yaml").write_text(WORLD.replace("walls", "wals"))
-    code, told = pre_commit(repository, "run", "--all-files")
-    assert (code, told.count("Failed")) == (1, 2), told
-    assert "scenarios/room.world.yaml:2:1: error[SC012]" in told
+    code, output = pre_commit(repository, "run", "--all-files")
+    assert (code, output.count("Failed")) == (1, 2), output
+    assert "scenarios/room.world.yaml:2:1: error[SC012]" in output
 
 
 def test_pre_commit_configurations_in_the_guide_are_valid(tmp_path: Path) -> None:
@@ -79,14 +79,14 @@ def test_pipelines_in_the_guides_match_their_schemas(tmp_path: Path, schema: str
         (tmp_path / f"{number}.yml").write_text(block)
     files = sorted(tmp_path.iterdir())
     assert len(files) == count
-    _fits(schema, *files)
+    _check_schema(schema, *files)
 
 
 def test_the_action_fits_githubs_schema() -> None:
-    _fits("vendor.github-actions", ROOT / "action.yml")
+    _check_schema("vendor.github-actions", ROOT / "action.yml")
 
 
-def _fits(schema: str, *files: Path) -> None:
+def _check_schema(schema: str, *files: Path) -> None:
     command = [BIN / "check-jsonschema", "--builtin-schema", schema, *files]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -94,26 +94,26 @@ def _fits(schema: str, *files: Path) -> None:
 
 def test_jenkins_pipeline_has_balanced_brackets() -> None:
     (block,) = blocks("jenkins.md", "groovy")
-    bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", block)
+    unquoted = re.sub(r"'[^']*'|\"[^\"]*\"", "", block)
     for opened, closed in ("{}", "()"):
-        assert bare.count(opened) == bare.count(closed)
+        assert unquoted.count(opened) == unquoted.count(closed)
     assert {"agent", "options", "environment", "stages", "post"} <= set(re.findall(r"^  (\w+) ", block, re.MULTILINE))
 
 
 def test_dockerfile_is_valid_and_copies_existing_files() -> None:
     done = subprocess.run([BIN / "hadolint", ROOT / "Dockerfile"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "")
-    kept = set(re.findall(r"^!(\S+)$", (ROOT / ".dockerignore").read_text(), re.MULTILINE))
+    not_ignored = set(re.findall(r"^!(\S+)$", (ROOT / ".dockerignore").read_text(), re.MULTILINE))
     copied = [
         name
         for line in re.findall(r"^COPY (?!--)(.*) \S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
         for name in line.split()
     ]
-    assert set(copied) == kept
+    assert set(copied) == not_ignored
     assert all((ROOT / name).exists() for name in copied)
 
 
 def test_docs_do_not_install_simscen_from_pypi() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "simscen").rglob("*.py")]
-    told = re.compile(r"pip3? install (?:-\S+ )*['\"]?simscen\b(?!/)")
-    assert [str(page) for page in pages if told.search(page.read_text(encoding="utf-8"))] == []
+    command = re.compile(r"pip3? install (?:-\S+ )*['\"]?simscen\b(?!/)")
+    assert [str(page) for page in pages if command.search(page.read_text(encoding="utf-8"))] == []

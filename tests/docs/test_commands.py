@@ -32,7 +32,7 @@ def shown() -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize("page", sorted({page for page, _, _ in shown()}))
-def test_commands_are_shown_with_options_that_they_have(page: str) -> None:
+def test_shown_options_of_commands_exist(page: str) -> None:
     unknown = []
     for where, name, rest in shown():
         if where == page:
@@ -46,5 +46,5 @@ def test_commands_are_shown_with_options_that_they_have(page: str) -> None:
 
 def test_the_guide_lists_every_exit_code() -> None:
     table = (ROOT / "docs/guides/command-line.md").read_text(encoding="utf-8").partition("## Exit codes")[2]
-    told = {int(code) for row in re.findall(r"^\| ([\d, ]+) \|", table, re.MULTILINE) for code in row.split(",")}
-    assert told == {code.value for code in Exit}
+    listed = {int(code) for row in re.findall(r"^\| ([\d, ]+) \|", table, re.MULTILINE) for code in row.split(",")}
+    assert listed == {code.value for code in Exit}

@@ -23,7 +23,7 @@ LISTED = [line for line in re.findall(r"^    simscen (.*?)(?:  .*)?$", GUIDE, re
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The files of the guide, a program of each name it uses, and a home with its configuration."""
+    """Write the files, programs, and configuration of the guide; return their folder."""
     for name, text in FILES.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -52,12 +52,12 @@ def test_files_and_configuration_of_the_guide_are_valid(project: Path) -> None:
 
 @pytest.mark.slow
 def test_comparison_prints_the_output_of_the_guide(project: Path) -> None:
-    """To the words and the outcomes; the last digits may differ between processors."""
+    """Only words and outcomes are compared, because the last digits differ between processors."""
     done = CliRunner().invoke(app, [*shlex.split(SHOWN), "--out", "out"])
     assert done.exit_code == 1
-    told = done.output.partition("\n\n")[2].partition("\n\n\ndid not pass:")[0]
-    assert words(told) == words(TABLE)
-    assert "scenarios/room   6/6   4/6" in told
+    output = done.output.partition("\n\n")[2].partition("\n\n\ndid not pass:")[0]
+    assert words(output) == words(TABLE)
+    assert "scenarios/room   6/6   4/6" in output
     assert (project / "out/runs/scenarios/room/seed-3-dwb/run.mcap").is_file()
     assert "room [seed 3, dwb]" in (project / "out/junit.xml").read_text()
     assert '"comparison"' in (project / "out/results.json").read_text()
@@ -65,7 +65,7 @@ def test_comparison_prints_the_output_of_the_guide(project: Path) -> None:
 
 
 def words(text: str) -> list[list[str]]:
-    """Each line without its numbers and without signs of them."""
+    """Return the words of each line, without numbers."""
     return [re.findall(r"[a-z_]{2,}", line) for line in text.strip("\n").splitlines()]
 
 
@@ -76,7 +76,7 @@ def test_listed_command_succeeds(project: Path, command: str) -> None:
 
 @pytest.mark.parametrize("command", [line for line in LISTED if line.startswith("run")])
 def test_listed_stack_commands_are_valid(project: Path, command: str) -> None:
-    """The stacks it names are a user's own; here it is enough that each is valid and would be started."""
+    """The stacks in the commands do not exist here, so that the commands are only validated."""
     checked = ["validate", *shlex.split(command)[1:]]
     done = CliRunner().invoke(app, checked)
     assert done.exit_code == 0, done.output

@@ -10,8 +10,8 @@ from simscen.loading.checks.files import check_file, file_kind
 
 ROOT = Path(__file__).parents[2]
 # Other tests read these pages: test_own_packages.py and test_extends_guide.py.
-ELSEWHERE = re.compile("own-|extends")
-PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not ELSEWHERE.match(p.name))]
+OTHER_PAGES = re.compile("own-|extends")
+PAGES = [ROOT / "README.md", *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not OTHER_PAGES.match(p.name))]
 BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -29,7 +29,7 @@ def project(tmp_path_factory):
     shutil.copytree(ROOT / "worlds", root / "worlds")
     (root / "scenarios" / "theme").mkdir(parents=True)
     (root / "scenarios" / "jackal.urdf").write_text("<robot name='jackal'/>")
-    for file in (ROOT / "scenarios").rglob("*.scenario.yaml"):  # what the studies of the documentation extend
+    for file in (ROOT / "scenarios").rglob("*.scenario.yaml"):  # studies in the documentation extend these
         text = file.read_text(encoding="utf-8").replace("../../worlds", "../worlds")
         (root / "scenarios" / file.name).write_text(text, encoding="utf-8")
     tutorial = (ROOT / "docs/tutorials/flaky-to-fixed.md").read_text(encoding="utf-8")
@@ -39,8 +39,8 @@ def project(tmp_path_factory):
 
 @pytest.mark.parametrize("block", blocks())
 def test_complete_example_is_valid(block, project):
-    told = {"\nextends:": "study", "\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
-    kind = next((kind for key, kind in told.items() if key in block), "world")
+    kinds = {"\nextends:": "study", "\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
+    kind = next((kind for key, kind in kinds.items() if key in block), "world")
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
     file = project / folder / f"example.{kind}.yaml"
     file.write_text(block, encoding="utf-8")

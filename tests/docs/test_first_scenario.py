@@ -20,7 +20,7 @@ PARTS = dict(re.findall(r"^## (\d)[^\n]*\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE 
 
 @pytest.fixture
 def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What of a clone the page needs."""
+    """Change into a folder with the files of a clone that the page needs; return the folder."""
     shutil.copytree(ROOT / "worlds", tmp_path / "worlds")
     (tmp_path / "scenarios").mkdir()
     (tmp_path / ".git").mkdir()
@@ -28,17 +28,17 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def called(*words: str) -> tuple[int, str]:
+def call(*words: str) -> tuple[int, str]:
     done = CliRunner().invoke(app, list(words))
     return done.exit_code, done.output
 
 
 def test_scenario_of_the_tutorial_passes(clone: Path) -> None:
-    assert called("new", "scenarios/my_first")[0] == 0
+    assert call("new", "scenarios/my_first")[0] == 0
     (clone / "scenarios/my_first.scenario.yaml").write_text(FIRST, encoding="utf-8")
-    assert called("validate", "scenarios/my_first.scenario.yaml") == (0, "1 scenario is valid\n")
-    code, told = called("run", "scenarios/my_first.scenario.yaml")
-    assert code == 0, told
+    assert call("validate", "scenarios/my_first.scenario.yaml") == (0, "1 scenario is valid\n")
+    code, output = call("run", "scenarios/my_first.scenario.yaml")
+    assert code == 0, output
 
 
 @pytest.mark.slow
@@ -47,20 +47,20 @@ def test_harder_scenario_fails_only_by_the_tight_bound_and_writes_the_named_file
     assert before in HARDER and after in PARTS["4"]
     file = clone / "scenarios/my_first.scenario.yaml"
     file.write_text(HARDER.replace(before, after), encoding="utf-8")
-    code, told = called("run", "scenarios/my_first.scenario.yaml")
+    code, output = call("run", "scenarios/my_first.scenario.yaml")
     assert code == 1
-    assert "stopped_within: " in told and "again" in told and "scenarios/my_first.scenario.yaml:16" in told
+    assert "stopped_within: " in output and "again" in output and "scenarios/my_first.scenario.yaml:16" in output
     (shown,) = re.findall(r"^```text\n(.*?)^```", PARTS["4"], re.MULTILINE | re.DOTALL)
-    assert words(shown) == words(told.partition("\n")[2])[: len(words(shown))]
+    assert words(shown) == words(output.partition("\n")[2])[: len(words(shown))]
     session = clone / "simscen-out/latest"
     (run,) = json.loads((session / "results.json").read_text())["runs"]
     assert run["outcome"] == "failed"
-    left = {path.name for path in session.rglob("*") if path.is_file()}
+    written = {path.name for path in session.rglob("*") if path.is_file()}
     named = set(re.findall(r"`(\w+\.(?:html|png|mcap))`", PARTS["4"]))
-    assert {"replay.html", "report.html", "map.png", "run.mcap"} == named <= left
+    assert {"replay.html", "report.html", "map.png", "run.mcap"} == named <= written
     log = next(session.rglob("run.mcap"))
     file.write_text(HARDER, encoding="utf-8")
-    assert called("judge", str(log), "--scenario", str(file))[0] == 0
+    assert call("judge", str(log), "--scenario", str(file))[0] == 0
 
 
 @pytest.mark.parametrize("page", ["python", pytest.param("several-robots", marks=pytest.mark.slow)])
@@ -75,5 +75,5 @@ def test_python_example_runs(page: str, clone: Path) -> None:
 
 
 def words(text: str) -> list[list[str]]:
-    """Each line without its numbers, whose last digits may differ between processors."""
+    """Return the words of each line without numbers; their last digits differ between processors."""
     return [re.findall(r"[a-z_]{2,}", line) for line in text.strip("\n").splitlines()]

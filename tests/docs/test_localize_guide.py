@@ -15,7 +15,7 @@ GUIDE = (ROOT / "docs" / "guides" / "localize.md").read_text(encoding="utf-8")
 SHOWN = re.findall(r"^```console\n\$ simscen (.*?)\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 FILES = re.findall(r"^```yaml\n# (\S+)\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"-?\d+\.?\d*")
-"""Those of a particle filter may differ a little with the processor's arithmetic."""
+"""Numbers of a particle filter differ slightly between processors."""
 
 sys.path.insert(0, str(ROOT / "tests" / "unit" / "cli"))
 
@@ -34,8 +34,8 @@ def test_command_prints_the_output_of_the_guide(
     monkeypatch.chdir(tmp_path)
     printed = CliRunner().invoke(app, shlex.split(command)).stdout
     assert NUMBER.sub("#", printed) == NUMBER.sub("#", shown)
-    told, meant = (list(map(float, NUMBER.findall(text))) for text in (printed, shown))
-    assert told == pytest.approx(meant, abs=0.03)
+    printed_numbers, shown_numbers = (list(map(float, NUMBER.findall(text))) for text in (printed, shown))
+    assert printed_numbers == pytest.approx(shown_numbers, abs=0.03)
 
 
 def test_the_guide_shows_more_than_one_command() -> None:

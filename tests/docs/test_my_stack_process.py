@@ -26,23 +26,23 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def called(command: str, home: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+def run_command(command: str, home: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, "HOME": str(home), "XDG_CONFIG_HOME": str(home / "none"), **variables}
     env["PATH"] = f"{Path(sys.executable).parent}:{env['PATH']}"
     return subprocess.run(command, shell=True, cwd=home, env=env, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(("command", "says"), COMMANDS)
-def test_command_prints_the_output_of_the_tutorial(home: Path, command: str, says: str) -> None:
-    ended = called(command, home)
-    assert says in ended.stdout + ended.stderr
-    assert ended.returncode == (0 if "passed" in says else 2 if "SC060" in says else 3)
+@pytest.mark.parametrize(("command", "shown"), COMMANDS)
+def test_command_prints_the_output_of_the_tutorial(home: Path, command: str, shown: str) -> None:
+    ended = run_command(command, home)
+    assert shown in ended.stdout + ended.stderr
+    assert ended.returncode == (0 if "passed" in shown else 2 if "SC060" in shown else 3)
 
 
 @pytest.mark.slow
 def test_configuration_defines_the_command_of_the_stack_name(home: Path) -> None:
-    ended = called("simscen run room.scenario.yaml", home, XDG_CONFIG_HOME=str(home / ".config"))
+    ended = run_command("simscen run room.scenario.yaml", home, XDG_CONFIG_HOME=str(home / ".config"))
     assert (ended.returncode, ended.stderr) == (0, "")
 
 

@@ -14,7 +14,7 @@ TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorials"
 PIP = ["-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
 PROGRAMS = {
     "simscen": ["-c", "import sys; from simscen.cli.start import start; sys.exit(start())"],
-    # A working copy that was not installed anew knows the plug-in of pytest only by name.
+    # Load the plug-in explicitly, because the entry points of an old installation may lack it.
     "pytest": ["-m", "pytest", "-p", "no:xdist", "-p", "no:simscen", "-p", "simscen.testing.plugin"],
 }
 
@@ -29,15 +29,15 @@ def test_every_step_of_the_tutorial_works(tmp_path: Path, page: str) -> None:
     for language, text in re.findall(r"^```(\w+)\n(.*?)^```", shown_text, re.MULTILINE | re.DOTALL):
         if language == "console":
             for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", text, re.MULTILINE):
-                _check(command, shown, _done(command, work, site))
+                _check(command, shown, _run(command, work, site))
         else:
             file = work / text.partition("\n")[0].removeprefix("# ")
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding="utf-8")
 
 
-def _done(command: str, work: Path, site: Path) -> str:
-    """What a command prints. Packages are installed into a folder of their own, without asking the network."""
+def _run(command: str, work: Path, site: Path) -> str:
+    """Run a command and return its output. Packages are installed into `site` without the network."""
     program, *arguments = shlex.split(command)
     if program == "pip" and arguments[0] == "uninstall":
         shutil.rmtree(site)
@@ -57,6 +57,6 @@ def _done(command: str, work: Path, site: Path) -> str:
 
 
 def _check(command: str, shown: str, printed: str) -> None:
-    """All of it is shown, line by line; `…` stands for whatever is there."""
+    """Check that a command prints exactly the shown text; `…` matches any text."""
     pattern = "".join(re.escape(part) if part != "…" else ".*?" for part in re.split("(…)", shown.strip()))
     assert re.fullmatch(pattern, printed.strip(), re.DOTALL) or not shown, f"$ {command}\n{printed}\nshown:\n{shown}"

@@ -15,7 +15,7 @@ FILES = [
     *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.suffix in KINDS),
 ]
 DOCUMENT = re.compile(r"(?<![\w./])(?:\.\./)*((?:[\w.-]+/)*[A-Z][A-Z0-9_]{2,}\.md)\b")
-"""Documents whose names are in capitals, as those of a repository's front are."""
+"""Documents with names in capitals, such as README.md."""
 TICKET = re.compile(r"\bissues? #?\d+\b", re.IGNORECASE)
 PLACE = re.compile(r"(?<![\w.}$\"'=:])/(?:work|root)/\w|/home/(?!me\b|user\b|u\b)[a-z]+/\w")
 

@@ -10,7 +10,7 @@ SOURCES = [
     path
     for folder in ("simscen", "docs")
     for path in sorted((ROOT / folder).rglob("*"))
-    if path.suffix in (".py", ".md") and path.name != "language.md"  # which is made of docstrings
+    if path.suffix in (".py", ".md") and path.name != "language.md"  # generated from docstrings
 ]
 ENTRY = re.compile(r"^@\w+\{(\w+),\n(.*?)^\}", re.MULTILINE | re.DOTALL)
 FIELD = re.compile(r"^  (\w+) = \{(.*)\},$", re.MULTILINE)
@@ -24,12 +24,12 @@ CITED = (
     ),  # Olson, A title, 2009
 )
 NO_AUTHORS = {*calendar.month_name, "REP"}
-"""Stand before a number that looks like a year: months, and ROS enhancement proposals."""
+"""Words before numbers that are not years of publications."""
 ENTRIES = {key: dict(FIELD.findall(body)) for key, body in ENTRY.findall((ROOT / "docs/references.bib").read_text())}
 
 
 def citations() -> Iterator[tuple[str, str, str]]:
-    """File, name (or a word of the title or venue before the year) and year."""
+    """Yield file, name (or the word of title or venue before the year), and year."""
     for path in SOURCES:
         text = re.sub(r"\s+", " ", path.read_text(encoding="utf-8"))
         for pattern in CITED:
@@ -46,12 +46,12 @@ def test_each_citation_has_an_entry() -> None:
 
 
 def words(entry: dict[str, str]) -> set[str]:
-    """What may stand before the year: an author, the last word of a title, a venue in short."""
+    """Return the words that can precede the year: authors, words of the title, venues."""
     text = " ".join(entry.values())
     return {*re.findall(r"[^\W\d_][\w'’-]+", text), *re.findall(r"van \w+", text)}
 
 
-def test_each_entry_is_cited_and_says_where_to_find_it() -> None:
+def test_each_entry_is_cited_and_has_a_publisher_or_address() -> None:
     text = " ".join(path.read_text(encoding="utf-8") for path in SOURCES)
     used = set(re.findall(r"[^\W\d_]+", text))
     first = {key: entry["author"].partition(",")[0] for key, entry in ENTRIES.items()}

@@ -1,4 +1,4 @@
-"""The guide that lists all keys by task contains every trigger, action, fault, and criterion."""
+"""Test that the guide to keys lists every trigger, action, fault, and criterion."""
 
 import re
 from pathlib import Path
@@ -22,5 +22,5 @@ CHOICES = {
 
 @pytest.mark.parametrize("part", CHOICES)
 def test_every_key_is_in_its_section(part):
-    said = re.findall(r"`([a-z_]+)`", PARTS[part])
-    assert sorted(set(CHOICES[part]) - set(said)) == []
+    listed = re.findall(r"`([a-z_]+)`", PARTS[part])
+    assert sorted(set(CHOICES[part]) - set(listed)) == []

@@ -1,8 +1,8 @@
 """Feeds damaged files to every loader: `python tests/fuzz/fuzz.py [--mutants N] [--seed N] [--only TARGET[:NUMBER]]`.
 
-Every mutant must be accepted, and then be fit to run, or be refused as InvalidInput: no other exception, no crash, at
-most some seconds of CPU and one GiB of memory. A mutant is a function of seed, target and number. Exit code 1 when
-there are findings; each is told with what repeats it.
+A mutant must be accepted and ready to run, or be refused with InvalidInput. Other exceptions, crashes, more than 5 s of
+CPU time, and more than 1 GiB of memory are findings. A mutant depends only on seed, target, and number. The
+exit code is 1 if there are findings, each of which is printed with the option that repeats it.
 """
 
 import argparse
@@ -46,7 +46,7 @@ pass:
 
 
 def examine(target: Target, name: str, folder: Path) -> dict[str, Any]:
-    """Build one mutant in `folder` and read it: how that came out."""
+    """Build one mutant in `folder`, read it, and return the result."""
     try:
         mutated = target.build(folder, random.Random(name))
         try:
@@ -61,11 +61,11 @@ def examine(target: Target, name: str, folder: Path) -> dict[str, Any]:
         own = [frame for frame in frames if "simscen" in frame.filename and "fuzz" not in frame.filename] or frames
         where = f"{Path(own[-1].filename).name}:{own[-1].lineno}"
         what = f"{type(error).__name__} in {where}" if own is not frames else f"{type(error).__name__}: {error}"[:150]
-        return {"mutant": name, "how": what, "told": traceback.format_exc()[-1500:]}
+        return {"mutant": name, "how": what, "traceback": traceback.format_exc()[-1500:]}
 
 
 def chunk(target: Target, names: list[str]) -> Iterator[dict[str, Any]]:
-    """Examine these in a child; one that dies on a mutant is that mutant's finding, and the next goes on behind it."""
+    """Examine mutants in a child process; if it dies on one, yield a finding and continue in another child."""
     while names:
         reading, writing = os.pipe()
         child = os.fork()
@@ -90,14 +90,14 @@ def chunk(target: Target, names: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def _be_child(target: Target, names: list[str], report: int) -> None:
-    """A loop in C takes no Python signal, so that the default action of SIGPROF ends it."""
+    """Examine mutants, and exit. The default action of SIGPROF ends also loops in C, which handle no signals."""
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    nowhere = os.open(os.devnull, os.O_RDWR)
+    null = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
-        os.dup2(nowhere, descriptor)
+        os.dup2(null, descriptor)
     try:
         for name in names:
             folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
@@ -110,8 +110,8 @@ def _be_child(target: Target, names: list[str], report: int) -> None:
         os._exit(0)
 
 
-def unsound(known: dict[str, Target]) -> list[str]:
-    """Of the corpus what is refused before it is damaged; mutants of it would all end at the same line."""
+def invalid_corpus_files(known: dict[str, Target]) -> list[str]:
+    """Return the files of the corpus that are refused without damage: all their mutants would fail in the same line."""
     found = []
     for name, target in known.items():
         for index, file in enumerate(target.files):
@@ -122,8 +122,8 @@ def unsound(known: dict[str, Target]) -> list[str]:
     return found
 
 
-def a_log() -> bytes:
-    """The log of a short run."""
+def log_of_short_run() -> bytes:
+    """Return the log of a short run."""
     with tempfile.TemporaryDirectory() as name:
         scenario, log = Path(name) / "a.scenario.yaml", Path(name) / "run.mcap"
         scenario.write_text(QUICK)
@@ -132,7 +132,7 @@ def a_log() -> bytes:
 
 
 def all_results(chosen: dict[str, Target], each: int, seed: int, jobs: int) -> Iterator[dict[str, Any]]:
-    """Results of all mutants, several children at a time."""
+    """Yield the results of all mutants, from several children at a time."""
     work = [
         (target, [f"{seed}:{name}:{number}" for number in range(start, min(start + CHUNK, each))])
         for start in range(0, each, CHUNK)
@@ -164,24 +164,24 @@ def all_results(chosen: dict[str, Target], each: int, seed: int, jobs: int) -> I
 
 
 def main() -> int:
-    """Examine, sum up, and print each kind of finding once."""
+    """Examine all mutants, and print each kind of finding once."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--mutants", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="target, or SEED:TARGET:NUMBER to repeat one, whose files stay")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     options = parser.parse_args()
-    known = targets(a_log())
+    known = targets(log_of_short_run())
     if options.only.count(":") == 2:
         folder = Path(tempfile.mkdtemp(prefix="mutant-"))
         result = examine(known[options.only.split(":")[1]], options.only, folder)
-        print(folder, result["how"], result.get("told", ""), sep="\n")
-        return int("told" in result)
-    if bad := unsound(known):
-        print("the corpus is not sound:", *bad, sep="\n  ")
+        print(folder, result["how"], result.get("traceback", ""), sep="\n")
+        return int("traceback" in result)
+    if bad := invalid_corpus_files(known):
+        print("invalid files in the corpus:", *bad, sep="\n  ")
         return 1
     chosen = {name: target for name, target in known.items() if options.only in ("", name)}
-    begun, each = time.monotonic(), -(-options.mutants // len(chosen))
+    start_s, each = time.monotonic(), -(-options.mutants // len(chosen))
     counts: dict[str, Counter[str]] = {name: Counter() for name in chosen}
     findings: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for result in all_results(chosen, each, options.seed, options.jobs):
@@ -194,7 +194,7 @@ def main() -> int:
     for (name, how), found in findings.items():
         print(f"\n{name}: {how}, {len(found)} times, e.g. --only {found[0]['mutant']}\n{found[0].get('told', '')}")
     total, wrong = sum(count.total() for count in counts.values()), sum(map(len, findings.values()))
-    print(f"{total} mutants in {time.monotonic() - begun:.0f} s, {wrong} findings of {len(findings)} kinds")
+    print(f"{total} mutants in {time.monotonic() - start_s:.0f} s, {wrong} findings of {len(findings)} kinds")
     return int(bool(findings) or total < options.mutants)
 
 

@@ -1,4 +1,4 @@
-"""Damages bytes as accidents and attackers do; a function of its random generator alone."""
+"""Random damage to bytes, as by accidents and attackers; reproducible from the generator."""
 
 import random
 import re
@@ -20,12 +20,12 @@ TOKENS = [
 
 
 def mutant(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
-    """One of the corpus, by its index, damaged one to six times; of some only numbers, which reaches deeper."""
+    """Return an index into the corpus and this file, damaged one to six times; 40 % get only other numbers."""
     index = rng.randrange(len(corpus))
     data = corpus[index]
-    ways = _MUTATIONS if rng.random() < 0.6 else (_number,)
+    mutations = _MUTATIONS if rng.random() < 0.6 else (_number,)
     for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
-        data = rng.choice(ways)(data, corpus, rng)
+        data = rng.choice(mutations)(data, corpus, rng)
     return index, data[: 1 << 18]
 
 
@@ -41,12 +41,12 @@ def _flip(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :]
 
 
-def _cut(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+def _delete(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     start, end = _span(data, rng)
     return data[:start] + data[end:]
 
 
-def _end(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+def _cut(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     return data[: rng.randrange(len(data) + 1)]
 
 
@@ -80,7 +80,7 @@ def _number(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
 
 
 def _line(data: bytes, corpus: list[bytes], rng: random.Random) -> bytes:
-    """Drop, repeat or move a line, or take one from elsewhere."""
+    """Delete, repeat, indent, or replace a line."""
     lines = data.split(b"\n")
     at = rng.randrange(len(lines))
     other = rng.choice(rng.choice(corpus).split(b"\n"))
@@ -89,7 +89,7 @@ def _line(data: bytes, corpus: list[bytes], rng: random.Random) -> bytes:
 
 
 def _word(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
-    """Put one word in the place of another, wherever it stands."""
+    """Replace one or all occurrences of a word."""
     words = re.findall(rb"\w+", data)
     if not words:
         return data
@@ -97,5 +97,5 @@ def _word(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
 
 
 _MUTATIONS = (
-    _flip, _cut, _end, _repeat, _insert, _overwrite, _splice, _number, _number, _number, _line, _line, _word, _word,
+    _flip, _delete, _cut, _repeat, _insert, _overwrite, _splice, _number, _number, _number, _line, _line, _word, _word,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is fuzzed: a folder in which all files are sound but one, and the loader that a user would meet it through."""
+"""Fuzz targets: a folder in which exactly one file is damaged, and the function that loads it."""
 
 import contextlib
 import io
@@ -51,21 +51,21 @@ MAP = "image: {file}\nresolution: 0.05\norigin: [0, 0, 0]\n"
 
 @dataclass
 class Target:
-    """Files that are damaged, by name, the texts of those beside them, and what reads them.
+    """Files to damage, by name, the texts of other files in their folder, and the function that reads them.
 
-    `{file}` in a text is the name of the damaged one. `read` gives the problems that a user would see.
+    `{file}` in a text is the name of the damaged file. `read` returns the problems that a user would see.
     """
 
     files: dict[str, bytes]
-    beside: dict[str, str]
+    other_files: dict[str, str]
     read: Callable[[Path], list[Problem]]
     damage: Callable[[list[bytes], random.Random], tuple[int, bytes]] = field(default=mutant)
 
     def build(self, folder: Path, rng: random.Random) -> Path:
-        """Write a mutant and what it needs; the mutant's path."""
+        """Write a mutant and the files that it needs; return the path of the mutant."""
         names = list(self.files)
         index, data = self.damage(list(self.files.values()), rng)
-        for name, text in self.beside.items():
+        for name, text in self.other_files.items():
             (folder / name).write_text(text.replace("{file}", names[index]))
         for name in ("tent.stl", "room.pgm"):
             (folder / name).write_bytes(next(CORPUS.glob(f"*/{name}")).read_bytes())
@@ -75,7 +75,7 @@ class Target:
 
 
 def read_scenario(mutated: Path) -> list[Problem]:
-    """What `validate` says; what it accepts must be fit to be run."""
+    """Return the problems that `validate` reports; prepare the run if it accepts the file."""
     folder = mutated.parent
     file = mutated if mutated.name.endswith(".scenario.yaml") else folder / "a.scenario.yaml"
     variations, problems = FileChecker(folder).check_scenario(file)
@@ -85,7 +85,7 @@ def read_scenario(mutated: Path) -> list[Problem]:
 
 
 def read_log(path: Path) -> list[Problem]:
-    """What `judge` and `log recover` say."""
+    """Read a log like `judge` and `log recover`."""
     with contextlib.suppress(InvalidInput):
         recover(path)
     read = read_run(path)
@@ -96,7 +96,7 @@ def read_log(path: Path) -> list[Problem]:
 
 
 def damaged_log(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
-    """Half are damaged as bytes, which checksums notice; half inside their records, with checksums that fit."""
+    """Damage the bytes of 30 % of the logs, with wrong checksums; damage records of the others, with valid ones."""
     if rng.random() < 0.3:
         return mutant(corpus, rng)
     out = io.BytesIO()
@@ -108,7 +108,7 @@ def damaged_log(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
     def damaged(data: bytes) -> bytes:
         return mutant([data], rng)[1] if data and rng.random() < rate else data
 
-    with contextlib.suppress(KeyError, ValueError, struct.error, OverflowError):  # what cannot be written is no log
+    with contextlib.suppress(KeyError, ValueError, struct.error, OverflowError):  # such a mutant cannot be written
         for record in RecordReader(io.BytesIO(corpus[0])):
             match record:
                 case records.Schema():
@@ -132,7 +132,7 @@ def _corpus(name: str) -> dict[str, bytes]:
 
 
 def targets(log: bytes) -> dict[str, Target]:
-    """All of them; `log` is that of a short run."""
+    """Return all targets by name; `log` is the log of a short run."""
     world = {"a.scenario.yaml": SCENARIO.format(world="{file}", robot="turtlebot")}
     robot = {"a.scenario.yaml": SCENARIO.format(world=ROOM, robot="{file}")}
     urdf = {
@@ -156,7 +156,7 @@ def targets(log: bytes) -> dict[str, Target]:
 
 
 def check_problems(problems: list[Problem], mutated: Path) -> None:
-    """Each says what is wrong, in a file that is there, at a place that is in it."""
+    """Check that each problem has a message, a path, and a position inside the file."""
     for problem in problems:
         assert problem.message, problem
         assert problem.path, problem

@@ -27,13 +27,13 @@ def test_types_of_the_package_meet_their_contracts(yardwork, kind: str, name: st
 
 
 @pytest.mark.parametrize(
-    ("target", "told"),
+    ("target", "expected"),
     [("reversing=0.1", 3), ("reversing", "e.g. reversing=1.0"), ("dwell=3", "3 is not a JSON object")],
 )
-def test_a_bare_value_is_given_as_it_is_written(yardwork, target: str, told: int | str) -> None:
-    if isinstance(told, int):
-        assert len(promises_of_target(target)) == told
+def test_contract_test_target_takes_a_value_or_json(yardwork, target: str, expected: int | str) -> None:
+    if isinstance(expected, int):
+        assert len(promises_of_target(target)) == expected
         return
     with pytest.raises(InvalidTarget) as wrong:
         promises_of_target(target)
-    assert told in str(wrong.value)
+    assert expected in str(wrong.value)

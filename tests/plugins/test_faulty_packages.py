@@ -70,9 +70,9 @@ USES = {
 
 @pytest.fixture
 def run(packages, tmp_path):
-    """`run(kind, text)` drives two seconds with a package whose `mine` is of this kind and does this."""
+    """Return `run(kind, text)`: simulate 2 s with a component `mine` of this kind and with this code."""
 
-    def driven(kind: str, text: str, sensor: str = "lidar"):
+    def simulate_with(kind: str, text: str, sensor: str = "lidar"):
         packages("mines", "0.3", {kind: {"mine": "mine:Mine"}}, mine=f"{HEAD}\n\n{HEADS[kind]}{dedent(text)}\n")
         scenario, robot = USES[kind]
         (tmp_path / "r.robot.yaml").write_text(ROBOT % robot)
@@ -81,14 +81,14 @@ def run(packages, tmp_path):
         (tmp_path / "s.scenario.yaml").write_text((SCENARIO % scenario).replace("sensor: lidar", f"sensor: {sensor}"))
         return simulate(prepare(load_scenario(tmp_path / "s.scenario.yaml", tmp_path))).result
 
-    return driven
+    return simulate_with
 
 
 FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("return []", "it checked nothing (criterion `mine` of mines 0.3)"),
         ("return None", "it checked nothing"),
@@ -103,15 +103,15 @@ FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
         ("raise KeyError('gone')", "KeyError: 'gone' (criterion `mine` of mines 0.3)"),
     ],
 )
-def test_criterion_without_findings_makes_the_run_an_error(run, text: str, told: str) -> None:
+def test_criterion_without_findings_makes_the_run_an_error(run, text: str, message: str) -> None:
     result = run("criterion", text)
     assert result.outcome is Outcome.ERROR
-    assert result.error is not None and told in result.error.message
+    assert result.error is not None and message in result.error.message
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         (
             "return float(chr(110) + chr(97) + chr(110))",
@@ -122,21 +122,21 @@ def test_criterion_without_findings_makes_the_run_an_error(run, text: str, told:
         ("return 1 / 0", "metric mine: ZeroDivisionError: division by zero (metric `mine` of mines 0.3)"),
     ],
 )
-def test_nonnumeric_metric_makes_the_run_an_error(run, text: str, told: str) -> None:
+def test_nonnumeric_metric_makes_the_run_an_error(run, text: str, message: str) -> None:
     result = run("metric", text)
     assert result.outcome is Outcome.ERROR
-    assert result.error is not None and told in result.error.message
+    assert result.error is not None and message in result.error.message
 
 
 def test_undefined_metric_has_a_reason(run) -> None:
-    result = run("metric", "return 'nobody came'")
+    result = run("metric", "return 'no pedestrian'")
     assert result.outcome is Outcome.PASSED
-    assert (result.metrics["mine"], result.undefined["mine"]) == (None, "nobody came")
+    assert (result.metrics["mine"], result.undefined["mine"]) == (None, "no pedestrian")
 
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize(
-    ("kind", "text", "error", "told"),
+    ("kind", "text", "error", "message"),
     [
         (
             "trigger",
@@ -183,11 +183,11 @@ def test_undefined_metric_has_a_reason(run) -> None:
         ("sensor", "return Scan('extra', tick, np.ones(3), np.nan, 1., 0., 9.)", "broken-component", "is not finite"),
     ],
 )
-def test_invalid_result_of_a_component_is_an_error_with_its_name(run, kind, text, error, told) -> None:
+def test_invalid_result_of_a_component_is_an_error_with_its_name(run, kind, text, error, message) -> None:
     with pytest.raises(RunError) as raised:
         run(kind, text)
     assert raised.value.kind == error
-    assert told in str(raised.value)
+    assert message in str(raised.value)
 
 
 def test_invalid_command_from_a_fault_is_an_error_with_its_name(run) -> None:

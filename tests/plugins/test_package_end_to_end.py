@@ -30,7 +30,7 @@ sensors:
   imu: {imu: {}}
   ring: {sonar: {sensors: 6, mount: {z: 0.15}}}
 """
-DRIVE = """\
+SCENARIO = """\
 simscen: 1
 name: doorway
 world:
@@ -54,53 +54,53 @@ metrics:
 """
 
 
-def make(folder: Path) -> Path:
-    """A folder with a scenario that uses everything of the package."""
+def create_folder(folder: Path) -> Path:
+    """Create a folder with a scenario that uses all types of the package."""
     folder.mkdir()
     (folder / "yard.robot.yaml").write_text(ROBOT)
-    (folder / "door.scenario.yaml").write_text(DRIVE)
+    (folder / "door.scenario.yaml").write_text(SCENARIO)
     return folder
 
 
 @pytest.fixture
 def yard(tmp_path, monkeypatch, yardwork) -> Path:
-    """Such a folder to work in; the package comes by PYTHONPATH."""
-    monkeypatch.chdir(make(tmp_path / "work"))
+    """Change into such a folder, with the package on PYTHONPATH; return the folder."""
+    monkeypatch.chdir(create_folder(tmp_path / "work"))
     monkeypatch.setenv("PYTHONPATH", str(yardwork))
     return tmp_path / "work"
 
 
 def simscen(*arguments: str, cwd: Path | None = None, **more: str) -> subprocess.CompletedProcess[str]:
-    """Call the command in a process of its own."""
+    """Run the command in a new process."""
     env = {**os.environ, "COLUMNS": "100", **more}
     return subprocess.run([*SIMSCEN, *arguments], cwd=cwd, capture_output=True, text=True, check=False, env=env)
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory, lay_out) -> Path:
-    """What a run of the scenario left, for all tests that only look at it."""
-    top = tmp_path_factory.mktemp("front_door")
-    site = lay_out(Path(__file__).with_name("yardwork"), top / "site")
-    done = simscen("run", "door.scenario.yaml", "--out", "out", cwd=make(top / "work"), PYTHONPATH=str(site))
+def shared_out(tmp_path_factory, install_folder) -> Path:
+    """Return the output folder of a run of the scenario, for tests that do not change it."""
+    top = tmp_path_factory.mktemp("yard")
+    site = install_folder(Path(__file__).with_name("yardwork"), top / "site")
+    done = simscen("run", "door.scenario.yaml", "--out", "out", cwd=create_folder(top / "work"), PYTHONPATH=str(site))
     assert done.returncode == 0, done.stdout + done.stderr
     return top / "work" / "out"
 
 
 @pytest.fixture
-def ran(yard, once) -> Path:
-    """The folder with a copy of what the run left."""
-    shutil.copytree(once, yard / "out")
+def finished_yard(yard, shared_out) -> Path:
+    """Return the folder of `yard` with a copy of the run's output."""
+    shutil.copytree(shared_out, yard / "out")
     return yard
 
 
-def test_run_uses_types_of_the_package_and_reports_show_them(ran) -> None:
-    yard = ran
+def test_run_uses_types_of_the_package_and_reports_show_them(finished_yard) -> None:
+    yard = finished_yard
     log = read_log(yard / "out/runs/door/seed-1/run.mcap")
     result = json.loads((yard / "out/runs/door/seed-1/result.json").read_text())
-    told = {name: fact for name, fact in log.header.facts.items() if name.startswith("plugin.")}
+    facts = {name: fact for name, fact in log.header.facts.items() if name.startswith("plugin.")}
     kinds = ["action.turn_robot", "criterion.dwell", "fault.crosstalk", "metric.reversed_length", "sensor.sonar"]
     kinds.append("trigger.reversing")
-    assert told == {f"plugin.{kind}": "yardwork==1.2" for kind in kinds}
+    assert facts == {f"plugin.{kind}": "yardwork==1.2" for kind in kinds}
     packages = json.loads((yard / "out/run.json").read_text())["plugins"]
     used = [kind.replace(".", " ") for kind in kinds]
     assert packages == {"yardwork": {"version": "1.2", "used": used}}
@@ -115,16 +115,16 @@ def test_run_uses_types_of_the_package_and_reports_show_them(ran) -> None:
 
 @pytest.mark.slow
 def test_criterion_of_the_package_can_fail_with_a_margin(yard) -> None:
-    (yard / "door.scenario.yaml").write_text(DRIVE.replace("max: 30 s", "max: 0.5 s"))
+    (yard / "door.scenario.yaml").write_text(SCENARIO.replace("max: 30 s", "max: 0.5 s"))
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 1
     (failure,) = ET.parse(yard / "out/junit.xml").getroot().iter("failure")
     assert re.search(r"dwell: doorway: \d\.\d\d s > 0\.50 s", failure.get("message", "")), failure.attrib
 
 
-def test_readings_of_the_package_sensor_are_in_the_log(once) -> None:
+def test_readings_of_the_package_sensor_are_in_the_log(shared_out) -> None:
     from mcap.reader import make_reader
 
-    with (once / "runs/door/seed-1/run.mcap").open("rb") as stream:
+    with (shared_out / "runs/door/seed-1/run.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
         assert summary is not None
         topics = {channel.topic for channel in summary.channels.values()}
@@ -133,7 +133,7 @@ def test_readings_of_the_package_sensor_are_in_the_log(once) -> None:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize(
-    ("old", "new", "wrong", "told", "hint"),
+    ("old", "new", "wrong", "message", "hint"),
     [
         ("max: 30 s", "max: 30 m", "30 m", "`m` is a unit of length, but this is a duration", "units: s, ms"),
         ("region: doorway,", "region: dorway,", "dorway,", "no region of the world is called `dorway`", "`doorway`?"),
@@ -150,8 +150,8 @@ def test_readings_of_the_package_sensor_are_in_the_log(once) -> None:
         ("reversed_length:", "reversed_lenght:", "reversed_lenght", "unknown key", "did you mean `reversed_length`?"),
     ],
 )
-def test_mistake_is_reported_at_its_position_with_a_suggestion(yard, old, new, wrong, told, hint) -> None:
-    text = DRIVE.replace(old, new)
+def test_mistake_is_reported_at_its_position_with_a_suggestion(yard, old, new, wrong, message, hint) -> None:
+    text = SCENARIO.replace(old, new)
     (yard / "door.scenario.yaml").write_text(text)
     done = simscen("validate", "door.scenario.yaml")
     line = next(number for number, line in enumerate(text.splitlines(), 1) if new in line)
@@ -159,18 +159,18 @@ def test_mistake_is_reported_at_its_position_with_a_suggestion(yard, old, new, w
     place = f"{line}:{row.index(wrong, row.index(new) if wrong in new else 0) + 1}"
     assert (done.returncode, done.stderr) == (2, "")
     assert f"door.scenario.yaml:{place}: error" in done.stdout, done.stdout
-    assert told in done.stdout and hint in done.stdout
+    assert message in done.stdout and hint in done.stdout
 
 
 @pytest.mark.slow
 def test_schema_and_explain_include_the_package_but_committed_files_do_not(yard) -> None:
     schema = json.loads(simscen("schema", "scenario").stdout)
-    jsonschema.Draft7Validator(schema).validate(yaml.safe_load(DRIVE))
+    jsonschema.Draft7Validator(schema).validate(yaml.safe_load(SCENARIO))
     jsonschema.Draft7Validator(json.loads(simscen("schema", "robot").stdout)).validate(yaml.safe_load(ROBOT))
-    wrong = yaml.safe_load(DRIVE.replace("max: 30 s", "maximum: 30 s"))
+    wrong = yaml.safe_load(SCENARIO.replace("max: 30 s", "maximum: 30 s"))
     assert [list(error.path) for error in jsonschema.Draft7Validator(schema).iter_errors(wrong)] != []
-    told = simscen("explain", "dwell").stdout
-    assert "dwell (criterion of yardwork 1.2)" in told and "region: text (required)" in told
+    explained = simscen("explain", "dwell").stdout
+    assert "dwell (criterion of yardwork 1.2)" in explained and "region: text (required)" in explained
     page = simscen("explain", "--page").stdout
     assert "### `dwell`\n\nAdded by yardwork 1.2.\n\nThe robot leaves a region" in page
     assert "### `sonar`" in page and "### `reversed_length`" in page
@@ -193,7 +193,7 @@ def test_resume_repeats_runs_that_use_a_changed_package(yard, yardwork) -> None:
     assert (kept, journal.read_text().count('"event": "started"')) == (1, 2)
 
 
-def test_missing_package_is_reported_for_files_that_use_it(ran, yardwork) -> None:
+def test_missing_package_is_reported_for_files_that_use_it(finished_yard, yardwork) -> None:
     shutil.rmtree(yardwork)
     done = simscen("validate", "door.scenario.yaml")
     assert done.returncode == 2
@@ -201,13 +201,13 @@ def test_missing_package_is_reported_for_files_that_use_it(ran, yardwork) -> Non
     assert "`simscen plugins` lists what installed packages add" in done.stdout + done.stderr
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
-    told = "the run was judged with criterion `dwell` of yardwork==1.2, but it is not installed"
-    assert told in judged.stdout + judged.stderr
-    (ran / "mine.yaml").write_text("pass: [{goals_reached: {}}]\n")
+    message = "the run was judged with criterion `dwell` of yardwork==1.2, but it is not installed"
+    assert message in judged.stdout + judged.stderr
+    (finished_yard / "mine.yaml").write_text("pass: [{goals_reached: {}}]\n")
     assert simscen("judge", "out/runs/door/seed-1/run.mcap", "--scenario", "mine.yaml").returncode == 0
 
 
-def test_log_is_not_judged_by_another_package_version(ran, yardwork) -> None:
+def test_log_is_not_judged_by_another_package_version(finished_yard, yardwork) -> None:
     (yardwork / "yardwork-1.2.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: yardwork\nVersion: 2.0\n")
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
@@ -217,7 +217,7 @@ def test_log_is_not_judged_by_another_package_version(ran, yardwork) -> None:
 @pytest.mark.slow
 def test_log_is_judged_without_packages_needed_only_by_the_run(yard, yardwork) -> None:
     (yard / "door.scenario.yaml").write_text(
-        DRIVE.replace("  - dwell: {region: doorway, max: 30 s}\n", "").partition("metrics:")[0]
+        SCENARIO.replace("  - dwell: {region: doorway, max: 30 s}\n", "").partition("metrics:")[0]
     )
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
     shutil.rmtree(yardwork)

@@ -25,11 +25,11 @@ pass:
 
 
 @pytest.fixture
-def told(yardwork, tmp_path: Path, monkeypatch, capsys):
-    """`told(action)` validates a scenario whose goal is behind a wall, with an event that does this."""
+def validate(yardwork, tmp_path: Path, monkeypatch, capsys):
+    """Return `validate(action)`, for a scenario with a goal behind a wall and an event with this action."""
     from simscen.cli.main import main
 
-    def validate(action: str) -> tuple[int, str]:
+    def call(action: str) -> tuple[int, str]:
         (tmp_path / "s.scenario.yaml").write_text(SCENARIO % action)
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr("sys.argv", ["simscen", "validate", "s.scenario.yaml"])
@@ -37,19 +37,19 @@ def told(yardwork, tmp_path: Path, monkeypatch, capsys):
             main()
         return int(end.value.code or 0), capsys.readouterr().out
 
-    return validate
+    return call
 
 
-def test_shipped_actions_do_not_hide_errors(told) -> None:
-    code, text = told("{remove: {name: nothing}}")
+def test_shipped_actions_do_not_hide_errors(validate) -> None:
+    code, text = validate("{remove: {name: nothing}}")
     assert code == 2
-    code, text = told("{push: {impulse: [0, 2]}}")
+    code, text = validate("{push: {impulse: [0, 2]}}")
     assert code == 2
     assert "no event cancels a goal" in text
 
 
-def test_package_actions_turn_uncertain_errors_into_warnings(told) -> None:
-    code, text = told("{turn_robot: {by: 1}}")
+def test_package_actions_turn_uncertain_errors_into_warnings(validate) -> None:
+    code, text = validate("{turn_robot: {by: 1}}")
     assert code == 0, text
     assert "error[" not in text
     assert "unless an action of an installed package opens a route" in text

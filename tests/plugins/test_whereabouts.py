@@ -20,10 +20,10 @@ ISOLATED = (
 )
 
 
-def isolated(told: str, folder: Path) -> str:
-    """What a process finds that knows nothing of this one's environment but what it is told."""
+def isolated(path: str, folder: Path) -> str:
+    """Return the criteria and the index of `folder` in sys.path in an isolated process with this plugin path."""
     code = ISOLATED.replace("{0!r}", repr(str(folder)))
-    done = subprocess.run([sys.executable, "-I", "-c", code, told], capture_output=True, text=True, check=False, env={})
+    done = subprocess.run([sys.executable, "-I", "-c", code, path], capture_output=True, text=True, check=False, env={})
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
@@ -33,49 +33,49 @@ def test_no_package_folders_are_passed_without_package_types() -> None:
 
 
 def test_package_folders_are_appended_to_the_path(yardwork) -> None:
-    (told,) = plugin_path_arguments(installed("criterion"))
-    found, place = isolated(told, yardwork).rsplit(" ", 1)
+    (argument,) = plugin_path_arguments(installed("criterion"))
+    found, index = isolated(argument, yardwork).rsplit(" ", 1)
     assert found == "[('1.2', 'yardwork.dwell')]"
-    assert int(place) > 2
+    assert int(index) > 2
 
 
 def test_user_site_packages_and_pth_files_are_found(tmp_path, packages) -> None:
-    """As an editable installation in the user's site-packages lies there."""
+    """Editable installations in the user's site-packages consist of .pth files."""
     from_home, source = tmp_path / "home", tmp_path / "source"
-    lay = packages.lay  # type: ignore[attr-defined]
+    install = packages.install  # type: ignore[attr-defined]
     text = "from simscen.core.records.verdict import Finding\nfrom simscen.criteria.base import Criterion\n"
     text += "from simscen.spec.base import Spec\n"
     text += "class Mine(Spec, Criterion):\n    def judge(self, trace, case): return []\n"
-    lay(source, "elsewhere", "0", {}, mine=text)
-    lay(from_home, "mine", "3.0", {"criterion": {"mine": "mine:Mine"}})
+    install(source, "elsewhere", "0", {}, mine=text)
+    install(from_home, "mine", "3.0", {"criterion": {"mine": "mine:Mine"}})
     (from_home / "mine.pth").write_text(f"{source}\n")
     used = [["mine", str(from_home)]]
-    told = json.dumps({"path": [str(from_home)], "user": str(from_home), "used": used})
-    assert isolated(told, from_home).startswith("[('3.0', 'mine')]")
+    argument = json.dumps({"path": [str(from_home)], "user": str(from_home), "used": used})
+    assert isolated(argument, from_home).startswith("[('3.0', 'mine')]")
 
 
 def test_validated_version_of_a_package_is_used(tmp_path, packages) -> None:
-    lay, old, new = packages.lay, tmp_path / "old", tmp_path / "new"  # type: ignore[attr-defined]
+    install, old, new = packages.install, tmp_path / "old", tmp_path / "new"  # type: ignore[attr-defined]
     for folder, version in ((old, "1.0"), (new, "2.0")):
         text = (ROOT / "tests/plugins/yardwork/yardwork/dwell.py").read_text()
-        lay(folder, "yard", version, {"criterion": {"dwell": "dwell:Dwell"}}, dwell=text)
-    told = json.dumps({"path": [str(old), str(new)], "user": "", "used": [["yard", str(new)]]})
-    assert isolated(told, new) == "[('2.0', 'dwell')] 0"
+        install(folder, "yard", version, {"criterion": {"dwell": "dwell:Dwell"}}, dwell=text)
+    argument = json.dumps({"path": [str(old), str(new)], "user": "", "used": [["yard", str(new)]]})
+    assert isolated(argument, new) == "[('2.0', 'dwell')] 0"
 
 
 def test_working_folder_is_not_on_the_worker_path(yardwork, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
-    (told,) = plugin_path_arguments(
+    (argument,) = plugin_path_arguments(
         [Entry("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
     )
-    assert str(tmp_path) not in json.loads(told)["path"]
-    assert str(yardwork) in json.loads(told)["path"]
+    assert str(tmp_path) not in json.loads(argument)["path"]
+    assert str(yardwork) in json.loads(argument)["path"]
 
 
 @pytest.mark.slow
-def test_pip_installs_what_the_tests_lay_out(tmp_path, yardwork) -> None:
-    """The fixture that lays packages out leaves what an installer leaves."""
+def test_pip_installs_the_same_files_as_the_fixture(tmp_path, yardwork) -> None:
+    """The fixture `install_folder` writes the same files as pip."""
     call = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
     folder, target = ROOT / "tests/plugins/yardwork", tmp_path / "target"
     done = subprocess.run([*call, "--target", str(target), str(folder)], capture_output=True, text=True, check=False)
@@ -83,7 +83,7 @@ def test_pip_installs_what_the_tests_lay_out(tmp_path, yardwork) -> None:
     code = (
         "from simscen.spec.registry import GROUPS, installed; print(*(e.value for g in GROUPS for e in installed(g)))"
     )
-    env = {**os.environ, "PYTHONPATH": f"{target}{os.pathsep}{ROOT}"}
+    env = {**os.environ, "PYTHONPATH": f"{target}{os.pathep}{ROOT}"}
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env).stdout
     assert found.split() == [
         entry.value

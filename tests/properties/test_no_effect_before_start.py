@@ -57,8 +57,8 @@ events:%s
 pass: [{collisions: {max: 5}}]
 """
 NEVER = "when: {time: 1 s, probability: 0}, required: false"
-LONG = 2.5
-"""Seconds of the run without any disturbance, which all others are compared with."""
+UNDISTURBED_S = 2.5
+"""Duration of the run without disturbances that all others are compared with."""
 
 VALUES = {
     ("noise", "Odometry"): "{linear: 5 cm, angular: 5 deg}",
@@ -76,9 +76,9 @@ VALUES = {
     ("gain", "Command"): "{linear: 80 %}",
     ("saturation", "Command"): "{linear: 0.2 m/s, angular_acceleration: 0.5}",
 }
-"""What stands under a fault where its docstring's example is for another kind of instance."""
+"""Values of faults with a docstring example for another kind of target."""
 ACTIONS: dict[str, str] = {}
-"""What stands under `do` where the docstring's example is about another world."""
+"""Values of `do` for actions with a docstring example for another world."""
 
 
 def example(choice: type[Choice], key: str) -> str:
@@ -97,7 +97,7 @@ def fault_example(word: str, kind: str) -> str:
 
 def kinds_of(word: str) -> list[str]:
     affects = annotation_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
-    return sorted(affects - {MAP})  # what befalls the map befalls the whole run
+    return sorted(affects - {MAP})  # a fault of the map lasts for the whole run
 
 
 NAMES = {kind: name for name, kind in KIND_BY_TARGET_NAME.items()}
@@ -124,15 +124,15 @@ def play(tmp_path_factory):
         loaded = load_scenario(file, Path(folder))
         scope = NameScope(loaded)
         assert [*unknown_sensors(scope), *unsuitable_faults(scope)] == []
-        heard = Heard()
-        simulate(prepare(loaded), 3, attach=lambda rig, logs: [heard])
-        return heard.moments
+        log = MomentLog()
+        simulate(prepare(loaded), 3, attach=lambda rig, logs: [log])
+        return log.moments
 
     return play
 
 
-class Heard:
-    """A log that keeps the moments."""
+class MomentLog:
+    """A log that keeps all moments in memory."""
 
     def __init__(self) -> None:
         self.moments: list[Moment] = []
@@ -142,35 +142,35 @@ class Heard:
 
 
 @pytest.fixture(scope="module")
-def quiet(play):
-    """The runs with nothing in them, by whether the door is shut at first."""
-    return {shut: play([], [], LONG, shut) for shut in (True, False)}
+def undisturbed(play):
+    """Return the moments of runs without disturbances, by whether the door is closed at the start."""
+    return {shut: play([], [], UNDISTURBED_S, shut) for shut in (True, False)}
 
 
-def same(one: Any, other: Any) -> bool:
-    """Whether two things are the same to the last bit."""
+def is_identical(one: Any, other: Any) -> bool:
+    """Return whether two objects are bit-identical."""
     if type(one) is not type(other):
         return False
     if isinstance(one, np.ndarray):
         return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
-    if isinstance(one, Moment):  # a sample that waits until somebody looks is the one that was made at once
+    if isinstance(one, Moment):  # compare samples that are computed on first access by their values
         one, other = (replace(each, sample=each.truth) for each in (one, other))
     if is_dataclass(one):
-        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+        return all(is_identical(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
     if isinstance(one, list | tuple):
-        return len(one) == len(other) and all(map(same, one, other))
+        return len(one) == len(other) and all(map(is_identical, one, other))
     if isinstance(one, dict):
-        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+        return list(one) == list(other) and all(is_identical(one[key], other[key]) for key in one)
     return repr(one) == repr(other)
 
 
-def begun(moments: list[Moment], kind: EventKind) -> int:
-    """The tick at which the disturbance began."""
+def first_tick_of(moments: list[Moment], kind: EventKind) -> int:
+    """Return the tick of the first event of a kind."""
     return next(event.tick for moment in moments for event in moment.events if event.kind is kind)
 
 
-def drawn(name: str) -> float:
-    """A time of its own for each word: the same in each run of the tests."""
+def random_time(name: str) -> float:
+    """Return a random time in s for a name, which is the same in each test run."""
     return round(random.Random(name).uniform(0.6, 1.4), 3)
 
 
@@ -178,38 +178,38 @@ def at(seconds: float) -> str:
     return f"when: {{time: {seconds} s}}"
 
 
-def assert_the_same_until(moments: list[Moment], other: list[Moment], tick: int) -> None:
+def assert_identical_until(moments: list[Moment], other: list[Moment], tick: int) -> None:
     before = [moment for moment in other if moment.tick < tick]
     assert before
     for moment, known in zip(moments, before, strict=False):
-        assert same(moment, known), f"tick {moment.tick}"
+        assert is_identical(moment, known), f"tick {moment.tick}"
 
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
-def test_run_is_unchanged_until_a_fault_starts(play, quiet, name: str, fault: str) -> None:
-    start = drawn(name)
+def test_run_is_unchanged_until_a_fault_starts(play, undisturbed, name: str, fault: str) -> None:
+    start = random_time(name)
     moments = play([fault.replace("WHEN", at(start))], [], start + 0.3)
-    assert_the_same_until(moments, quiet[True], begun(moments, EventKind.FAULT_STARTED))
+    assert_identical_until(moments, undisturbed[True], first_tick_of(moments, EventKind.FAULT_STARTED))
 
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "event"), EVENTS, ids=[name for name, _ in EVENTS])
-def test_run_is_unchanged_until_an_event_starts(play, quiet, name: str, event: str) -> None:
-    start, shut = drawn(name), name != "close"
+def test_run_is_unchanged_until_an_event_starts(play, undisturbed, name: str, event: str) -> None:
+    start, shut = random_time(name), name != "close"
     moments = play([], [event.replace("WHEN", at(start))], start + 0.1, shut)
-    assert_the_same_until(moments, quiet[shut], begun(moments, EventKind.EVENT_STARTED))
+    assert_identical_until(moments, undisturbed[shut], first_tick_of(moments, EventKind.EVENT_STARTED))
 
 
-def test_entries_that_never_start_do_not_change_the_run(play, quiet) -> None:
+def test_entries_that_never_start_do_not_change_the_run(play, undisturbed) -> None:
     moments = play(
         [fault.replace("WHEN", NEVER) for _, fault in FAULTS],
         [event.replace("WHEN", NEVER) for _, event in EVENTS],
-        LONG,
+        UNDISTURBED_S,
     )
-    assert len(moments) == len(quiet[True])
-    for moment, known in zip(moments, quiet[True], strict=True):
-        assert same(moment, known), f"tick {moment.tick}"
+    assert len(moments) == len(undisturbed[True])
+    for moment, known in zip(moments, undisturbed[True], strict=True):
+        assert is_identical(moment, known), f"tick {moment.tick}"
 
 
 MAPS = [
@@ -218,19 +218,19 @@ MAPS = [
 
 
 @pytest.mark.parametrize("word", MAPS)
-def test_map_fault_applies_from_the_first_cycle(play, quiet, word: str) -> None:
+def test_map_fault_applies_from_the_first_cycle(play, undisturbed, word: str) -> None:
     moments = play([f"{{sensor: map, {word}: {fault_example(word, MAP)}}}"], [], 0.2)
-    assert begun(moments, EventKind.FAULT_STARTED) == begun(moments, EventKind.FAULT_TOOK_EFFECT) == 0
+    assert first_tick_of(moments, EventKind.FAULT_STARTED) == first_tick_of(moments, EventKind.FAULT_TOOK_EFFECT) == 0
 
 
 def test_fault_without_messages_leaves_the_run_unchanged(play) -> None:
-    """A delay at a time at which no message is due changes no bit of the rest."""
+    """A delay at a time at which no message is due leaves the run bit-identical."""
     fault = "{sensor: lidar, delay: {latency: 50 ms}, when: {time: 1.01 s}, for: 0.02 s, required: false}"
     plain, late = play([], [], 2.0), play([fault], [], 2.0)
-    told = [
+    without_fault_events = [
         replace(moment, events=tuple(e for e in moment.events if not e.kind.startswith("fault."))) for moment in late
     ]
-    assert all(map(same, told, plain))
+    assert all(map(is_identical, without_fault_events, plain))
 
 
 def test_every_fault_is_tested_on_each_target(play, tmp_path: Path) -> None:

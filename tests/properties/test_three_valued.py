@@ -33,50 +33,50 @@ def some(truths):
 
 
 class Oracle:
-    """Three-valued truth of formulas on a run of one sample a second that came to its end."""
+    """Three-valued truth of formulas on a complete run with one sample per second."""
 
     def __init__(self, p, q):
         self.signals, self.count = {"clearance": p, "yaw_rate": q}, len(p)
 
     def windowed(self, truth, k, part):
-        """The truths in the window of sample k; one that is not known beyond the end."""
-        begin, end = part.get("between", (0, None))
+        """Return the truths in the window of sample k, which are UNKNOWN beyond the end of the run."""
+        start, end = part.get("between", (0, None))
         last = self.count - 1 if end is None else k + end
-        inside = [truth(j) if j < self.count else UNKNOWN for j in range(k + begin, last + 1)]
+        inside = [truth(j) if j < self.count else UNKNOWN for j in range(k + start, last + 1)]
         return inside or [UNKNOWN]
 
-    def truth(self, formula, k, begin):
-        """The truth of a formula at sample k, where `begin` is the first sample at which it counts."""
+    def truth(self, formula, k, start):
+        """Return the truth of a formula at sample k; it is evaluated from the sample `start` on."""
         match formula:
             case {"signal": signal, "op": op, "value": value}:
                 return COMPARE[op](self.signals[signal][k], value)
             case {"all": parts}:
-                return every(self.truth(part, k, begin) for part in parts)
+                return every(self.truth(part, k, start) for part in parts)
             case {"any": parts}:
-                return some(self.truth(part, k, begin) for part in parts)
+                return some(self.truth(part, k, start) for part in parts)
             case {"not": part}:
-                return negated(self.truth(part, k, begin))
+                return negated(self.truth(part, k, start))
             case {"whenever": premise, "then": answer}:
-                return self.response(premise, answer, k, begin)
+                return self.response(premise, answer, k, start)
             case {"until": {"hold": hold, "release": release, "between": [a, b]}}:
-                later = begin + a
+                later = start + a
                 return some(
-                    every([self.at(release, j, later), *(self.at(hold, i, begin) for i in range(k, j))])
+                    every([self.at(release, j, later), *(self.at(hold, i, start) for i in range(k, j))])
                     for j in range(k + a, k + b + 1)
                 )
         ((operator, part),) = formula.items()
-        later = begin + part.get("between", (0, None))[0]
+        later = start + part.get("between", (0, None))[0]
         combine = every if operator == "always" else some
         return combine(self.windowed(lambda j: self.truth(inner(part), j, later), k, part))
 
-    def at(self, formula, k, begin):
-        return self.truth(formula, k, begin) if k < self.count else UNKNOWN
+    def at(self, formula, k, start):
+        return self.truth(formula, k, start) if k < self.count else UNKNOWN
 
-    def response(self, premise, answer, k, begin):
-        """Undecided, if nothing contradicts it, as long as the premise was never known to be true."""
-        tested = any(self.truth(premise, j, begin) is True for j in range(begin, self.count))
+    def response(self, premise, answer, k, start):
+        """Return the truth of a response: UNKNOWN instead of True if the premise was never known to be true."""
+        tested = any(self.truth(premise, j, start) is True for j in range(start, self.count))
         truth = every(
-            some([negated(self.truth(premise, j, begin)), self.truth(answer, j, begin)]) for j in range(k, self.count)
+            some([negated(self.truth(premise, j, start)), self.truth(answer, j, start)]) for j in range(k, self.count)
         )
         return UNKNOWN if truth is True and not tested else truth
 

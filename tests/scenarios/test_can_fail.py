@@ -1,6 +1,6 @@
 """Tests that each shipped scenario can fail: with a broken stack, without its disturbance, or with a tighter bound.
 
-How is in can_fail/, a file for each theme: under the criterion that must then fail, new values by path into the YAML.
+can_fail/ has a file for each theme. For each criterion that must fail, it has new values by path in the YAML.
 """
 
 import copy
@@ -19,14 +19,14 @@ from simscen.run.simulate import simulate
 ROOT = Path(__file__).parents[2]
 FOLDER = Path(__file__).with_name("can_fail")
 CHANGES = {
-    f"{file.stem}/{name}": [next(iter(way.items())) for way in ways]
+    f"{file.stem}/{name}": [next(iter(change.items())) for change in entries]
     for file in sorted(FOLDER.glob("*.yaml"))
-    for name, ways in yaml.safe_load(file.read_text()).items()
+    for name, entries in yaml.safe_load(file.read_text()).items()
 }
-WAYS = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
+ALL_CHANGES = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
 CASES = [
-    pytest.param(*way, id=f"{way[0]}:{way[1]}", marks=[pytest.mark.slow] if number % 24 else [])
-    for number, way in enumerate(WAYS)
+    pytest.param(*change, id=f"{change[0]}:{change[1]}", marks=[pytest.mark.slow] if number % 24 else [])
+    for number, change in enumerate(ALL_CHANGES)
 ]
 """`make test` runs every 24th case, `make test-all` all of them, which takes as long as all scenarios twice."""
 
@@ -40,7 +40,7 @@ def test_every_shipped_scenario_is_in_the_table():
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("scenario", "criterion", "changes"), CASES)
 def test_a_broken_scenario_fails_for_the_stated_reason(scenario, criterion, changes, tmp_path):
-    result = run(changed(scenario, changes), scenario, tmp_path)
+    result = run(changed_scenario(scenario, changes), scenario, tmp_path)
     assert result.outcome is Outcome.FAILED
     statuses = {verdict.status for verdict in result.verdicts if verdict.criterion == criterion}
     assert Status.FAIL in statuses, [(verdict.id, verdict.status.value) for verdict in result.verdicts]
@@ -56,10 +56,10 @@ Loader.yaml_implicit_resolvers = {
 }
 
 
-def changed(scenario: str, changes) -> dict:
+def changed_scenario(scenario: str, changes) -> dict:
     text = (ROOT / "scenarios" / f"{scenario}.scenario.yaml").read_text()
     spec = copy.deepcopy(yaml.load(text, Loader))
-    spec.pop("variations", None)  # as it is without them, it can be changed as any other
+    spec.pop("variations", None)  # the changes apply to the scenario without variations
     for path, value in changes.items():
         *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
         place = spec

@@ -29,7 +29,7 @@ simscen: 1
 world:
   simscen: 1
   walls: [{name: outer wall, points: [[0, 0], [7, 0], [7, 4], [0, 4], [0, 0]]}]
-  obstacles: [{name: thing, %s}]
+  obstacles: [{name: obstacle, %s}]
 robot: {model: waiter.robot.yaml, pose: {x: 1, y: 2}}
 stack: {localizer: {type: ground_truth}}
 goals: [{pose: {x: 6, y: 2}, timeout: 30 s}]
@@ -42,16 +42,16 @@ LOW_BOX = "box: [0.3, 0.5, 0.12], pose: {x: 3.5, y: 2}"
 TABLE_TOP = "box: [0.4, 0.6, 0.05], z: 0.5, pose: {x: 3.5, y: 2}"
 
 
-def outcome(tmp_path: Path, thing: str, camera: bool) -> dict[str, str]:
-    """Of each criterion its status."""
+def outcome(tmp_path: Path, obstacle: str, camera: bool) -> dict[str, str]:
+    """Return the status of each criterion."""
     (tmp_path / "waiter.robot.yaml").write_text(ROBOT + camera * CAMERA)
     file = tmp_path / "own.scenario.yaml"
-    file.write_text(SCENARIO % thing)
+    file.write_text(SCENARIO % obstacle)
     return {v.criterion: v.status.value for v in simulate(prepare(load_scenario(file, tmp_path))).result.verdicts}
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("thing", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
-def test_depth_camera_prevents_a_collision_that_the_lidar_misses(tmp_path: Path, thing: str) -> None:
-    assert outcome(tmp_path, thing, camera=False)["collisions"] == "fail"
-    assert outcome(tmp_path, thing, camera=True) == {"goals_reached": "pass", "collisions": "pass"}
+@pytest.mark.parametrize("obstacle", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
+def test_depth_camera_prevents_a_collision_that_the_lidar_misses(tmp_path: Path, obstacle: str) -> None:
+    assert outcome(tmp_path, obstacle, camera=False)["collisions"] == "fail"
+    assert outcome(tmp_path, obstacle, camera=True) == {"goals_reached": "pass", "collisions": "pass"}

@@ -37,13 +37,13 @@ pass: [{goals_reached: {}}]
         "`south of the door` and `north of the door` at (3.95, 2.00) on the shortest path: "
         "0.10 m are left, the robot is 0.44 m wide",
     ),
-    "a robot that was carried off": (
+    "a kidnapped robot": (
         """\
-events: [{name: carried off, when: {travelled: 1 m}, do: {kidnap: {pose: {x: 5, y: 1}}}}]
+events: [{name: kidnapped, when: {travelled: 1 m}, do: {kidnap: {pose: {x: 5, y: 1}}}}]
 pass: [{localization_error: {max: 0.5 m}}]
 """,
         "localization_error",
-        "why: event `carried off` had moved the robot elsewhere ",
+        "why: event `kidnapped` had moved the robot elsewhere ",
     ),
     "a box dropped before a robot at speed": (
         """\

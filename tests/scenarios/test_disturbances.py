@@ -25,15 +25,15 @@ pass: [{goals_reached: {}}]
 
 
 def run(text: str, folder: Path) -> tuple[RunResult, dict[str, str]]:
-    """The result, and of each event and fault what became of it, after a + where it happened and a - where not."""
+    """Simulate; return the result and the effect of each event and fault, with "+" if it happened, else "-"."""
     file = folder / "own.scenario.yaml"
     file.write_text(HEAD + text)
     result = simulate(prepare(load_scenario(file, folder))).result
     return result, {one.disturbance.name: f"{'-+'[one.happened]} {one.effect}" for one in result.disturbances}
 
 
-def complaints(result: RunResult) -> dict[str, int]:
-    """The ids of what failed, and the lines they are written in."""
+def failed_lines(result: RunResult) -> dict[str, int]:
+    """Return the ids of failed verdicts, and their lines in the scenario."""
     pairs = zip(result.verdicts, result.lines, strict=True)
     return {verdict.id: line for verdict, line in pairs if verdict.status.value != "pass"}
 
@@ -41,19 +41,19 @@ def complaints(result: RunResult) -> dict[str, int]:
 ACTIONS = """\
 events:
   - {name: far away, when: {robot_within: {of: [50, 50], distance: 1 m}}, do: {push: {impulse: [0, 1]}}}
-  - {name: remove what never was, when: {time: 1 s}, do: {remove: {name: later}}}
+  - {name: remove a missing object, when: {time: 1 s}, do: {remove: {name: later}}}
   - {name: remove, when: {time: 1 s}, do: {remove: {name: bin}}}
   - {name: remove again, when: {time: 2 s}, do: {remove: {name: bin}}}
-  - {name: move what is gone, when: {time: 2 s}, do: {move: {name: bin, through: [[5, 1]], speed: 1}}}
+  - {name: move a removed object, when: {time: 2 s}, do: {move: {name: bin, through: [[5, 1]], speed: 1}}}
   - {name: spawn, when: {time: 2 s}, do: {spawn: {name: crate, box: [0.2, 0.2, 0.3], pose: {x: 5.5, y: 3.5}}}}
   - {name: move, when: {time: 3 s}, do: {move: {name: crate, through: [[5.5, 3]], speed: 1}}}
-  - {name: move to where it is, when: {time: 5 s}, do: {move: {name: crate, through: [[5.5, 3]], speed: 1}}}
-  - {name: shut what is shut, when: {time: 1 s}, do: {close: {name: hatch}}}
+  - {name: move to the same place, when: {time: 5 s}, do: {move: {name: crate, through: [[5.5, 3]], speed: 1}}}
+  - {name: close a closed door, when: {time: 1 s}, do: {close: {name: hatch}}}
   - {name: open, when: {time: 2 s}, do: {open: {name: hatch}}}
-  - {name: open what is open, when: {time: 5 s}, do: {open: {name: hatch}}}
+  - {name: open an open door, when: {time: 5 s}, do: {open: {name: hatch}}}
   - {name: no push, when: {time: 1 s}, do: {push: {impulse: [0, 0]}}}
   - {name: push, when: {time: 1 s}, do: {push: {impulse: [0, 0.5]}}}
-  - {name: kidnapped to where it is, when: {time: 0 s}, do: {kidnap: {pose: {x: 1, y: 1}}}}
+  - {name: kidnapped to the same place, when: {time: 0 s}, do: {kidnap: {pose: {x: 1, y: 1}}}}
   - {name: kidnapped, when: {time: 0 s}, do: {kidnap: {pose: {x: 1, y: 1.2}}}}
   - name: no plan to spawn on
     when: {goal: {status: reached}}
@@ -65,19 +65,19 @@ events:
 
 
 def test_event_happens_if_each_action_has_an_effect(tmp_path):
-    result, told = run(ACTIONS, tmp_path)
+    result, effects = run(ACTIONS, tmp_path)
     happened = {"remove", "spawn", "move", "open", "push", "kidnapped"}
-    assert {name for name, effect in told.items() if effect.startswith("+")} == happened
+    assert {name for name, effect in effects.items() if effect.startswith("+")} == happened
     assert result.outcome is Outcome.FAILED
     lines = (HEAD + ACTIONS).split("\n")
-    line = {name: next(k for k, text in enumerate(lines, 1) if f"name: {name}," in f"{text},") for name in told}
-    assert complaints(result) == {name: line[name] for name in told if name not in {*happened, "second time"}}
-    assert told["remove"] == "+ removed bin"
-    assert told["move to where it is"] == "- crate is already at its waypoint"
-    assert told["open what is open"] == "- hatch was already open"
-    assert told["nothing to cancel"] == "- the robot had no goal"
-    assert told["no plan to spawn on"].endswith("because the robot had no plan")
-    assert told["far away"].startswith("- it never began; the run ended at t = ")
+    line = {name: next(k for k, text in enumerate(lines, 1) if f"name: {name}," in f"{text},") for name in effects}
+    assert failed_lines(result) == {name: line[name] for name in effects if name not in {*happened, "second time"}}
+    assert effects["remove"] == "+ removed bin"
+    assert effects["move to the same place"] == "- crate is already at its waypoint"
+    assert effects["open an open door"] == "- hatch was already open"
+    assert effects["nothing to cancel"] == "- the robot had no goal"
+    assert effects["no plan to spawn on"].endswith("because the robot had no plan")
+    assert effects["far away"].startswith("- it never began; the run ended at t = ")
 
 
 FAULTS = """\
@@ -87,24 +87,24 @@ faults:
   - {sensor: odom, name: before it drives, bias: {linear_scale: 1.5}, for: 0.025 s}
   - {sensor: odom, slip: {left: 5 %}, when: {time: 2 s}}
   - {sensor: lidar, dropout: {probability: 0.001 %}}
-  - {sensor: lidar, name: dead, off: {}, when: {time: 4 s}, for: 1 s}
-  - {sensor: lidar, name: noise of the dead, noise: {std: 1 cm}, when: {time: 4 s}, for: 1 s}
+  - {sensor: lidar, name: lidar off, off: {}, when: {time: 4 s}, for: 1 s}
+  - {sensor: lidar, name: noise while off, noise: {std: 1 cm}, when: {time: 4 s}, for: 1 s}
   - {sensor: lidar, name: noise, noise: {std: 1 cm}, when: {time: 5 s}, for: 1 s}
   - {sensor: lidar, name: to the end, off: {}, when: {time: 6 s}}
 """
 
 
 def test_fault_happens_if_it_changes_a_message_or_command(tmp_path):
-    result, told = run(FAULTS, tmp_path)
-    assert {name for name, effect in told.items() if effect.startswith("+")} == {
-        "one message", "odom.slip", "dead", "noise", "to the end",
+    result, effects = run(FAULTS, tmp_path)
+    assert {name for name, effect in effects.items() if effect.startswith("+")} == {
+        "one message", "odom.slip", "lidar off", "noise", "to the end",
     }  # fmt: skip
-    assert told["one message"] == "+ disturbed lidar once, first at t = 3.00 s"
-    assert told["dead"] == "+ disturbed lidar 10 times"
-    assert told["noise of the dead"] == "- it changed no message of lidar from t = 4.00 s to t = 5.00 s"
-    assert set(complaints(result)) >= {"before it drives", "lidar.dropout", "noise of the dead"}
-    assert "lidar.off" in told
-    assert "lidar.off" not in complaints(result), "it may stay away"
+    assert effects["one message"] == "+ disturbed lidar once, first at t = 3.00 s"
+    assert effects["lidar off"] == "+ disturbed lidar 10 times"
+    assert effects["noise while off"] == "- it changed no message of lidar from t = 4.00 s to t = 5.00 s"
+    assert set(failed_lines(result)) >= {"before it drives", "lidar.dropout", "noise while off"}
+    assert "lidar.off" in effects
+    assert "lidar.off" not in failed_lines(result), "it is optional"
 
 
 def test_event_in_the_last_cycle_did_not_happen(tmp_path):
@@ -113,12 +113,13 @@ events: [{name: too late, when: {time: 19.996 s}, do: {push: {impulse: [0, 1]}}}
 faults: [{sensor: lidar, off: {}, when: {time: 19.996 s}}]
 linger: 60
 """
-    result, told = run(text, tmp_path)
-    assert complaints(result).keys() == {"too late", "lidar.off"}
-    assert told["too late"] == told["lidar.off"] == "- it began only when the run ended at t = 20.00 s (time limit)"
+    result, effects = run(text, tmp_path)
+    assert failed_lines(result).keys() == {"too late", "lidar.off"}
+    late = "- it began only when the run ended at t = 20.00 s (time limit)"
+    assert effects["too late"] == effects["lidar.off"] == late
 
 
-CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{push: {{impulse: [0, 0.1]}}}}{}}}]\n"
+RANDOM = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{push: {{impulse: [0, 0.1]}}}}{}}}]\n"
 
 
 @pytest.mark.parametrize(
@@ -126,36 +127,36 @@ CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{pu
     [("1 %", "", Outcome.FAILED), ("1 %", ", required: false", Outcome.PASSED), ("99 %", "", Outcome.PASSED)],
 )
 def test_event_excluded_by_probability_did_not_happen(probability, required, outcome, tmp_path):
-    result, _ = run(CHANCE.format(probability, required), tmp_path)
+    result, _ = run(RANDOM.format(probability, required), tmp_path)
     assert result.outcome is outcome
 
 
-STORIES = """\
+SEQUENCES = """\
 events:
-  - name: a story
+  - name: sequence
     when: {time: 1 s}
     do: {push: {impulse: [0, 0.01]}}
     then:
       - {when: {time: 500 ms}}
       - {when: {collision: {}}, do: {remove: {name: bin}}}
       - {name: the end, when: {time: 1 s}, do: {open: {name: hatch}}}
-      - {name: may stay away, do: {close: {name: hatch}}, required: false}
+      - {name: optional step, do: {close: {name: hatch}}, required: false}
   - name: another
     when: {time: 2 s}
     required: false
     then:
       - {name: never, when: {collision: {}}}
-      - {name: nor this, do: {push: {impulse: [1, 0]}}}
-      - {name: but this should, do: {push: {impulse: [1, 0]}}, required: true}
+      - {name: skipped step, do: {push: {impulse: [1, 0]}}}
+      - {name: required step, do: {push: {impulse: [1, 0]}}, required: true}
 """
 
 
 def test_stopped_sequence_fails_at_the_pending_step(tmp_path: Path) -> None:
-    result, told = run(STORIES, tmp_path)
-    assert complaints(result) == {"a story then 2": 18, "but this should": 27}
-    since = "it was due from t = 1.50 s, after a story then 1; it never began"
-    assert told["a story then 1"] == "+ its trigger fired"
-    assert told["a story then 2"].startswith(f"- {since}")
-    assert told["the end"].startswith("- it was not due, because a story then 2 had not happened; it never began")
-    assert told["but this should"].startswith("- it was not due, because never had not happened")
+    result, effects = run(SEQUENCES, tmp_path)
+    assert failed_lines(result) == {"sequence then 2": 18, "required step": 27}
+    since = "it was due from t = 1.50 s, after sequence then 1; it never began"
+    assert effects["sequence then 1"] == "+ its trigger fired"
+    assert effects["sequence then 2"].startswith(f"- {since}")
+    assert effects["the end"].startswith("- it was not due, because sequence then 2 had not happened; it never began")
+    assert effects["required step"].startswith("- it was not due, because never had not happened")
     assert result.outcome is Outcome.FAILED

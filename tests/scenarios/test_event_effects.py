@@ -31,10 +31,10 @@ linger: 6
 events:
   - {name: away, when: {time: 1 s}, do: {teleport: {name: crate, pose: {x: 6.5, y: 3, yaw: 45 deg}}}}
   - {name: pushed, when: {time: 1 s}, do: {push: {name: bin, force: [0, 60], for: 0.5 s}}}
-  - {name: gone, when: {time: 1 s}, do: {push: {name: crate, impulse: [0, 5]}}, required: false}
+  - {name: no mass, when: {time: 1 s}, do: {push: {name: crate, impulse: [0, 5]}}, required: false}
   - {name: waits, when: {time: 1 s}, do: {stop: {name: cart, for: 1 s}}}
-  - {name: stands, when: {time: 3 s}, do: {stop: {name: cart}}}
-  - {name: stood, when: {time: 3.5 s}, do: {stop: {name: cart}}, required: false}
+  - {name: stops, when: {time: 3 s}, do: {stop: {name: cart}}}
+  - {name: not moving, when: {time: 3.5 s}, do: {stop: {name: cart}}, required: false}
   - name: hatch opens
     when: {time: 1 s}
     do: {open: {name: hatch, duration: 2 s}}
@@ -63,9 +63,9 @@ def at(trace, name, seconds):
 def test_all_possible_events_happened(run):
     done, _ = run
     happened = {one.disturbance.name: one for one in done.result.disturbances}
-    assert {name for name, one in happened.items() if not one.happened} == {"gone", "stood"}
-    assert happened["gone"].effect == "crate has no mass or is moved by a script, so it cannot be pushed"
-    assert happened["stood"].effect == "cart was not moving"
+    assert {name for name, one in happened.items() if not one.happened} == {"no mass", "not moving"}
+    assert happened["no mass"].effect == "crate has no mass or is moved by a script, so it cannot be pushed"
+    assert happened["not moving"].effect == "cart was not moving"
     assert happened["hatch opens then 1"].effect == "hatch swings shut"
 
 
@@ -122,9 +122,9 @@ goals: [{{pose: {{x: 3, y: 1}}}}]
 time_limit: 2 s
 events:
   - {{when: {{time: 0 s}}, do: {anna}}}
-  - {{name: stands, when: {{time: {when} s}}, do: {{stop: {{name: anna}}}}}}
+  - {{name: stops, when: {{time: {when} s}}, do: {{stop: {{name: anna}}}}}}
 pass: [{{collisions: {{max: 5}}}}]
 """)
         done = simulate(prepare(load_scenario(file, tmp_path)))
-        assert {one.disturbance.name: one.happened for one in done.result.disturbances}["stands"]
-        assert 2.3 < done.trace.objects["anna"].values[-1][0] < 2.9, "two seconds would have led her on"
+        assert {one.disturbance.name: one.happened for one in done.result.disturbances}["stops"]
+        assert 2.3 < done.trace.objects["anna"].values[-1][0] < 2.9, "she did not stop"

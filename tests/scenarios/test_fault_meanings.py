@@ -32,7 +32,7 @@ goals: [{pose: {x: 4, y: 1}}]
 """
 
 
-class Heard:
+class MomentLog:
     def __init__(self) -> None:
         self.moments: list[Moment] = []
 
@@ -40,28 +40,28 @@ class Heard:
         self.moments.append(moment)
 
 
-def play(text: str, folder: Path, head: str = ROOM, ends: str = "pass: [{collisions: {max: 5}}]\n"):
-    """The result and the moments of a run."""
+def play(text: str, folder: Path, head: str = ROOM, criteria: str = "pass: [{collisions: {max: 5}}]\n"):
+    """Simulate a scenario; return the run and its moments."""
     file = folder / "own.scenario.yaml"
-    file.write_text(head + text + ends)
-    heard = Heard()
-    run = simulate(prepare(load_scenario(file, folder)), attach=lambda rig, logs: [heard])
-    return run, heard.moments
+    file.write_text(head + text + criteria)
+    log = MomentLog()
+    run = simulate(prepare(load_scenario(file, folder)), attach=lambda rig, logs: [log])
+    return run, log.moments
 
 
 def scans(moments: list[Moment]) -> list[tuple[int, Scan]]:
     return [(moment.tick, one) for moment in moments for one in moment.readings if isinstance(one, Scan)]
 
 
-def to_walls(x: float, y: float, angles: np.ndarray) -> np.ndarray:
-    """How far it is to the walls of an empty room of 8 m by 4 m."""
+def ranges_to_walls(x: float, y: float, angles: np.ndarray) -> np.ndarray:
+    """Return the distances to the walls of an empty room of 8 m by 4 m."""
     with np.errstate(divide="ignore"):
         along = np.where(np.cos(angles) > 0, (8 - x) / np.cos(angles), -x / np.cos(angles))
         across = np.where(np.sin(angles) > 0, (4 - y) / np.sin(angles), -y / np.sin(angles))
     return np.minimum(along, across)
 
 
-STANDING = """\
+STATIONARY = """\
 simscen: 1
 world:
   simscen: 1
@@ -76,14 +76,14 @@ time_limit: 1 s
 
 
 def test_beams_through_glass_measure_the_object_behind(tmp_path):
-    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane, crate]}}]\n", tmp_path, STANDING)
+    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane, crate]}}]\n", tmp_path, STATIONARY)
     for _, scan in scans(moments):
-        off = scan.ranges - to_walls(2.0, 2.0, scan.angles() + 0.3)
-        assert np.abs(off).max() < 0.06, "0.01 m of noise, nothing of the pane and the crate"
+        off = scan.ranges - ranges_to_walls(2.0, 2.0, scan.angles() + 0.3)
+        assert np.abs(off).max() < 0.06, "more than 0.01 m of noise: a beam hits the pane or the crate"
 
 
 def test_share_of_beams_passes_through_glass(tmp_path):
-    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane], probability: 70 %}}]\n", tmp_path, STANDING)
+    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane], probability: 70 %}}]\n", tmp_path, STATIONARY)
     through = []
     for _, scan in scans(moments):
         bearing = scan.angles() + 0.3
@@ -97,20 +97,20 @@ def test_rotated_lidar_measures_a_rotated_scene(tmp_path):
         "faults: [{sensor: lidar, extrinsic: {yaw: 10 deg, x: 5 cm}}, {sensor: lidar, glass: {of: [pane, crate]}}]\n"
     )
     _, moments = play(
-        fault.replace("glass", "glass"), tmp_path, STANDING.replace("box: [0.02, 3, 1]", "box: [0.02, 0.02, 1]")
+        fault.replace("glass", "glass"), tmp_path, STATIONARY.replace("box: [0.02, 3, 1]", "box: [0.02, 0.02, 1]")
     )
     x, y = 2 + 0.05 * math.cos(0.3), 2 + 0.05 * math.sin(0.3)
     for _, scan in scans(moments):
-        off = scan.ranges - to_walls(x, y, scan.angles() + 0.3 + math.radians(10))
-        assert np.mean(np.abs(off) < 0.06) > 0.9, "but for the crate and the post"
+        off = scan.ranges - ranges_to_walls(x, y, scan.angles() + 0.3 + math.radians(10))
+        assert np.mean(np.abs(off) < 0.06) > 0.9, "too many beams do not hit a wall"
 
 
 def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
-    _, moments = play("faults: [{sensor: lidar, extrinsic: {pitch: 5 deg}}]\n", tmp_path, STANDING)
+    _, moments = play("faults: [{sensor: lidar, extrinsic: {pitch: 5 deg}}]\n", tmp_path, STATIONARY)
     height = 0.18
     for _, scan in scans(moments):
-        ahead = scan.ranges[len(scan.ranges) // 2]
-        assert ahead == pytest.approx(height / math.sin(math.radians(5)), abs=0.06)
+        range_ahead = scan.ranges[len(scan.ranges) // 2]
+        assert range_ahead == pytest.approx(height / math.sin(math.radians(5)), abs=0.06)
 
 
 def test_delayed_scans_arrive_in_the_next_cycle_with_the_stamp_of_measurement(tmp_path):
@@ -148,9 +148,9 @@ def test_weak_left_wheels_turn_left_and_odometry_measures_it(tmp_path):
     _, moments = play(fault, tmp_path)
     turned = [moment.truth.twist.wz for moment in moments if moment.truth and 2.3 < moment.tick / 240 < 2.55]
     assert np.mean(turned) > 0.5
-    heard = [one for moment in moments for one in moment.readings if isinstance(one, Odometry) and one.tick == 600]
+    readings = [o for moment in moments for o in moment.readings if isinstance(o, Odometry) and o.tick == 600]
     truth = next(moment.truth for moment in moments if moment.tick == 600)
-    assert heard[0].pose.yaw == pytest.approx(truth.pose.plane.yaw, abs=0.05)
+    assert readings[0].pose.yaw == pytest.approx(truth.pose.plane.yaw, abs=0.05)
 
 
 def test_localizer_jump_shifts_the_estimate_during_the_fault(tmp_path):
@@ -180,7 +180,7 @@ def test_stack_survives_lidar_garbage(tmp_path, value):
     faults = (
         f"faults: [{{sensor: lidar, garbage: {{value: {value}}}, when: {{time: 1 s}}, for: 2 s}}]\ntime_limit: 25 s\n"
     )
-    run, moments = play(faults, tmp_path, ends="pass: [{collisions: {max: 0}}, {goals_reached: {}}]\n")
+    run, moments = play(faults, tmp_path, criteria="pass: [{collisions: {max: 0}}, {goals_reached: {}}]\n")
     assert run.result.outcome in (Outcome.PASSED, Outcome.FAILED)
     assert [event for moment in moments for event in moment.events if event.kind is EventKind.FAULT_ENDED]
 
@@ -200,13 +200,13 @@ def test_localizers_survive_odometry_and_imu_garbage(tmp_path, localizer):
 
 
 GARBAGE = "".join(f"  - {{sensor: {name}, garbage: {{}}, when: {{time: 1 s}}}}\n" for name in ("lidar", "odom", "imu"))
-BURSTS = "".join(
+DELAYS = "".join(
     f"  - {{sensor: {name}, delay: {{latency: 0.3 s, jitter: 0.5 s}}, when: {{time: 1 s}}, for: 1 s}}\n"
     for name in ("lidar", "odom", "imu", "bumper", "cmd_vel")
 )
 
 
-@pytest.mark.parametrize("faults", [GARBAGE, BURSTS], ids=["garbage", "bursts"])
+@pytest.mark.parametrize("faults", [GARBAGE, DELAYS], ids=["garbage", "delays"])
 def test_log_with_invalid_readings_is_judged_with_the_same_result(tmp_path, faults):
     criteria = "pass: [{collisions: {max: 5}}, {path_length: {max: 9}}, {localization_error: {max: 3}}]\n"
     file = tmp_path / "own.scenario.yaml"
@@ -244,5 +244,5 @@ time_limit: 5 s
 
 def test_faults_apply_to_one_of_several_robots(tmp_path):
     run, _ = play("", tmp_path, TWO)
-    told = {one.disturbance.name: one.happened for one in run.result.disturbances}
-    assert told == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)
+    happened = {one.disturbance.name: one.happened for one in run.result.disturbances}
+    assert happened == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)

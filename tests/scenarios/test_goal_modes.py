@@ -60,7 +60,7 @@ def through(tmp_path_factory):
     return simulate(scenario(THROUGH, tmp_path_factory.mktemp("through")))
 
 
-def test_one_plan_leads_through_all_poses(through):
+def test_one_plan_contains_all_via_poses(through):
     trace = through.trace
     (first, *_) = trace.plans
     for x, y in POSES.values():
@@ -85,7 +85,7 @@ def test_poses_are_passed_within_their_radius_and_without_a_stop(through):
     assert ended.name == "SUCCEEDED"
 
 
-def test_a_pose_that_is_passed_is_judged_by_how_near_the_robot_came(through):
+def test_via_pose_is_judged_by_the_minimum_distance_of_the_robot(through):
     assert through.result.outcome is Outcome.PASSED
     (reached,) = (verdict for verdict in through.result.verdicts if verdict.criterion == "goals_reached")
     truth = through.trace.truth.values
@@ -98,13 +98,13 @@ def test_a_pose_that_is_passed_is_judged_by_how_near_the_robot_came(through):
     assert [finding.what for finding in reached.findings][-1] == "goal home heading"
 
 
-def test_a_trigger_counts_waypoints_that_were_passed(through):
+def test_trigger_counts_passed_via_poses(through):
     (fired,) = through.trace.of_kind(EventKind.EVENT_STARTED)
     second = through.trace.of_kind(EventKind.GOAL_PASSED)[1].tick
     assert second < fired.tick <= second + 12
 
 
-def test_waypoints_are_waited_at_and_driven_to_again(tmp_path):
+def test_robot_waits_at_waypoints_and_repeats_the_loop(tmp_path):
     run = simulate(scenario(WAYPOINTS + PASS, tmp_path))
     trace = run.trace
     assert run.result.outcome is Outcome.PASSED
@@ -115,8 +115,8 @@ def test_waypoints_are_waited_at_and_driven_to_again(tmp_path):
     assert accepted["a#2"] - reached["b"] == 240
     (ended,) = trace.of_kind(EventKind.NAVIGATION_ENDED)
     assert ended.tick - reached["b#2"] == 240
-    stays = [(trace.command.ticks >= reached["a"]) & (trace.command.ticks < accepted["b"])]
-    assert not trace.command.values[stays[0]].any()
+    waiting = [(trace.command.ticks >= reached["a"]) & (trace.command.ticks < accepted["b"])]
+    assert not trace.command.values[waiting[0]].any()
     (fired,) = trace.of_kind(EventKind.EVENT_STARTED)
     assert reached["a#2"] < fired.tick <= reached["a#2"] + 12
     waits = [f for v in run.result.verdicts for f in v.findings if f.what.endswith(" wait")]
@@ -138,7 +138,7 @@ def test_only_the_expected_failure_passes(tmp_path, expected, passes):
     assert [f.what for f in wrong] == ([] if passes else ["goal in the crate"])
 
 
-def test_a_success_that_is_not_expected_fails(tmp_path):
+def test_unexpected_success_fails(tmp_path):
     result = simulate(
         scenario("goals: [{name: a, pose: {x: 2, y: 1}, expect: failed}]\npass: [{goals_reached: {}}]\n", tmp_path)
     ).result
@@ -149,11 +149,11 @@ def test_a_success_that_is_not_expected_fails(tmp_path):
 @pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("text", [THROUGH, WAYPOINTS, MISSED % "failed"], ids=["through", "waypoints", "missed"])
-def test_a_stack_behind_the_protocol_takes_goals_in_the_same_way(tmp_path, text):
+def test_stack_protocol_gives_the_same_result_for_all_goal_modes(tmp_path, text):
     prepared = scenario(text, tmp_path)
-    here, there = simulate(prepared), simulate(with_external_reference(prepared), stack_log=tmp_path / "stack.log")
-    assert there.result == here.result
-    assert there.trace.events == here.trace.events
+    external = simulate(with_external_reference(prepared), stack_log=tmp_path / "stack.log")
+    in_process = simulate(prepared)
+    assert (external.result, external.trace.events) == (in_process.result, in_process.trace.events)
 
 
 def test_preemption_drops_all_poses_of_a_drive(tmp_path):
@@ -163,7 +163,7 @@ def test_preemption_drops_all_poses_of_a_drive(tmp_path):
     )
     run = simulate(scenario(text, tmp_path))
     assert run.result.outcome is Outcome.PASSED
-    told = [
+    events = [
         (event.kind.value, event.name) for event in run.trace.of_kind(EventKind.GOAL_CANCELED, EventKind.GOAL_REACHED)
     ]
-    assert told == [*(("goal.canceled", name) for name in ("north", "west", "home")), ("goal.reached", "now")]
+    assert events == [*(("goal.canceled", name) for name in ("north", "west", "home")), ("goal.reached", "now")]

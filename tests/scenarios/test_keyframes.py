@@ -12,7 +12,7 @@ from simscen.run.simulate import simulate
 
 RATE = 240
 FRAMES = [(0.0, 3.0, 1.0, 0.0), (0.5, 4.0, 1.0, 1.5), (0.7, 4.0, 2.0, 3.0), (1.1, 3.0, 2.0, -2.0), (1.3, 3.0, 1.0, 0.0)]
-BEGINS, PHASE = 0.5, 0.6
+START_S, PHASE_S = 0.5, 0.6
 SCENARIO = f"""\
 simscen: 1
 world:
@@ -27,9 +27,9 @@ goals: [{{pose: {{x: 1, y: 3}}}}]
 physics: {{truth_rate: {RATE}}}
 events:
   - {{when: {{time: 0 s}}, do: {{spawn: {{name: round, cylinder: [0.2, 1.0], pose: {{x: 7, y: 3}}}}}}}}
-  - when: {{time: {BEGINS} s}}
+  - when: {{time: {START_S} s}}
     do: {{move: {{name: round, keyframes: {[list(frame) for frame in FRAMES]}, repeat: loop, ease: spline,
-                phase: {PHASE} s}}}}
+                phase: {PHASE_S} s}}}}
 time_limit: 5 s
 pass: [{{collisions: {{max: 0}}}}]
 """
@@ -43,11 +43,11 @@ def run(tmp_path_factory):
     return simulate(prepare(load_scenario(file, folder)), log=log), log
 
 
-def by_hand(ticks, begins, phase, shift, spline):
-    """Where the cylinder has to be, by scipy's spline or numpy's lines."""
+def expected_poses(ticks, start, phase, shift, spline):
+    """Return the expected poses of the cylinder, by a spline of scipy or linear interpolation."""
     times, values = np.array(FRAMES)[:, 0], np.array(FRAMES)[:, 1:] + [*shift, 0.0]
     values[:, 2] = np.unwrap(values[:, 2])
-    local = np.fmod(ticks / RATE - begins + phase, times[-1])
+    local = np.fmod(ticks / RATE - start + phase, times[-1])
     if not spline:
         return np.column_stack([np.interp(local, times, column) for column in values.T])
     slopes = np.empty_like(values)
@@ -58,25 +58,25 @@ def by_hand(ticks, begins, phase, shift, spline):
 
 @pytest.mark.parametrize("read", ["trace", "log"])
 @pytest.mark.parametrize(
-    ("name", "begins", "phase", "shift"), [("round", BEGINS, PHASE, (0, 0)), ("straight", 0.0, 0.0, (2, 1))]
+    ("name", "start", "phase", "shift"), [("round", START_S, PHASE_S, (0, 0)), ("straight", 0.0, 0.0, (2, 1))]
 )
-def test_object_is_within_a_millimeter_of_its_keyframes(run, read, name, begins, phase, shift):
+def test_object_is_within_a_millimeter_of_its_keyframes(run, read, name, start, phase, shift):
     done, log = run
     trace = done.trace if read == "trace" else read_log(log).trace
     samples = trace.objects[name]
-    moving = samples.ticks >= round(begins * RATE) + 1
+    moving = samples.ticks >= round(start * RATE) + 1
     ticks = samples.ticks[moving]
-    assert np.array_equal(ticks, np.arange(ticks[0], trace.end + 1)), "every tick is there"
-    assert len(ticks) > 3 * FRAMES[-1][0] * RATE, "several loops"
-    expected = by_hand(ticks, begins, phase, shift, name == "round")
-    off = samples.values[moving] - expected
-    assert np.abs(off[:, :2]).max() < 1e-3
-    assert np.abs((off[:, 2] + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
+    assert np.array_equal(ticks, np.arange(ticks[0], trace.end + 1)), "a pose is missing"
+    assert len(ticks) > 3 * FRAMES[-1][0] * RATE, "too few loops"
+    expected = expected_poses(ticks, start, phase, shift, name == "round")
+    error = samples.values[moving] - expected
+    assert np.abs(error[:, :2]).max() < 1e-3
+    assert np.abs((error[:, 2] + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
 
 
 def test_log_contains_the_parameters_of_the_motion(run):
     _, log = run
-    (moved,) = read_log(log).trace.of_kind(EventKind.OBJECT_MOVED)
-    told = moved.data
-    assert [(t, *pose) for t, pose in zip(told["times"], told["waypoints"], strict=True)] == FRAMES
-    assert (told["repeat"], told["ease"], told["phase"], told["start"]) == ("loop", "spline", PHASE, 0.0)
+    (event,) = read_log(log).trace.of_kind(EventKind.OBJECT_MOVED)
+    motion = event.data
+    assert [(t, *pose) for t, pose in zip(motion["times"], motion["waypoints"], strict=True)] == FRAMES
+    assert (motion["repeat"], motion["ease"], motion["phase"], motion["start"]) == ("loop", "spline", PHASE_S, 0.0)

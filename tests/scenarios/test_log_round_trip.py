@@ -1,4 +1,4 @@
-"""Shipped scenarios, reconstructed from the logs of their runs alone, agree with what was ordered.
+"""Tests that scenarios reconstructed from only their logs agree with the shipped scenarios.
 
 `python tests/campaign/log_round_trip.py` prints the same comparison for all of them.
 """
@@ -30,7 +30,7 @@ CASES = [pytest.param(name, marks=[pytest.mark.slow] if number % 10 else []) for
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", CASES)
-def test_a_scenario_survives_the_way_through_its_log(name, tmp_path):
+def test_scenario_reconstructed_from_its_log_agrees(name, tmp_path):
     log = tmp_path / "run.mcap"
     simulate(prepare(load_scenario(ROOT / "scenarios" / f"{name}.scenario.yaml", ROOT)), log=log)
     row = compare(log, tmp_path / "again.scenario.yaml")

@@ -29,7 +29,7 @@ world:
 """
 EAST = "pose: {x: 1, y: 3}, goals: [{name: east, pose: {x: 3, y: 3.4}}]"
 FAR = "pose: {x: 28, y: 3}, goals: [{name: north, pose: {x: 28, y: 4}}]"
-AGAINST = "pose: {x: 2.2, y: 3, yaw: 180 deg}, stack: {collision_monitor: {enabled: false}}"
+ONCOMING = "pose: {x: 2.2, y: 3, yaw: 180 deg}, stack: {collision_monitor: {enabled: false}}"
 PASS = "pass: [{goals_reached: {}}, {collisions: {max: 0}}]\n"
 
 
@@ -43,8 +43,8 @@ def run(tmp_path):
     return run
 
 
-def messages(log, robot, seconds):
-    """All that is written of a robot at first, but where the others are."""
+def hash_of_messages(log, robot, seconds):
+    """Return a hash of a robot's first messages, except the poses of the other robots."""
     sha = hashlib.sha256()
     with log.open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages(end_time=int(seconds * 1e9)):
@@ -61,9 +61,9 @@ def test_command_from_an_event_takes_effect_in_the_robots_next_cycle(run, order)
         f"robots: {{a: {{{EAST}}}, b: {{{FAR}, model: jackal}}}}\n"
         f"events: [{{when: {{time: 330 ms}}, do: {order}}}]\npass: [{{collisions: {{max: 0}}}}]\n"
     )
-    told = next(event for event in done.robots["a"].trace.events if event.kind is EventKind.GOAL_CANCELED)
+    canceled = next(event for event in done.robots["a"].trace.events if event.kind is EventKind.GOAL_CANCELED)
     began = next(event for event in done.robots["a"].trace.events if event.kind is EventKind.EVENT_STARTED)
-    assert (began.tick, told.tick) == (80, 84)
+    assert (began.tick, canceled.tick) == (80, 84)
 
 
 def test_robots_that_never_meet_have_the_logs_of_single_runs(run):
@@ -74,7 +74,7 @@ def test_robots_that_never_meet_have_the_logs_of_single_runs(run):
         "three",
     )
     assert two.passed
-    assert messages(two.log, "a", 5) == messages(three.log, "a", 5)
+    assert hash_of_messages(two.log, "a", 5) == hash_of_messages(three.log, "a", 5)
 
 
 def test_verdicts_metrics_and_faults_are_per_robot_and_events_per_world(run):
@@ -101,7 +101,7 @@ def test_verdicts_metrics_and_faults_are_per_robot_and_events_per_world(run):
 
 
 def test_log_contains_the_trace_of_each_robot(run):
-    done = run(f"robots: {{a: {{{EAST}}}, b: {{{AGAINST}}}}}\n{PASS.replace('{goals_reached: {}}, ', '')}")
+    done = run(f"robots: {{a: {{{EAST}}}, b: {{{ONCOMING}}}}}\n{PASS.replace('{goals_reached: {}}, ', '')}")
     log = read_log(done.log)
     assert list(log.robots) == ["a", "b"]
     for name, one in log.robots.items():
@@ -144,7 +144,7 @@ def test_failing_robot_fails_the_run_with_its_name(run):
     assert done.robots["b"].passed
 
 
-def test_a_run_ends_when_all_robots_have_and_one_without_a_goal_is_not_waited_for(run):
+def test_run_ends_when_all_robots_with_goals_have_ended(run):
     near = FAR.replace("y: 4", "y: 3.3")
     done = run(
         f"robots: {{a: {{{EAST}}}, b: {{{near}}}, c: {{pose: {{x: 20, y: 3}}}}}}\npass: [{{collisions: {{}}}}]\n"

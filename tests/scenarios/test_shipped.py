@@ -31,33 +31,33 @@ def hashes(folder: Path, name: str) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def together(request, tmp_path_factory):
+def shipped_session(request, tmp_path_factory):
     """A session of the shipped scenarios: its folder, and the finished process. `make test` runs every third one."""
     every = 3 if request.config.option.markexpr == "not slow" else 1
     folder = tmp_path_factory.mktemp("shipped") / "out"
     return folder, simscen("run", *SHIPPED[::every], "-j", 2, "--out", folder)
 
 
-def test_shipped_scenarios_pass(together):
-    folder, done = together
+def test_shipped_scenarios_pass(shipped_session):
+    folder, done = shipped_session
     assert done.returncode == 0, done.stdout + done.stderr
     results = json.loads((folder / "results.json").read_text())
     assert results["passed"] == results["total"] >= len(SHIPPED) // 3
 
 
-def test_every_run_writes_log_result_picture_and_scenario(together):
-    folder, _ = together
+def test_every_run_writes_log_result_picture_and_scenario(shipped_session):
+    folder, _ = shipped_session
     logs = list(folder.rglob("run.mcap"))
     assert len(logs) >= len(SHIPPED) // 3
     for log in logs:
-        left = {file.name for file in log.parent.iterdir()}
-        assert left >= {"run.mcap", "result.json", "map.png", "scenario.yaml", "worker.log"}
+        written = {file.name for file in log.parent.iterdir()}
+        assert written >= {"run.mcap", "result.json", "map.png", "scenario.yaml", "worker.log"}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)], ids=["every sixteenth", "all"])
-def test_logs_and_results_are_equal_in_serial_and_from_another_folder(together, tmp_path, every: int):
-    folder, _ = together
+def test_logs_and_results_are_equal_in_serial_and_from_another_folder(shipped_session, tmp_path, every: int):
+    folder, _ = shipped_session
     files = sorted((ROOT / "scenarios").rglob("*.scenario.yaml"))[::every]
     done = simscen("run", *files, "-j", 1, "--out", tmp_path / "out", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -68,18 +68,18 @@ def test_logs_and_results_are_equal_in_serial_and_from_another_folder(together, 
 
 
 @pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)], ids=["every fourth", "all"])
-def test_run_replay_and_judge_give_the_same_verdicts(together, every: int):
-    folder, _ = together
+def test_run_replay_and_judge_give_the_same_verdicts(shipped_session, every: int):
+    folder, _ = shipped_session
     logs = sorted(folder.rglob("run.mcap"))[::every]
     assert logs
     for file in logs:
         live, log = read_result(file.with_name("result.json")), read_log(file)
-        again = judged_again(live, log, file.name)
+        again = judge_log(live, log, file.name)
         assert to_json(again) == file.with_name("result.json").read_text(encoding="utf-8") == log.result, file
 
 
-def judged_again(live, log, name):
-    """The result by what the log says alone; of several robots from those of each."""
+def judge_log(live, log, name):
+    """Return the result of judging only the log, combined from those of each robot if there are several."""
     if not log.robots:
         criteria = criteria_of_text(log.header.scenario, name, {}).pass_
         return judge_run(live.key, live.path, criteria, log.trace, log.header.case, live.lines)
@@ -92,8 +92,8 @@ def judged_again(live, log, name):
 
 
 @pytest.mark.slow
-def test_another_seed_gives_another_trace(together, tmp_path):
-    folder, _ = together
+def test_another_seed_gives_another_trace(shipped_session, tmp_path):
+    folder, _ = shipped_session
     simscen("run", "scenarios/navigation/goal.scenario.yaml", "--seed", 2, "--out", tmp_path / "out")
     (other,) = (tmp_path / "out").rglob("run.mcap")
     (usual,) = folder.rglob("goal/seed-1/run.mcap")
@@ -110,7 +110,7 @@ def test_check_determinism_compares_the_logs_of_two_runs(tmp_path):
     assert len(list(out.rglob("run.mcap"))) == 2
 
 
-def test_the_page_of_shipped_scenarios_has_a_row_for_each():
+def test_scenarios_page_has_a_row_for_each_shipped_scenario():
     page = (ROOT / "docs/reference/scenarios.md").read_text(encoding="utf-8")
     shipped = {file.relative_to(ROOT).as_posix() for file in (ROOT / "scenarios").rglob("*.scenario.yaml")}
     assert set(re.findall(r"\]\(\.\./\.\./(scenarios/\S+)\)", page)) == shipped

@@ -1,4 +1,4 @@
-"""The reference stack behind the stack protocol gives the same log as in the process of the run."""
+"""Tests that the reference stack behind the stack protocol gives the same log as in process."""
 
 import os
 from dataclasses import replace
@@ -20,7 +20,7 @@ CHOSEN = [
     "corner_cases/goal_blocked_for_good",
     "robots/mecanum_errand",
 ]
-EVERYTHING = """\
+ALL_TYPES = """\
 simscen: 1
 world:
   simscen: 1
@@ -30,7 +30,7 @@ map: none
 robot: {model: watcher.robot.yaml, pose: {x: 1, y: 1}}
 stack:
   localizer: {type: ground_truth}
-  # The stack behind the socket makes no pictures of what it hears, so none may be in anybody's way.
+  # The external stack does not receive images, so that the other one must ignore them.
   costmap: {min_obstacle_height: 99 m, max_obstacle_height: 100 m}
   controller: {type: mppi, batch_size: 100}
   recovery: {number_of_retries: 0}
@@ -66,29 +66,29 @@ sensors:
 """
 
 
-Said = list[tuple[str, int, bytes]]
+Messages = list[tuple[str, int, bytes]]
 
 
-def logs(file: Path, root: Path, folder: Path) -> tuple[Said, Said]:
-    """All messages of the scenario's log, with its stack in the engine and behind the protocol."""
+def messages_of_both(file: Path, root: Path, folder: Path) -> tuple[Messages, Messages]:
+    """Return the messages of a scenario's log, with the stack in process and behind the protocol."""
     prepared = prepare(load_scenario(file, root))
-    here = simulate(prepared, log=folder / "here.mcap")
-    there = simulate(with_external_reference(prepared), log=folder / "there.mcap", stack_log=folder / "stack.log")
-    assert there.result == here.result
-    assert there.trace.events == here.trace.events
-    return messages(folder / "here.mcap"), messages(folder / "there.mcap")
+    in_process = simulate(prepared, log=folder / "in_process.mcap")
+    external = simulate(with_external_reference(prepared), log=folder / "external.mcap", stack_log=folder / "stack.log")
+    assert external.result == in_process.result
+    assert external.trace.events == in_process.trace.events
+    return messages(folder / "in_process.mcap"), messages(folder / "external.mcap")
 
 
-def messages(log: Path) -> Said:
+def messages(log: Path) -> Messages:
     with log.open("rb") as file:
-        said = make_reader(file).iter_messages(log_time_order=False)
-        return [(channel.topic, message.log_time, message.data) for _, channel, message in said]
+        records = make_reader(file).iter_messages(log_time_order=False)
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in records]
 
 
 SHIPPED = sorted(
     str(path.relative_to(ROOT / "scenarios"))
     for path in (ROOT / "scenarios").rglob("*.scenario.yaml")
-    # The localizer of a stack behind a socket cannot be disturbed.
+    # Faults of the localizer do not work with external stacks.
     if "sensor: localizer" not in path.read_text()
 )
 
@@ -98,18 +98,18 @@ SHIPPED = sorted(
     "name", SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else [f"{name}.scenario.yaml" for name in CHOSEN]
 )
 def test_stack_protocol_gives_the_same_log_as_in_process(name: str, tmp_path: Path) -> None:
-    here, there = logs(ROOT / "scenarios" / name, ROOT, tmp_path)
-    assert sum(len(data) for _, _, data in here) > 20_000
-    assert there == here
+    in_process, external = messages_of_both(ROOT / "scenarios" / name, ROOT, tmp_path)
+    assert sum(len(data) for _, _, data in in_process) > 20_000
+    assert external == in_process
 
 
 @pytest.mark.slow
 def test_stack_protocol_matches_for_all_message_and_goal_types(tmp_path: Path) -> None:
-    (tmp_path / "a.scenario.yaml").write_text(EVERYTHING)
+    (tmp_path / "a.scenario.yaml").write_text(ALL_TYPES)
     (tmp_path / "watcher.robot.yaml").write_text(ROBOT)
-    here, there = logs(tmp_path / "a.scenario.yaml", tmp_path, tmp_path)
-    assert sum(len(data) for _, _, data in here) > 20_000
-    assert there == here
+    in_process, external = messages_of_both(tmp_path / "a.scenario.yaml", tmp_path, tmp_path)
+    assert sum(len(data) for _, _, data in in_process) > 20_000
+    assert external == in_process
 
 
 TWO = """\
@@ -130,14 +130,13 @@ pass: [{collisions: {max: 0}}]
 @pytest.mark.slow
 def test_stack_protocol_matches_for_two_robots(tmp_path: Path) -> None:
     (tmp_path / "two.scenario.yaml").write_text(TWO)
-    here, there = logs(tmp_path / "two.scenario.yaml", tmp_path, tmp_path)
-    assert sum(len(data) for _, _, data in here) > 20_000
-    assert there == here
+    in_process, external = messages_of_both(tmp_path / "two.scenario.yaml", tmp_path, tmp_path)
+    assert sum(len(data) for _, _, data in in_process) > 20_000
+    assert external == in_process
 
 
 @pytest.mark.slow
 def test_comparison_detects_another_stack(tmp_path: Path) -> None:
-    """The comparison can fail."""
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
     other = with_external_reference(prepared)
     argv = other.loaded.external_command and (

@@ -32,8 +32,8 @@ pass: [{collisions: {max: 0, caused_by_robot: true}}]
 """
 
 
-class Compared:
-    """At each scan: errors of what is told of people, and what is told to move and does not."""
+class TrackComparison:
+    """A log that compares the predicted obstacles with the true pedestrians at each scan."""
 
     def __init__(self, agent: RobotUnderTest) -> None:
         assert isinstance(agent.stack, CheckedStack) and isinstance(agent.stack.inner, ReferenceStack)
@@ -54,15 +54,15 @@ class Compared:
         self.scans += 1
         self.turning += abs(moment.truth.twist.wz) > 0.3
         for center, velocity in zip(centers, velocities, strict=True):
-            off, name = min((math.hypot(center[0] - pose.x, center[1] - pose.y), name) for name, pose in people.items())
-            if off > 0.5:
+            gap, name = min((math.hypot(center[0] - pose.x, center[1] - pose.y), name) for name, pose in people.items())
+            if gap > 0.5:
                 self.false += 1
             elif name in self.before:
                 since, pose = self.before[name]
                 seconds = (moment.tick - since) / 240
-                walks = ((people[name].x - pose.x) / seconds, (people[name].y - pose.y) / seconds)
-                self.places.append(off)
-                self.speeds.append(math.dist(velocity, walks))
+                true_velocity = ((people[name].x - pose.x) / seconds, (people[name].y - pose.y) / seconds)
+                self.places.append(gap)
+                self.speeds.append(math.dist(velocity, true_velocity))
         self.before = {name: (moment.tick, pose) for name, pose in people.items()}
 
     def finish(self) -> None:
@@ -72,15 +72,15 @@ class Compared:
 def test_pedestrians_are_tracked_to_centimeters_without_false_tracks(tmp_path: Path) -> None:
     file = tmp_path / "walkers.scenario.yaml"
     file.write_text(HOUSE)
-    heard: list[Compared] = []
+    comparisons: list[TrackComparison] = []
 
     def attach(rig, logs):
-        heard.append(Compared(rig.robots[0]))
-        return heard
+        comparisons.append(TrackComparison(rig.robots[0]))
+        return comparisons
 
     simulate(prepare(load_scenario(file, tmp_path, (WORLDS,))), 1, attach=attach)
-    (compared,) = heard
-    assert compared.turning > 40  # of what stands, much is seen while the robot turns
+    (compared,) = comparisons
+    assert compared.turning > 40  # false tracks of static objects appear mostly while the robot turns
     assert len(compared.places) > 60
     assert np.median(compared.places) < 0.03 and np.percentile(compared.places, 90) < 0.12
     assert np.median(compared.speeds) < 0.1 and np.percentile(compared.speeds, 90) < 0.4

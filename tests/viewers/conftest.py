@@ -1,4 +1,4 @@
-"""Readers of logs from npm, those that Foxglove and Lichtblick are made of, in a folder of their own."""
+"""Fixture that reads logs with the npm packages that Foxglove and Lichtblick use."""
 
 import fcntl
 import json
@@ -22,14 +22,14 @@ NPM = ["npm", "install", "--no-audit", "--no-fund", "--no-save", "--ignore-scrip
 
 
 @pytest.fixture(scope="session")
-def seen_by_viewers() -> Callable[[Path], dict[str, Any]]:
-    """What a viewer reads of a log; skips the test where there is no Node.js, or no registry to install from."""
+def read_in_viewer() -> Callable[[Path], dict[str, Any]]:
+    """Return a function that reads a log like a viewer; skip the test without Node.js or the npm registry."""
     node = shutil.which("node")
     if node is None or shutil.which("npm") is None:
         pytest.skip("there is no node and npm to run Foxglove's readers with")
     FOLDER.mkdir(exist_ok=True)
     with (FOLDER / ".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # several processes of pytest would install them at once
+        fcntl.flock(lock, fcntl.LOCK_EX)  # other pytest workers install them too
         stamp = FOLDER / "installed"
         if not stamp.exists() or stamp.read_text() != " ".join(PACKAGES):
             command = [*NPM, "--fetch-timeout=8000", f"--prefix={FOLDER}", *PACKAGES]
@@ -37,12 +37,12 @@ def seen_by_viewers() -> Callable[[Path], dict[str, Any]]:
             if done.returncode:
                 pytest.skip(f"Foxglove's readers cannot be installed: {done.stderr.strip().splitlines()[-1]}")
             stamp.write_text(" ".join(PACKAGES))
-        shutil.copy(HERE / "read.mjs", FOLDER / "read.mjs")  # Node.js looks for packages beside what is run
+        shutil.copy(HERE / "read.mjs", FOLDER / "read.mjs")  # Node.js looks for packages in the folder of the script
 
     def read(log: Path) -> dict[str, Any]:
         done = subprocess.run([node, str(FOLDER / "read.mjs"), str(log)], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        told: dict[str, Any] = json.loads(done.stdout)
-        return told
+        content: dict[str, Any] = json.loads(done.stdout)
+        return content
 
     return read

@@ -1,4 +1,4 @@
-"""Behaviors that break a promise each."""
+"""Behaviors, each of which breaks a promise."""
 
 import random
 from typing import Any
@@ -11,7 +11,7 @@ from tests.contracts.broken.cases import Wrapper, breaks
 SPIN, BACKUP = Spin(), BackUp()
 
 
-class Stepping(Wrapper):
+class CommandWrapper(Wrapper):
     def step(self, pose, costmap, seconds):
         return self.changed(self.inner.step(pose, costmap, seconds), seconds)
 
@@ -20,45 +20,45 @@ class Stepping(Wrapper):
 
 
 @breaks(SPIN, "it ends", "has not ended after 120 s")
-class WaitsForEver(Wrapper):
+class NeverEnds(Wrapper):
     def step(self, pose, costmap, seconds):
         return Twist()
 
 
 @breaks(SPIN, "it ends", "beyond the limits of the base")
-class SpinsTooFast(Stepping):
+class ExceedsSpeedLimit(CommandWrapper):
     def changed(self, command, seconds):
         return command and command._replace(wz=5.0)
 
 
 @breaks(SPIN, "it has a name", "is called ''")
-class IsNameless(Wrapper):
+class HasNoName(Wrapper):
     name = ""
 
 
 @breaks(BACKUP, "it never drives into anything", "drives into a wall")
-class BacksBlindly(Wrapper):
+class IgnoresObstacles(Wrapper):
     def step(self, pose, costmap, seconds):
         return Twist(-0.15) if seconds < 3.0 else None
 
 
 @breaks(BACKUP, "it never drives into anything", "raises RuntimeError")
-class FailsInItsOwnWay(Wrapper):
-    def step(self, *asked):
+class RaisesRuntimeError(Wrapper):
+    def step(self, *arguments):
         try:
-            return self.inner.step(*asked)
+            return self.inner.step(*arguments)
         except NavigationFailure as failure:
-            raise RuntimeError("no room") from failure
+            raise RuntimeError("no free space") from failure
 
 
 @breaks(BACKUP, "the same calls", "two runs with the same generator differ")
-class BacksByChance(Stepping):
+class UsesGlobalRandom(CommandWrapper):
     def changed(self, command, seconds):
         return command and command._replace(vx=command.vx * (0.9 + 0.1 * random.random()))
 
 
 @breaks(BACKUP, "a costmap is not changed", "changes the costmap")
-class ClearsTheCostmapItself(Wrapper):
+class ChangesCostmap(Wrapper):
     def step(self, pose, costmap, seconds):
         costmap.costs[:] = 0
         return self.inner.step(pose, costmap, seconds)

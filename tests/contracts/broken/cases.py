@@ -1,4 +1,4 @@
-"""How a component or a word of the language that breaks a promise becomes a case."""
+"""Decorators that register components, criteria, faults, and so on that break a promise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ class Case:
     name: str
     spec: Any
     promise: str
-    seen: str
+    message: str
 
 
 CASES: list[Case] = []
 
 
 class Wrapper:
-    """A component that does as the one it wraps, but for what a subclass does otherwise."""
+    """A component that forwards all calls to another one; subclasses change some of them."""
 
     def __init__(self, inner: Any, setting: Any) -> None:
         self.inner, self.setting = inner, setting
@@ -31,25 +31,25 @@ class Wrapper:
         return getattr(self.inner, name)
 
 
-def breaks(spec: Any, promise: str, seen: str) -> Callable[[type[Wrapper]], type[Wrapper]]:
-    """Adds a case: the component of `spec` in this wrapper breaks a promise, and `seen` is said of it."""
+def breaks(spec: Any, promise: str, message: str) -> Callable[[type[Wrapper]], type[Wrapper]]:
+    """Register a wrapper with which the component of `spec` breaks a promise; the error contains `message`."""
 
     def add(wrapper: type[Wrapper]) -> type[Wrapper]:
         def made(inner: Any, setting: Any) -> Any:
             return wrapper(type(spec).implementation()(inner, setting), setting)
 
         kind = type(wrapper.__name__, (type(spec),), {"implementation": classmethod(lambda cls: made)})
-        CASES.append(Case(wrapper.__name__, kind.model_construct(**dict(spec)), promise, seen))
+        CASES.append(Case(wrapper.__name__, kind.model_construct(**dict(spec)), promise, message))
         return wrapper
 
     return add
 
 
-def word(promise: str, seen: str) -> Callable[[type[Spec]], type[Spec]]:
-    """Adds a case: a criterion, fault, trigger or action that breaks a promise."""
+def breaks_contract(promise: str, message: str) -> Callable[[type[Spec]], type[Spec]]:
+    """Register a criterion, fault, trigger, action, or metric that breaks a promise."""
 
     def add(kind: type[Spec]) -> type[Spec]:
-        CASES.append(Case(kind.__name__, kind(), promise, seen))
+        CASES.append(Case(kind.__name__, kind(), promise, message))
         return kind
 
     return add

@@ -1,4 +1,4 @@
-"""Controllers that break a promise each."""
+"""Controllers, each of which breaks a promise."""
 
 import math
 import random
@@ -12,22 +12,22 @@ from tests.contracts.broken.cases import Wrapper, breaks
 CONTROLLER = RegulatedPurePursuit()
 
 
-class Commanding(Wrapper):
-    def command(self, *asked):
-        return self.changed(self.inner.command(*asked))
+class CommandWrapper(Wrapper):
+    def command(self, *arguments):
+        return self.changed(self.inner.command(*arguments))
 
     def changed(self, command: Twist) -> Any:
         return command
 
 
 @breaks(CONTROLLER, "it follows the path", "from the end of the path")
-class StandsStill(Commanding):
+class NeverMoves(CommandWrapper):
     def changed(self, command):
         return Twist()
 
 
 @breaks(CONTROLLER, "it follows the path", "deviates from the path by")
-class Swerves(Commanding):
+class LeavesPath(CommandWrapper):
     k = 0
 
     def changed(self, command):
@@ -36,72 +36,72 @@ class Swerves(Commanding):
 
 
 @breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
-class TurnsTooFast(Commanding):
+class ExceedsAngularLimit(CommandWrapper):
     def changed(self, command):
         return command._replace(wz=9.0)
 
 
 @breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
-class SlidesSideways(Commanding):
+class CommandsLateralVelocity(CommandWrapper):
     def changed(self, command):
         return command._replace(vy=0.1)
 
 
 @breaks(CONTROLLER, "no command exceeds", "nan")
-class CommandsNothings(Commanding):
+class CommandsNan(CommandWrapper):
     def changed(self, command):
         return command._replace(vx=math.nan)
 
 
 @breaks(CONTROLLER, "a speed limit", "under a limit of 0.15")
-class MindsNoLimit(Wrapper):
+class IgnoresSpeedLimit(Wrapper):
     def set_speed_limit(self, limit):
         pass
 
 
 @breaks(CONTROLLER, "a speed limit", "without a limit")
-class NeverLiftsALimit(Wrapper):
+class KeepsSpeedLimit(Wrapper):
     def set_speed_limit(self, limit):
         self.inner.set_speed_limit(limit or 0.15)
 
 
 @breaks(CONTROLLER, "a command is collision free or it fails with no valid control", "with an obstacle")
-class IsBlind(Wrapper):
+class IgnoresCostmap(Wrapper):
     def command(self, pose, twist, costmap, goal):
         return Twist(0.5, 0.0, 0.0)
 
 
 @breaks(CONTROLLER, "it never drives into a wall", "drives into the wall")
-class DrivesOn(Wrapper):
-    def command(self, *asked):
+class HidesFailure(Wrapper):
+    def command(self, *arguments):
         try:
-            return self.inner.command(*asked)
+            return self.inner.command(*arguments)
         except NavigationFailure:
             return Twist(0.2, 0.0, 0.0)
 
 
 @breaks(CONTROLLER, "the same calls", "two drives with the same generator differ")
-class Trembles(Commanding):
+class UsesGlobalRandom(CommandWrapper):
     def changed(self, command):
         return command._replace(wz=command.wz * (1.0 + 1e-9 * random.random()))
 
 
 @breaks(CONTROLLER, "an empty path", "accepts a path without points")
-class TakesEverything(Wrapper):
+class AcceptsEmptyPath(Wrapper):
     def set_path(self, path):
         if len(path.points):
             self.inner.set_path(path)
 
 
 @breaks(CONTROLLER, "path and costmap", "changes the path")
-class StraightensThePath(Wrapper):
+class ChangesPath(Wrapper):
     def set_path(self, path):
         self.inner.set_path(path)
         path.points[:, 1] += 0.01
 
 
 @breaks(CONTROLLER, "path and costmap", "an old costmap affects a new command")
-class KeepsACostmap(Wrapper):
+class KeepsFirstCostmap(Wrapper):
     kept = None
 
     def command(self, pose, twist, costmap, goal):
@@ -112,5 +112,5 @@ class KeepsACostmap(Wrapper):
 
 
 @breaks(CONTROLLER, "its local plan", "not a path of finite poses")
-class ExpectsPoints(Wrapper):
+class ReturnsLocalPlanAsTuples(Wrapper):
     local_plan = ((0.0, 0.0), (1.0, 0.0))

@@ -1,4 +1,4 @@
-"""Localizers that break a promise each."""
+"""Localizers, each of which breaks a promise."""
 
 import random
 from dataclasses import replace
@@ -12,7 +12,7 @@ from tests.contracts.broken.cases import Wrapper, breaks
 LOCALIZER = OdometryOnly(type="odometry")
 
 
-class Believing(Wrapper):
+class BeliefWrapper(Wrapper):
     @property
     def belief(self) -> Belief:
         return self.changed(self.inner.belief)
@@ -22,24 +22,24 @@ class Believing(Wrapper):
 
 
 @breaks(LOCALIZER, "the same calls", "two runs differ in pose")
-class BelievesInChance(Believing):
+class UsesGlobalRandom(BeliefWrapper):
     def changed(self, belief):
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + 1e-9 * random.random()))
 
 
 @breaks(LOCALIZER, "without motion the belief does not drift", "drifts by")
-class Drifts(Believing):
-    off = 0.0
+class DriftsAtRest(BeliefWrapper):
+    offset = 0.0
 
     def changed(self, belief):
-        self.off += 1e-3
-        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + self.off))
+        self.offset += 1e-3
+        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + self.offset))
 
 
 @breaks(LOCALIZER, "a belief does not change", "covariance changes")
-class UsesOneArray(Believing):
-    def __init__(self, *made):
-        super().__init__(*made)
+class ReusesCovariance(BeliefWrapper):
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
         self.array = np.zeros((3, 3))
 
     def changed(self, belief):
@@ -51,13 +51,13 @@ class UsesOneArray(Believing):
 
 
 @breaks(LOCALIZER, "a scan is neither", "changes the ranges of a scan")
-class CleansTheScan(Wrapper):
+class ChangesScan(Wrapper):
     def on_scan(self, scan):
         scan.ranges[:] = 1.0
 
 
 @breaks(LOCALIZER, "a scan is neither", "affects the belief")
-class KeepsTheScan(Believing):
+class KeepsScan(BeliefWrapper):
     scan = None
 
     def on_scan(self, scan):
@@ -69,7 +69,7 @@ class KeepsTheScan(Believing):
 
 
 @breaks(LOCALIZER, "invalid ranges never make the belief invalid", "believes to be at")
-class BelievesTheLidar(Believing):
+class AcceptsNanRanges(BeliefWrapper):
     last = 0.0
 
     def on_scan(self, scan):
@@ -80,7 +80,7 @@ class BelievesTheLidar(Believing):
 
 
 @breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "a covariance that is not")
-class BelievesTheGyroscope(Believing):
+class AcceptsNanGyro(BeliefWrapper):
     rate = 0.0
 
     def on_imu(self, imu):
@@ -91,28 +91,28 @@ class BelievesTheGyroscope(Believing):
 
 
 @breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "not positive semidefinite")
-class IsTooSure(Believing):
+class HasNegativeCovariance(BeliefWrapper):
     def changed(self, belief):
         return replace(belief, covariance=-belief.covariance)
 
 
 @breaks(LOCALIZER, "scans of any size range and mount are accepted", "raises IndexError when it receives a scan")
-class WantsAllBeams(Wrapper):
+class RequiresAllBeams(Wrapper):
     def on_scan(self, scan):
         scan.ranges[359]
 
 
 @breaks(LOCALIZER, "scans of any size range and mount are accepted", "weights that add up to")
-class WeighsNothing(Believing):
+class HasZeroWeights(BeliefWrapper):
     def changed(self, belief):
         return replace(belief, particles=np.zeros((3, 4)))
 
 
 @breaks(LOCALIZER, "a reset forgets", "after a reset")
-class NeverForgets(Wrapper):
-    told = 0
+class IgnoresReset(Wrapper):
+    resets = 0
 
     def reset(self, estimate):
-        self.told += 1
-        if self.told == 1:
+        self.resets += 1
+        if self.resets == 1:
             self.inner.reset(estimate)

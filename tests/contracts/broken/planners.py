@@ -1,4 +1,4 @@
-"""Planners that break a promise each."""
+"""Planners, each of which breaks a promise."""
 
 import math
 import random
@@ -15,33 +15,33 @@ from tests.contracts.broken.cases import Wrapper, breaks
 PLANNER = OmplPlanner()
 
 
-def _nudged(path, share):
-    """A path of which one pose is up to a millimeter off: plans from two seeds are now and then the same."""
+def _with_offset(path, share):
+    """Move one pose of a path by up to 1 mm, because two seeds sometimes give the same plan."""
     points = path.points.copy()
     points[len(points) // 2, 0] += 1e-3 * share
     return Path(points)
 
 
 @breaks(PLANNER, "success begins at the start", "begins 0.5")
-class BeginsElsewhere(Wrapper):
+class StartsElsewhere(Wrapper):
     def plan(self, costmap, start, goal, seed):
         return self.inner.plan(costmap, Pose2(start.x + 0.5, start.y, 0), goal, seed)
 
 
 @breaks(PLANNER, "success begins at the start", "from the goal, tolerance")
-class StopsShort(Wrapper):
-    def plan(self, *asked):
-        return Path(self.inner.plan(*asked).points[:-30])
+class EndsBeforeGoal(Wrapper):
+    def plan(self, *arguments):
+        return Path(self.inner.plan(*arguments).points[:-30])
 
 
 @breaks(PLANNER, "points are at most", "m apart")
-class LeavesOutPoints(Wrapper):
-    def plan(self, *asked):
-        return Path(self.inner.plan(*asked).points[::4])
+class OmitsPoints(Wrapper):
+    def plan(self, *arguments):
+        return Path(self.inner.plan(*arguments).points[::4])
 
 
 @breaks(PLANNER, "the footprint is never", "is in collision at")
-class GoesThroughWalls(Wrapper):
+class IgnoresObstacles(Wrapper):
     def plan(self, costmap, start, goal, seed):
         self.inner.plan(costmap, start, goal, seed)
         share = np.linspace(0, 1, 200)[:, None]
@@ -53,56 +53,56 @@ class GoesThroughWalls(Wrapper):
     "an impossible request fails with its error code",
     "raises ValueError when it plans, not a NavigationFailure",
 )
-class RaisesWhatItLikes(Wrapper):
-    def plan(self, *asked):
+class RaisesValueError(Wrapper):
+    def plan(self, *arguments):
         try:
-            return self.inner.plan(*asked)
+            return self.inner.plan(*arguments)
         except NavigationFailure as failure:
-            raise ValueError("no way") from failure
+            raise ValueError("no path") from failure
 
 
 @breaks(PLANNER, "an impossible request fails with its error code", "which is not an ErrorCode")
-class HasItsOwnCodes(Wrapper):
-    def plan(self, *asked):
+class RaisesUnknownCode(Wrapper):
+    def plan(self, *arguments):
         try:
-            return self.inner.plan(*asked)
+            return self.inner.plan(*arguments)
         except NavigationFailure as failure:
-            raise NavigationFailure(4711, "no way") from failure  # type: ignore[arg-type]
+            raise NavigationFailure(4711, "no path") from failure  # type: ignore[arg-type]
 
 
 @breaks(PLANNER, "an impossible request fails with its error code", "without points")
-class AnswersWithNothing(Wrapper):
-    def plan(self, *asked):
+class ReturnsEmptyPath(Wrapper):
+    def plan(self, *arguments):
         try:
-            return self.inner.plan(*asked)
+            return self.inner.plan(*arguments)
         except NavigationFailure:
             return Path()
 
 
 @breaks(PLANNER, "an impossible request fails with its error code", "does not return")
-class NeverGivesUp(Wrapper):
-    def plan(self, *asked):
+class NeverReturns(Wrapper):
+    def plan(self, *arguments):
         while True:
             try:
-                return self.inner.plan(*asked)
+                return self.inner.plan(*arguments)
             except NavigationFailure:
                 continue
 
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
-class DrawsFromTheGlobalGenerator(Wrapper):
-    def plan(self, *asked):
-        return _nudged(self.inner.plan(*asked), random.random())
+class UsesGlobalRandom(Wrapper):
+    def plan(self, *arguments):
+        return _with_offset(self.inner.plan(*arguments), random.random())
 
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
-class AsksTheClock(Wrapper):
-    def plan(self, *asked):
-        return _nudged(self.inner.plan(*asked), time.perf_counter_ns() % 10**9 / 10**9)
+class UsesWallClock(Wrapper):
+    def plan(self, *arguments):
+        return _with_offset(self.inner.plan(*arguments), time.perf_counter_ns() % 10**9 / 10**9)
 
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
-class RemembersHowOften(Wrapper):
+class CountsPlans(Wrapper):
     plans = 0
 
     def plan(self, costmap, start, goal, seed):
@@ -111,14 +111,14 @@ class RemembersHowOften(Wrapper):
 
 
 @breaks(PLANNER, "a costmap is neither", "changes the costmap")
-class DrawsIntoTheCostmap(Wrapper):
-    def plan(self, costmap, *asked):
+class ChangesCostmap(Wrapper):
+    def plan(self, costmap, *arguments):
         costmap.costs[0, 0] = 7
-        return self.inner.plan(costmap, *asked)
+        return self.inner.plan(costmap, *arguments)
 
 
 @breaks(PLANNER, "a costmap is neither", "an old costmap affects a new plan")
-class KeepsItsFirstCostmap(Wrapper):
+class KeepsFirstCostmap(Wrapper):
     kept = None
 
     def plan(self, costmap, start, goal, seed):
@@ -128,14 +128,14 @@ class KeepsItsFirstCostmap(Wrapper):
 
 
 @breaks(PLANNER, "success begins", "not finite float64")
-class PlansNothings(Wrapper):
-    def plan(self, *asked):
-        points = self.inner.plan(*asked).points.copy()
+class ReturnsNan(Wrapper):
+    def plan(self, *arguments):
+        points = self.inner.plan(*arguments).points.copy()
         points[3, 0] = math.nan
         return Path(points)
 
 
 @breaks(PLANNER, "success begins", "points are not (n, 3)")
-class ForgetsHeadings(Wrapper):
-    def plan(self, *asked):
-        return Path(self.inner.plan(*asked).points[:, :2])
+class OmitsHeadings(Wrapper):
+    def plan(self, *arguments):
+        return Path(self.inner.plan(*arguments).points[:, :2])

@@ -1,4 +1,4 @@
-"""Sensors that break a promise each."""
+"""Sensors, each of which breaks a promise."""
 
 import math
 import random
@@ -14,32 +14,32 @@ SENSOR = Bumper()
 
 
 @breaks(SENSOR, "a reading has the declared type name and tick", "labels a reading of tick")
-class SignsForAnother(Wrapper):
+class HasWrongName(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), sensor="other")
 
 
 @breaks(SENSOR, "a reading has the declared type name and tick", "returns Odometry, not Bump")
-class SaysSomethingElse(Wrapper):
+class ReturnsWrongType(Wrapper):
     def read(self, tick):
         return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
 
 
 @breaks(Lidar(), "the numbers of a reading are finite", "returns angle_min = nan")
-class KnowsNoAngles(Wrapper):
+class ReturnsNanAngle(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), angle_min=math.nan)
 
 
 @breaks(Lidar(), "the same world", "for the same")
-class MeasuresByChance(Wrapper):
+class UsesGlobalRandom(Wrapper):
     def read(self, tick):
         scan = self.inner.read(tick)
         return replace(scan, ranges=scan.ranges + random.random())
 
 
 @breaks(Lidar(), "a reading does not change", "changes when the next one is taken")
-class UsesItsArrayAgain(Wrapper):
+class ReusesArray(Wrapper):
     kept = None
 
     def read(self, tick):

@@ -1,4 +1,4 @@
-"""Whole stacks that break a promise each."""
+"""Whole stacks, each of which breaks a promise."""
 
 import random
 from dataclasses import replace
@@ -16,7 +16,7 @@ from tests.contracts.broken.cases import Wrapper, breaks
 STACK = StackSpec(localizer=GroundTruth(type="ground_truth"))
 
 
-class Deciding(Wrapper):
+class DecisionWrapper(Wrapper):
     tick = 0
 
     def decide(self, tick, readings):
@@ -28,26 +28,26 @@ class Deciding(Wrapper):
 
 
 @breaks(STACK, "it reaches a goal", "touches something")
-class RamsThings(Deciding):
+class DrivesIntoObstacles(DecisionWrapper):
     def changed(self, decision):
         near = self.tick < 1440
         return replace(decision, command=Twist(0.5, 0.0, 0.0) if near else decision.command)
 
 
 @breaks(STACK, "it reaches a goal", "navigation ends with")
-class FallsAsleep(Deciding):
+class NeverMoves(DecisionWrapper):
     def changed(self, decision):
         return replace(decision, command=Twist())
 
 
 @breaks(STACK, "without a goal", "commands a velocity without a goal")
-class CannotStandStill(Deciding):
+class TurnsWithoutGoal(DecisionWrapper):
     def changed(self, decision):
         return replace(decision, command=decision.command if any(decision.command) else Twist(0.0, 0.0, 0.01))
 
 
 @breaks(STACK, "once a task has ended", "after the end of its task")
-class GoesOn(Deciding):
+class DrivesAfterEnd(DecisionWrapper):
     ended = False
 
     def changed(self, decision):
@@ -56,46 +56,46 @@ class GoesOn(Deciding):
 
 
 @breaks(STACK, "a canceled task", "does not report that its goal is canceled")
-class TellsNobody(Deciding):
+class HidesCancellation(DecisionWrapper):
     def changed(self, decision):
         kept = tuple(event for event in decision.events if event.kind != EventKind.GOAL_CANCELED)
         return replace(decision, events=kept)
 
 
 @breaks(STACK, "a canceled task", "commands a velocity after it was canceled")
-class MindsNoCancel(Deciding):
+class IgnoresCancel(DecisionWrapper):
     def cancel(self, tick):
         pass
 
 
 @breaks(STACK, "a goal that preempts", "drives to")
-class MindsNoOtherGoal(Deciding):
+class IgnoresPreemption(DecisionWrapper):
     def preempt(self, tick, goal):
         pass
 
 
 @breaks(STACK, "every goal is accepted once", "accepts")
-class AcceptsTwice(Deciding):
+class AcceptsGoalTwice(DecisionWrapper):
     def changed(self, decision):
         again = tuple(event for event in decision.events if event.kind == EventKind.GOAL_ACCEPTED)
         return replace(decision, events=decision.events + again)
 
 
 @breaks(STACK, "the same seed", "differ in their commands")
-class DrivesByChance(Deciding):
+class UsesGlobalRandom(DecisionWrapper):
     def changed(self, decision):
         vx, vy, wz = decision.command
         return replace(decision, command=Twist(vx, vy, wz * (1 + 1e-12 * random.random()) + 1e-15 * random.random()))
 
 
 @breaks(STACK, "without a goal", "the event goal.reached of tick -5")
-class TellsOfThePast(Deciding):
+class ReportsPastEvent(DecisionWrapper):
     def changed(self, decision):
         return replace(decision, events=(Event(-5, EventKind.GOAL_REACHED, "x"),))
 
 
 @breaks(STACK, "invalid scans never make a decision invalid", "raises ValueError when it decides")
-class CannotBeBlind(Deciding):
+class RejectsNanScan(DecisionWrapper):
     def decide(self, tick, readings):
         for reading in readings:
             if hasattr(reading, "ranges") and np.isnan(reading.ranges).any():
@@ -104,7 +104,7 @@ class CannotBeBlind(Deciding):
 
 
 @breaks(STACK, "it reaches a goal", "changes the ranges of a scan")
-class CleansScans(Deciding):
+class ChangesScan(DecisionWrapper):
     def decide(self, tick, readings):
         for reading in readings:
             if hasattr(reading, "ranges"):

@@ -98,5 +98,5 @@ def test_exception_in_a_validator_is_a_problem_of_the_file(simscen, packages, tm
 
 def test_scenario_folder_is_never_imported(simscen, packages, tmp_path, monkeypatch) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))  # as `python -m` does with the working directory
-    packages.lay(tmp_path, "hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise SystemExit('it ran')")
+    packages.install(tmp_path, "hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise SystemExit('ran')")
     assert simscen("plugins").out.startswith("no plug-ins")
