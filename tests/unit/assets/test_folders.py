@@ -53,7 +53,7 @@ def test_a_package_xml_behind_a_link_is_not_read(folders: AllowedFolders, tmp_pa
         folders.package_folder("cart", folders.roots[0])
 
 
-def test_a_package_that_is_given_is_not_looked_for(folders: AllowedFolders, tmp_path: Path) -> None:
+def test_a_package_with_a_specified_path_is_not_searched(folders: AllowedFolders, tmp_path: Path) -> None:
     root, models = folders.roots
     put(models / "cart" / "base.stl")
     own = put(root / "vendor" / "base.stl")
@@ -102,7 +102,7 @@ def test_missing_file_message_reveals_nothing_outside(
     assert str(caught.value) == why
 
 
-def test_an_absolute_path_is_read_inside_where_it_may_be_absolute(folders: AllowedFolders) -> None:
+def test_an_absolute_path_inside_the_root_is_read_if_allowed(folders: AllowedFolders) -> None:
     there = put(folders.roots[0] / "base.stl")
     assert folders.find(str(there), folders.roots[1], absolute=True) == there
     with pytest.raises(UnusableFile, match="outside"):

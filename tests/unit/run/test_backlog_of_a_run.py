@@ -45,7 +45,7 @@ class Lag:
 
 
 @pytest.mark.parametrize("others", [False, True])
-def test_moments_wait_unless_a_run_has_code_of_others(tmp_path: Path, others: bool) -> None:
+def test_moments_are_recorded_immediately_if_a_run_has_plugins(tmp_path: Path, others: bool) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(SCENARIO)
     package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")

@@ -34,7 +34,7 @@ def ticks(trace, *kinds):
     return {event.name: event.tick for event in trace.of_kind(*(kinds or (EventKind.EVENT_STARTED,)))}
 
 
-def test_steps_happen_in_their_order_each_counted_from_the_one_before(trace):
+def test_each_step_counts_from_the_previous_one(trace):
     at = ticks(trace)
     assert at["story"] == 240
     assert at["story then 1"] == 360
@@ -45,7 +45,7 @@ def test_steps_happen_in_their_order_each_counted_from_the_one_before(trace):
     assert at["story then 4"] == at["story then 3"]  # nothing to wait for
 
 
-def test_only_what_happens_from_then_on_counts(trace):
+def test_step_ignores_events_before_its_start(trace):
     """The first goal was accepted long before; the step waits for the one that the story sends."""
     accepted = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED) if event.name == "back"]
     at = ticks(trace)
@@ -60,13 +60,13 @@ def test_events_and_faults_may_wait_for_a_step(trace):
     assert ticks(trace, EventKind.FAULT_STARTED)["lidar.dropout"] == at["story then 3"]
 
 
-def test_a_story_that_waits_changes_nothing_until_it_goes_on(play):
+def test_waiting_chain_does_not_change_the_run(play):
     alone = play("")
     story = f"events: [{{when: {{time: 2 s}}, then: [{{when: {{travelled: 9 m}}, {PUSH}}}], required: false}}]\n"
     assert alone.truth.values.tolist() == play(story).truth.values.tolist()
 
 
-def test_in_a_step_everything_that_counts_counts_from_its_beginning():
+def test_conditions_of_a_step_count_from_its_start():
     now = FakeStage(tick=1000, travelled=5.0, scans={"lidar": 990, "rear": 700})
     step = RelativeSituation(now)
 

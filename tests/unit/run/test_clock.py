@@ -26,7 +26,7 @@ def test_events_are_logged_in_the_order_in_which_they_happened(play):
 
 
 @pytest.mark.parametrize("truth_rate", [40, 120, 20])
-def test_the_rate_of_the_truth_changes_triggers_by_at_most_one_sample(play, truth_rate):
+def test_truth_rate_changes_triggers_by_at_most_one_sample(play, truth_rate):
     """Triggers by time are exact. Triggers by place are checked at each sample, here at least at 40 Hz."""
     extra = """\
 events:

@@ -24,7 +24,7 @@ def order(filters, what, enabled, region=None, limit=None):
     return filters.rejection_reason(told) or filters.switch(told)
 
 
-def test_zones_come_in_the_order_in_which_they_were_named():
+def test_zones_keep_their_order_when_they_are_switched():
     some = filters(**STACK)
     assert some.zones.keepout == (WET,)
     assert order(some, "keepout", True, "dry") == ("dry",)
@@ -46,7 +46,7 @@ def test_last_speed_limit_applies():
     assert some.zones.speed == ((SLOW, 0.1),)
 
 
-def test_a_filter_switched_as_a_whole_takes_its_mask_along_and_gives_back_what_was_on():
+def test_switching_a_whole_filter_includes_its_mask_and_restores_its_zones():
     some = filters(FilterMasks(MASK), keepout=["wet", "dry"])
     order(some, "keepout", False, "dry")
     assert order(some, "keepout", False) == ("wet", "")
@@ -66,11 +66,11 @@ def test_a_filter_switched_as_a_whole_takes_its_mask_along_and_gives_back_what_w
         ("the stack's keepout filter was on already", "keepout", True, None, None),
     ],
 )
-def test_an_order_that_changes_nothing_says_why(told, what, enabled, region, limit):
+def test_switch_without_effect_returns_the_reason(told, what, enabled, region, limit):
     assert order(filters(**STACK), what, enabled, region, limit) == told
 
 
-def test_a_filter_of_nothing_cannot_be_switched_and_one_that_is_off_takes_no_orders():
+def test_empty_filter_and_zones_of_a_disabled_filter_cannot_be_switched():
     assert order(filters(), "speed", False) == "the stack's speed filter has no zone and no mask"
     some = filters(**STACK)
     order(some, "keepout", False)

@@ -16,7 +16,7 @@ pass:
 """
 
 
-def test_a_criterion_of_a_base_has_no_line_in_the_file_that_extends_it(tmp_path: Path) -> None:
+def test_criterion_of_a_base_file_has_line_0(tmp_path: Path) -> None:
     """Line 6 of the scenario is another one than line 6 of its base."""
     (tmp_path / "base.yaml").write_text(BASE)
     (tmp_path / "a.scenario.yaml").write_text("extends: base.yaml\n\n\nname: a\n")

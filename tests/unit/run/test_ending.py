@@ -26,9 +26,7 @@ RATES = [
 
 
 @pytest.mark.parametrize(("tick_rate", "truth_rate", "controller"), RATES)
-def test_a_run_ends_soon_after_its_task_at_all_rates_and_with_a_sample_of_the_truth(
-    play, tick_rate, truth_rate, controller
-):
+def test_run_ends_soon_after_navigation_with_a_truth_sample_at_all_rates(play, tick_rate, truth_rate, controller):
     trace = play(
         physics=f"{{tick_rate: {tick_rate}, truth_rate: {truth_rate} Hz}}",
         stack=f"{{controller_frequency: {controller} Hz, localizer: {{type: ground_truth}}}}",
@@ -42,7 +40,7 @@ def test_a_run_ends_soon_after_its_task_at_all_rates_and_with_a_sample_of_the_tr
 
 @pytest.mark.parametrize(("truth_rate", "time_limit"), [(20, "110 ms"), (40, "101 ms"), (240, "100 ms"), (20, "60 ms")])
 @pytest.mark.parametrize("robots", [1, 2])
-def test_a_run_ends_exactly_at_its_time_limit_with_a_sample_of_the_truth(play, truth_rate, time_limit, robots):
+def test_run_ends_exactly_at_its_time_limit_with_a_truth_sample(play, truth_rate, time_limit, robots):
     instead = {"goals": "[]", "pass": "[{collisions: {max: 0}}]"}
     if robots == 2:
         del instead["goals"]
@@ -56,14 +54,14 @@ def test_a_run_ends_exactly_at_its_time_limit_with_a_sample_of_the_truth(play, t
     assert trace.truth.ticks[:-1].tolist() == list(range(0, limit, period))
 
 
-def test_an_end_between_two_samples_breaks_nothing_that_is_derived_from_them(play):
+def test_run_that_ends_between_two_samples_can_be_judged(play):
     trace = play(time_limit="2.01", physics="{truth_rate: 20 Hz}", stack="{localizer: {type: ground_truth}}")
     criterion = AnyCriterion.model_validate({"always": {"signal": "jerk", "op": "<=", "value": 1e6}})
     (verdict,) = judge([criterion], trace, synthetic_case({}))
     assert verdict.status is Status.PASS, verdict
 
 
-def test_a_new_goal_takes_the_ending_back():
+def test_new_goal_cancels_the_end_of_the_run():
     ending = EndCondition(Clock(240), 60.0, 0.5)
     ending.update(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
     assert not ending.end_event(219)

@@ -33,7 +33,7 @@ def thresholds():
 
 
 @pytest.mark.parametrize("others", [False, True])
-def test_garbage_is_looked_for_as_ever_where_code_of_others_runs(
+def test_garbage_collection_threshold_is_not_changed_if_a_run_has_plugins(
     thresholds: tuple[int, int, int], others: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop(*_: object, **__: object) -> None:

@@ -17,7 +17,7 @@ pass: [{collisions: {max: 0}}]
 """
 
 
-def test_goals_that_name_no_tolerances_have_those_of_the_stack(tmp_path: Path) -> None:
+def test_goals_without_tolerances_have_those_of_the_stack(tmp_path: Path) -> None:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO)
     spec = load_scenario(file, tmp_path).spec

@@ -6,7 +6,7 @@ from simscen.run.faults.interfaces import CommandLink
 GO, FAST = Twist(0.3), Twist(0.5)
 
 
-def test_the_stack_sends_at_its_rate_and_at_once_when_it_wants_something_else():
+def test_commands_are_sent_at_the_rate_and_immediately_when_they_change():
     link = CommandLink(12, 120)
     wanted = [GO] * 15 + [STOP] * 15
     assert [tick for tick, command in enumerate(wanted) if link.send(tick, command)] == [0, 12, 15, 24]
@@ -20,7 +20,7 @@ def test_base_without_commands_keeps_the_last_one_and_stops_after_its_timeout():
     assert link.active_command(606) == FAST
 
 
-def test_a_timeout_shorter_than_the_time_between_two_commands_lets_it_drive_all_the_same():
+def test_timeout_shorter_than_the_command_period_does_not_stop_the_base():
     link = CommandLink(48, 12)
     link.receive(0, GO)
     assert link.active_command(47) == GO

@@ -30,7 +30,7 @@ def verdicts(tmp_path: Path):
     return run
 
 
-def test_a_goal_that_an_event_sends_is_judged_with_the_tolerances_of_the_stack(verdicts):
+def test_goal_sent_by_an_event_is_judged_with_the_tolerances_of_the_stack(verdicts):
     found, done = verdicts(
         "events: [{name: redirect, when: {time: 1 s}, do: {new_goal: {name: detour, pose: {x: 0, y: 1}}}}]\n"
         "pass: [{goals_reached: {}}, {id: named, goals_reached: {goals: [detour]}}, {time_to_goal: {max: 25 s}}]"
@@ -42,14 +42,14 @@ def test_a_goal_that_an_event_sends_is_judged_with_the_tolerances_of_the_stack(v
     assert done.result.metrics["success"] == 1.0
 
 
-def test_clearance_is_searched_as_far_as_a_criterion_asks(verdicts):
+def test_clearance_search_radius_follows_the_criterion(verdicts):
     found, done = verdicts("pass: [{clearance: {min: 3 m}}]")
     assert found["clearance"].status is Status.PASS
     assert done.trace.clearance.values.max() == 3.5
     assert done.result.metrics["min_clearance"] == 2.0
 
 
-def test_a_wall_beyond_the_usual_search_is_near_enough_to_fail_a_far_bound(verdicts):
+def test_wall_beyond_the_default_search_radius_violates_a_larger_bound(verdicts):
     found, _ = verdicts("pass: [{clearance: {min: 5 m}}]")
     assert found["clearance"].status is Status.FAIL
     assert found["clearance"].findings[0].value == pytest.approx(6 - 1.5 - 0.2, abs=0.4)

@@ -60,7 +60,7 @@ def lateness(taken: list, kind: type) -> set[int]:
     return {moment.tick - one.tick for moment in taken for one in moment.readings if type(one) is kind}
 
 
-def test_readings_of_a_late_sensor_come_when_they_come_and_say_when_they_were_taken(tmp_path: Path) -> None:
+def test_delayed_readings_keep_the_tick_of_their_measurement(tmp_path: Path) -> None:
     taken = moments(tmp_path, 60, lidar=", latency: 30 ms")
     assert lateness(taken, Scan) == {7}
     assert lateness(taken, Odometry) == {
@@ -68,7 +68,7 @@ def test_readings_of_a_late_sensor_come_when_they_come_and_say_when_they_were_ta
     }
 
 
-def test_a_scenario_that_asks_for_it_has_the_latencies_of_its_robot(tmp_path: Path) -> None:
+def test_latencies_of_the_robot_apply_if_the_scenario_requests_them(tmp_path: Path) -> None:
     latency = "latency: {planner: 100 ms, controller: 10 ms, sensors: {lidar: 50 ms, odom: 10 ms}}"
     taken = moments(tmp_path, 60, ", latency: robot", ", latency: 30 ms", latency)
     assert lateness(taken, Scan) == {12}
@@ -93,7 +93,7 @@ def test_latency_of_a_missing_sensor_is_refused(tmp_path: Path) -> None:
         moments(tmp_path, 1, latency="latency: {sensors: {sonar: 1 ms}}")
 
 
-def test_a_late_sensor_keeps_the_order_of_its_readings() -> None:
+def test_delayed_readings_keep_their_order() -> None:
     class Sensor:
         name, period = "s", 4
 

@@ -32,12 +32,12 @@ def two(tmp_path: Path):
     return prepared
 
 
-def test_robots_whose_maps_are_true_run_with_what_was_prepared(two) -> None:
+def test_robots_without_map_faults_use_the_prepared_scenario(two) -> None:
     prepared = two()
     assert apply_map_faults(prepared, seed=1) is prepared
 
 
-def test_only_the_robot_whose_map_has_a_fault_gets_another(two) -> None:
+def test_only_the_robot_with_a_map_fault_gets_another_map(two) -> None:
     prepared = two(", faults: [{sensor: map, shift: {x: 10 cm}}]")
     run = apply_map_faults(prepared, seed=1)
     assert run.robots["a"] is prepared.robots["a"]

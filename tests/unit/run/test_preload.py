@@ -36,7 +36,7 @@ print("late:", *sorted(name for name in set(sys.modules) - before if name.split(
 """
 
 
-def test_a_run_imports_nothing_of_simscens_own_any_more_and_works_out_no_walls(tmp_path: Path) -> None:
+def test_run_after_the_warm_up_imports_no_modules_and_computes_no_walls(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     told = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path)], capture_output=True, text=True, check=True, timeout=120
@@ -44,7 +44,7 @@ def test_a_run_imports_nothing_of_simscens_own_any_more_and_works_out_no_walls(t
     assert "late:\n" in told.stdout
 
 
-def test_components_of_packages_are_left_to_the_process_of_the_run() -> None:
+def test_components_of_plugins_are_not_preloaded() -> None:
     class Theirs(Component):
         component = "nowhere.at_all:Theirs"
 

@@ -101,7 +101,7 @@ def test_a_package_in_another_repository_of_the_workspace_is_found(published):
     assert published(parts="other_repo/cart_parts").wheels
 
 
-def test_a_package_that_its_repository_keeps_in_a_folder_is_found(published):
+def test_a_package_in_a_subfolder_of_its_repository_is_found(published):
     assert published(parts="other_repo/common/cart_parts").wheels
 
 
@@ -109,7 +109,7 @@ def test_a_package_is_found_through_a_folder_of_the_world_path(published):
     assert published(parts="../ros/share/cart_parts", world_path=["../ros/share"]).wheels
 
 
-def test_a_package_is_where_the_robots_file_says(published):
+def test_a_package_path_in_the_robot_file_is_used(published):
     assert published("packages: {cart_parts: vendor/parts}", parts="vendor/parts").wheels
 
 
@@ -152,17 +152,17 @@ def test_a_package_that_is_a_file_or_missing_is_refused_at_its_line(refusal):
         "../../cart_parts/meshes/plate.obj",
     ],
 )
-def test_a_mesh_is_found_however_xacro_files_name_it(published, mesh):
+def test_a_mesh_is_found_by_every_notation_of_xacro_files(published, mesh):
     assert "plate" in [solid.name for solid in published("arguments: {plate: true}", mesh).hull]
 
 
 @pytest.mark.parametrize("mesh", ["package://cart_parts/../../../x.obj", "file:///etc/passwd", "/etc/passwd"])
-def test_no_mesh_outside_is_read(refusal, mesh):
+def test_a_mesh_outside_the_root_is_not_read(refusal, mesh):
     assert "outside the scenario root" in refusal("arguments: {plate: true}", mesh).message
 
 
 @pytest.mark.parametrize(("written", "length"), [("0.6", 0.6), ("'0.7'", 0.7), ("1", 1.0)])
-def test_an_argument_is_in_place_of_its_default(published, written, length):
+def test_an_argument_replaces_its_default(published, written, length):
     (base,) = (solid for solid in published(f"arguments: {{length: {written}}}").hull if solid.name == "base")
     assert base.shape.size[0] == length
 
@@ -174,11 +174,11 @@ def test_undeclared_argument_is_reported_with_a_suggestion(refusal):
     assert problem.hint == "did you mean `length`?"
 
 
-def test_an_argument_may_be_declared_where_nothing_is_expanded(published):
+def test_an_argument_may_be_declared_in_a_block_that_is_not_expanded(published):
     assert published("arguments: {thick: 0.02}").wheels
 
 
-def test_arguments_mean_nothing_without_a_urdf():
+def test_arguments_without_a_urdf_are_refused():
     spec = {"simscen": 1, "name": "x", "mass": 1.0, "body": [{"box": [0.1, 0.1, 0.1], "z": 0.1}], "sensors": {}}
     limits = {"linear": 1, "angular": 1, "linear_acceleration": 1, "angular_acceleration": 1}
     with pytest.raises(ValidationError, match="`packages` and `arguments` are only valid with `urdf`"):

@@ -9,14 +9,14 @@ from simscen.run.sessions.results import display_path, repeat_command
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{collisions: {}}]\n"
 
 
-def test_a_scenario_of_the_folder_needs_no_options(tmp_path, monkeypatch):
+def test_a_scenario_in_the_current_folder_needs_no_options(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a b.scenario.yaml").write_text(TEXT)
     scenario = load_scenario(tmp_path / "a b.scenario.yaml", tmp_path)
     assert repeat_command(scenario, 7) == "simscen run 'a b.scenario.yaml' --seed 7"
 
 
-def test_the_path_is_seen_from_here_and_what_matters_is_named(tmp_path, monkeypatch):
+def test_command_contains_the_relative_path_and_all_options(tmp_path, monkeypatch):
     (tmp_path / "sub").mkdir()
     (tmp_path / "models").mkdir()
     (tmp_path / "sub/a.scenario.yaml").write_text(TEXT)
@@ -26,7 +26,7 @@ def test_the_path_is_seen_from_here_and_what_matters_is_named(tmp_path, monkeypa
     assert told[2:] == ["../sub/a.scenario.yaml", "--seed", "1", "--root", "..", "--world-path", ".", "--lenient"]
 
 
-def test_from_far_away_the_absolute_path_is_shorter(tmp_path, monkeypatch):
+def test_displayed_path_is_absolute_if_that_is_shorter(tmp_path, monkeypatch):
     deep = tmp_path.joinpath(*"abcdefghijklmnopqrstuvwxyz")
     deep.mkdir(parents=True)
     monkeypatch.chdir(deep)

@@ -168,7 +168,7 @@ def test_unused_file_does_not_change_the_digest(project: Path, of: Digest) -> No
     assert of() == before
 
 
-def test_the_order_of_the_world_path_matters_where_it_chooses_another_model(project: Path, of: Digest) -> None:
+def test_order_of_the_world_path_changes_the_digest_if_it_selects_another_model(project: Path, of: Digest) -> None:
     """The first folder can contain another shelf."""
     (project / "mine/shelf").mkdir(parents=True)
     (project / "mine/shelf/model.config").write_text(MODEL_CONFIG)
@@ -182,7 +182,7 @@ def test_lenient_option_changes_the_digest(of: Digest) -> None:
     assert of(lenient=True) != of()
 
 
-def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Digest) -> None:
+def test_scenarios_of_one_world_list_all_its_files(project: Path, of: Digest) -> None:
     """Also the second one, whose world another has had built already."""
     (project / "p/b.scenario.yaml").write_text(FILES["p/a.scenario.yaml"])
     loaded, _ = load_selection([project / "p"], project / "p", [project / "models"], False, Selection())

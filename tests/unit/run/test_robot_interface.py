@@ -5,7 +5,7 @@ from simscen.run.robot_interface import TickSchedule
 
 
 @given(st.lists(st.sampled_from([1, 2, 3, 4, 6, 8, 12, 24, 48, 7]), min_size=1, max_size=4))
-def test_every_tick_at_which_something_is_due_is_visited_and_no_other(periods):
+def test_exactly_the_multiples_of_all_periods_are_visited(periods):
     table, tick, visited = TickSchedule(periods), 0, []
     while tick < 500:
         tick += table.until_next(tick)

@@ -11,7 +11,7 @@ from simscen.run.scenario_cache import CACHE_FORMAT, DiskCache, cache_folder, di
 KEY, OTHER = "a" * 64, "b" * 64
 
 
-def test_the_folder_is_where_caches_of_the_platform_are_and_can_be_moved_or_left_out() -> None:
+def test_cache_folder_depends_on_the_environment_variables() -> None:
     assert cache_folder({"HOME": "/home/me"}) == Path("/home/me/.cache/simscen", CACHE_FORMAT)
     assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "/fast"}) == Path("/fast/simscen", CACHE_FORMAT)
     assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "relative"}) == Path(
@@ -62,7 +62,7 @@ def test_damaged_cache_file_is_replaced(tmp_path: Path, damage: str) -> None:
     assert kept.get(KEY) == (None if damage == "folder" else b"content")
 
 
-def test_a_folder_into_which_others_may_write_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_that_other_users_can_write_to_is_not_used(tmp_path: Path) -> None:
     kept = DiskCache(tmp_path / "c")
     kept.put(KEY, b"content")
     (tmp_path / "c").chmod(0o777)
@@ -87,7 +87,7 @@ def test_least_recently_used_cache_file_is_deleted_first(tmp_path: Path) -> None
     assert kept.get(OTHER) is None, "it has no room at all"
 
 
-def test_sessions_that_write_the_same_at_once_leave_one_sound_file(tmp_path: Path) -> None:
+def test_concurrent_writes_of_one_entry_leave_one_valid_file(tmp_path: Path) -> None:
     content = bytes(range(256)) * 400
     threads = [threading.Thread(target=DiskCache(tmp_path).put, args=(KEY, content)) for _ in range(8)]
     for thread in threads:
@@ -98,7 +98,7 @@ def test_sessions_that_write_the_same_at_once_leave_one_sound_file(tmp_path: Pat
     assert [path.name for path in tmp_path.iterdir()] == [KEY]
 
 
-def test_a_folder_that_cannot_be_written_costs_nothing_but_the_time(tmp_path: Path) -> None:
+def test_an_unwritable_folder_disables_the_cache(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     kept = DiskCache(tmp_path / "file" / "c")
     kept.put(KEY, b"content")

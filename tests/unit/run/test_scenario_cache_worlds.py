@@ -64,7 +64,7 @@ def test_readable_but_invalid_cache_file_is_ignored(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("other", [(1.0, 0.0, 0.2), (0.0, 0.5, 0.2), (0.0, 0.0, 0.3)])
-def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp_path: Path, other) -> None:
+def test_cached_path_lengths_depend_on_world_goal_and_robot(tmp_path: Path, other) -> None:
     kept = CachedWorldBuilder(DiskCache(tmp_path))
 
     def legs(wall: float, goal: float, radius: float) -> object:

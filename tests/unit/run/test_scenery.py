@@ -62,7 +62,7 @@ def test_zones_are_those_of_the_stack():
     assert [(z.region, z.speed_limit) for z in scenery("zones/quiet_ward").zones] == [("north_corridor", 0.25)]
 
 
-def test_a_log_carries_the_scenery_the_map_as_it_is_and_what_is_spilled(tmp_path):
+def test_a_log_contains_scenery_map_and_friction_changes(tmp_path):
     file = tmp_path / "spilled.scenario.yaml"
     file.write_text("""\
 simscen: 1

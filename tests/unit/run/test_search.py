@@ -38,7 +38,7 @@ def test_tpe_finds_rare_failures_in_sixty_runs(name: str) -> None:
 
 
 @pytest.mark.parametrize("method", [SearchMethod.TPE, SearchMethod.SOBOL, SearchMethod.RANDOM])
-def test_a_search_is_repeatable_and_stays_inside(method: SearchMethod) -> None:
+def test_a_search_is_repeatable_and_stays_within_the_bounds(method: SearchMethod) -> None:
     def points() -> list[tuple[float, ...]]:
         search, found = make_search(method, [0, 3, 0], 7), []
         for _ in range(6):

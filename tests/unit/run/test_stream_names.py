@@ -100,7 +100,7 @@ LATER = {"sensor": "lidar", "when": {"time": "5 s"}}
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("other", KINDS)
 @pytest.mark.parametrize("name", [None, "mine"])
-def test_a_fault_that_is_over_leaves_the_draws_of_all_others_alone(kind, other, name):
+def test_an_ended_fault_does_not_change_the_random_numbers_of_others(kind, other, name):
     mine = {**LATER, **kind} | ({"name": name} if name else {})
     alone, beside = rig(mine), rig({"sensor": "lidar", "for": "1 s", **other}, mine)
     beside.begin(0)
@@ -132,7 +132,7 @@ DISTORTIONS = [{"bias": {"linear_scale": 1.5}}, {"slip": {"left": 0.3, "right": 
 @pytest.mark.parametrize("first", DISTORTIONS)
 @pytest.mark.parametrize("second", [None, *DISTORTIONS])
 @pytest.mark.parametrize("order", [1, -1])
-def test_the_error_of_odometry_stays_when_the_same_or_another_fault_begins(first, second, order):
+def test_the_error_of_odometry_stays_when_the_same_or_another_fault_starts(first, second, order):
     """The reported pose never jumps by more than a step, and what has been reported too much is never taken back."""
     entries = [{"sensor": "odom", **kind} for kind in (first, second) if kind]
     faults = rig(*entries[::order])
@@ -151,7 +151,7 @@ def test_the_error_of_odometry_stays_when_the_same_or_another_fault_begins(first
     assert faults.disturb((odometry(100),))[0].pose.distance(odometry(100).pose) > 0.1
 
 
-def test_streams_are_named_by_what_entries_are_called_or_say_never_by_their_place():
+def test_stream_names_depend_on_name_or_content_but_not_on_position():
     def names(*entries):
         made = [EventEntry.model_validate(entry, by_alias=True, by_name=False) for entry in entries]
         return stream_names(made)
@@ -165,7 +165,7 @@ def test_streams_are_named_by_what_entries_are_called_or_say_never_by_their_plac
     assert names(push, pull)[1:] == names({**pull, "when": {"time": "1000 ms"}})
 
 
-def test_keys_of_packages_are_part_of_the_stream_name(yardwork):
+def test_keys_of_plugins_are_part_of_the_stream_name(yardwork):
     slow, fast = ({"when": {"reversing": speed}, "do": {"turn_robot": {"by": 1.0}}} for speed in (0.1, 0.2))
     other = {**slow, "do": {"turn_robot": {"by": 2.0}}}
     names = stream_names([EventEntry.model_validate(words) for words in (slow, fast, other)])

@@ -36,11 +36,11 @@ def test_a_falling_trigger_fires_when_its_condition_stops_being_true():
     assert firings({"not": {"travelled": 2.0}, "edge": "falling"}, [0, 1, 2, 3]) == [0, 0, 1, 0]
 
 
-def test_a_falling_trigger_needs_to_have_seen_its_condition_hold():
+def test_a_falling_trigger_needs_a_condition_that_was_true_before():
     assert firings({"travelled": 2.0, "edge": "falling"}, [0, 1, 0, 0]) == [0, 0, 0, 0]
 
 
-def test_a_trigger_fires_as_often_as_it_may():
+def test_a_trigger_fires_at_most_the_specified_number_of_times():
     assert firings({"travelled": 1.0, "times": 2}, [0, 1, 0, 1, 0, 1]) == [0, 1, 0, 1, 0, 0]
 
 
@@ -48,13 +48,13 @@ def test_a_delayed_trigger_fires_later():
     assert firings({"travelled": 1.0, "delay": "200 ms"}, [0, 1, 1, 1, 1]) == [0, 0, 0, 1, 0]
 
 
-def test_a_probability_is_the_share_of_edges_that_count():
+def test_a_probability_is_the_share_of_edges_that_fire():
     edges = [0, 1] * 4000
     fired = sum(firings({"travelled": 1.0, "times": 4000, "probability": 0.3}, edges))
     assert fired / 4000 == pytest.approx(0.3, abs=0.03)  # four standard errors
 
 
-def test_the_same_seed_gives_the_same_chance():
+def test_random_firings_depend_only_on_the_seed():
     edges = [0, 1] * 50
     trigger = {"travelled": 1.0, "times": 50, "probability": 0.5}
     assert firings(trigger, edges, seed=3) == firings(trigger, edges, seed=3)
@@ -64,7 +64,7 @@ def test_the_same_seed_gives_the_same_chance():
 LASTING = {"travelled": 1.0, "for": "300 ms"}  # 72 ticks: three beats of a test
 
 
-def test_a_condition_that_lasts_counts_once_it_has_been_true_for_so_long():
+def test_a_condition_with_a_duration_fires_at_the_end_of_the_duration():
     assert firings(LASTING, [0, 1, 1, 1, 1, 1]) == [0, 0, 0, 0, 1, 0]
 
 
@@ -82,7 +82,7 @@ def test_falling_edge_with_duration_needs_a_lasting_condition():
     assert firings(falling, [0, 1, 1, 1, 0, 0, 0, 0]) == [0] * 8
 
 
-def test_delays_come_after_what_lasts():
+def test_a_delay_starts_at_the_end_of_the_duration():
     assert firings({**LASTING, "delay": "100 ms"}, [0, 1, 1, 1, 1, 1, 1]) == [0, 0, 0, 0, 0, 1, 0]
 
 
@@ -102,7 +102,7 @@ def lasts(values, beats):
 
 
 @pytest.mark.parametrize("where", COMBINED)
-def test_a_condition_may_last_anywhere_inside_of_others(where):
+def test_durations_apply_inside_combined_conditions(where):
     words, truth = COMBINED[where]
     rng = np.random.default_rng(5)
     fast, hall = (np.repeat(rng.random(60) < 0.6, rng.integers(1, 9, 60)) for _ in range(2))
@@ -125,7 +125,7 @@ def test_a_condition_may_last_anywhere_inside_of_others(where):
     assert 0 < sum(said) < length
 
 
-def test_several_due_at_once_fire_at_once_and_none_is_lost():
+def test_each_edge_fires_after_its_own_delay():
     edges = [0, 1, 0, 1, 0, 0, 0]
     assert firings({"travelled": 1.0, "times": 2, "delay": "400 ms"}, edges) == [0, 0, 0, 0, 0, 1, 0]
     assert firings({"travelled": 1.0, "times": 2, "delay": "400 ms"}, [*edges, 0]) == [0, 0, 0, 0, 0, 1, 0, 1]

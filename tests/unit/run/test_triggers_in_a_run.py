@@ -71,13 +71,13 @@ def expected(trace, name):
 
 
 @pytest.mark.parametrize("name", WHEN)
-def test_a_trigger_fires_when_the_trace_says_so(trace, name):
+def test_a_trigger_fires_when_the_trace_shows_its_condition(trace, name):
     (tick,) = fired(trace, name)
     before, at = expected(trace, name)
     assert before <= tick <= at  # a kidnapping is seen at its own beat, after the sample of the truth
 
 
-def test_a_clearance_is_searched_for_as_far_as_a_trigger_asks(play):
+def test_clearance_search_radius_follows_the_trigger(play):
     asked = (
         "events: [{name: far, when: {clearance_below: 2.9 m}, do: {push: {impulse: [0, 0.001]}}, required: false}]\n"
     )

@@ -31,7 +31,7 @@ def test_pedestrian_is_a_moving_object_of_type_person(play):
     assert way[:, 0].max() > 6.7 and np.ptp(way[:, 1]) < 0.01
 
 
-def test_people_walk_round_what_stands_and_what_lies_in_their_way(play):
+def test_pedestrians_walk_around_obstacles_and_spawned_objects(play):
     """A crate of the world, and one that an event put there."""
     crate = "{spawn: {name: box, box: [0.4, 0.4, 1], pose: {x: 6, y: 3.2}}}"
     anna = "{pedestrian: {name: anna, pose: {x: 3.5, y: 5.5}, goals: [[7, 4.5], [6, 2]], speed: 1.4 m/s}}"
@@ -52,7 +52,7 @@ def test_reacting_pedestrian_emits_an_event(play):
     assert dict(reacted[0].data) == {"behavior": "surprised", "robot": ""}
 
 
-def test_others_can_move_or_remove_a_pedestrian(play):
+def test_events_can_move_or_remove_a_pedestrian(play):
     lines = events(
         f"{{when: {{time: 0}}, do: {ANNA}}}",
         "{when: {time: 1}, do: {move: {name: anna, through: [[3.5, 1.5]], speed: 1}}}",
@@ -78,7 +78,7 @@ def test_pedestrians_are_not_spawned_without_free_space(play):
 
 
 @pytest.mark.slow
-def test_one_more_pedestrian_changes_neither_speed_nor_way_of_others_far_away(play):
+def test_another_pedestrian_does_not_change_distant_ones(play):
     far = "{pedestrian: {name: aaron, pose: {x: 0.4, y: 5.6}}}"
     anna = "{pedestrian: {name: anna, pose: {x: 7.5, y: 1}, goals: [[7.5, 5]]}}"
     crowd = "{crowd: {name: guest, count: COUNT, start: corner, goals: [corner], repeat: loop}}"
@@ -95,7 +95,7 @@ def test_one_more_pedestrian_changes_neither_speed_nor_way_of_others_far_away(pl
 
 
 @pytest.mark.slow
-def test_seeds_draw_other_speeds_and_a_speed_that_is_written_is_kept(play):
+def test_speed_depends_on_the_seed_unless_it_is_specified(play):
     def fastest(anna: str, seed: int) -> float:
         trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), seed, **STANDING)
         way = trace.objects["anna"]

@@ -1,4 +1,4 @@
-"""Simulations that are closed when a test is over."""
+"""Fixture that creates simulations and closes them after the test."""
 
 import sys
 from pathlib import Path
@@ -13,21 +13,21 @@ from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from playground import shipped
+from simulation_helpers import robot_spec
 
 
 @pytest.fixture
 def simulate():
-    """Makes simulations and closes them."""
-    made = []
+    """Return a function that creates simulations, and close them after the test."""
+    simulations = []
 
     def make(robot="turtlebot", solids=(), bodies=(), pose=Pose2(0.0, 0.0, 0.0), drive=None, **physics):
-        body = build_robot_body(shipped(robot)) if isinstance(robot, str) else robot
-        made.append(SingleRobotSimulation(merge_solids(solids), bodies, body, pose, triangulate, **physics))
+        body = build_robot_body(robot_spec(robot)) if isinstance(robot, str) else robot
+        simulations.append(SingleRobotSimulation(merge_solids(solids), bodies, body, pose, triangulate, **physics))
         if drive:
-            made[-1].drive(Twist(*drive))
-        return made[-1]
+            simulations[-1].drive(Twist(*drive))
+        return simulations[-1]
 
     yield make
-    for simulation in made:
+    for simulation in simulations:
         simulation.close()

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Cylinder, Extrusion, MotionPath, Solid
@@ -9,7 +9,7 @@ from simscen.core.geometry.shapes import Body, Cylinder, Extrusion, MotionPath, 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 
 
-def test_a_scripted_body_is_where_its_script_says(simulate):
+def test_scripted_body_follows_its_path(simulate):
     path = MotionPath((0.0, 2.0), (Pose2(3, 0, 0), Pose2(3, 2, math.pi / 2)), start=1.0)
     simulation = simulate(bodies=[Body("cart", CRATE, Pose3(3.0), path=path)])
     simulation.step(480)
@@ -18,7 +18,7 @@ def test_a_scripted_body_is_where_its_script_says(simulate):
     assert simulation.truth().objects["cart"].plane == pytest.approx(Pose2(3, 2, math.pi / 2))
 
 
-def test_move_begins_now_from_where_the_body_is(simulate):
+def test_move_starts_the_path_at_the_current_time(simulate):
     simulation = simulate(bodies=[Body("cart", CRATE, Pose3(3.0))])
     simulation.step(240)
     simulation.move("cart", MotionPath((0.0, 1.0), (Pose2(3, 0), Pose2(3, 1))))
@@ -26,14 +26,14 @@ def test_move_begins_now_from_where_the_body_is(simulate):
     assert simulation.object_pose("cart").plane == pytest.approx(Pose2(3, 0.5))
 
 
-def test_a_body_that_could_be_pushed_can_be_moved_by_a_script(simulate):
+def test_pushable_body_can_be_moved_along_a_path(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0), mass=5.0)])
     simulation.move("crate", MotionPath((0.0, 1.0), (Pose2(3, 0), Pose2(4, 0))))
     simulation.step(240)
     assert simulation.object_pose("crate").plane == pytest.approx(Pose2(4, 0))
 
 
-def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
+def test_spawned_bodies_exist_until_they_are_removed(simulate):
     simulation = simulate()
     simulation.spawn(Body("crate", CRATE, Pose3(1.0, 2.0)))
     assert simulation.object_pose("crate") == Pose3(1.0, 2.0)
@@ -44,7 +44,7 @@ def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
     assert simulation.truth().objects == {}
 
 
-def test_spawning_a_name_again_replaces_it(simulate):
+def test_spawned_body_replaces_one_with_the_same_name(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(1.0, 2.0))])
     simulation.spawn(Body("crate", CRATE, Pose3(-2.0)))
     assert dict(simulation.robot.objects()) == {"crate": Pose3(-2.0)}
@@ -67,7 +67,7 @@ def test_a_pushed_crate_comes_to_rest_by_friction(simulate):
 
 
 @pytest.mark.parametrize("mass", [0.0, 5.0])
-def test_bodies_of_any_shape_stand_where_they_were_put(simulate, mass):
+def test_bodies_of_any_shape_stay_where_they_were_placed(simulate, mass):
     corner = Solid(Extrusion(((0, 0), (0.4, 0), (0.4, 0.2), (0.2, 0.2), (0.2, 0.4), (0, 0.4)), 0.5))
     drum = Solid(Cylinder(0.2, 0.5), Pose3(z=0.25))
     bodies = [Body("corner", (corner,), Pose3(2, 0), mass), Body("drum", (drum,), Pose3(-2, 0), mass),

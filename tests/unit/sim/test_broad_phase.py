@@ -16,9 +16,9 @@ def test_bodies_do_not_meet_within_the_guaranteed_time():
         assert 0 < found.seconds <= SPEED_HORIZON_S
         apart = np.linalg.norm(scripted.centers[:, None] - pushable.centers, axis=2)
         reach = scripted.radii[:, None] + pushable.radii + found.seconds * (scripted.speeds[:, None] + 1.5)
-        for mover, thing in np.argwhere(apart < reach).tolist():
+        for mover, pushed in np.argwhere(apart < reach).tolist():
             assert mover in found.scripted
-            assert thing in found.pushable
+            assert pushed in found.pushable
 
 
 def test_distant_bodies_are_skipped_and_jumping_bodies_are_checked():

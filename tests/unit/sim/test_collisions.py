@@ -4,7 +4,7 @@ import math
 import random
 
 import pytest
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2, Pose3
@@ -29,7 +29,7 @@ def started(events):
     return [event for event in events if event.kind == "collision.started"]
 
 
-def test_driving_into_a_wall_is_one_collision_with_its_place_speed_and_culprit(simulate):
+def test_driving_into_a_wall_is_one_collision_with_place_speed_and_cause(simulate):
     simulation = simulate(solids=[WALL, box("far", -3, 0, 1, 1)], drive=(0.5, 0.0, 0.0))
     events = collisions(simulation, 960)
     assert [event.kind for event in events] == ["collision.started"]
@@ -43,7 +43,7 @@ def test_driving_into_a_wall_is_one_collision_with_its_place_speed_and_culprit(s
     assert simulation.robot.touching()
 
 
-def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
+def test_collision_ends_a_tenth_of_a_second_after_the_last_contact(simulate):
     simulation = simulate(solids=[WALL], drive=(0.5, 0.0, 0.0))
     collisions(simulation, 720)
     simulation.drive(Twist(-0.3, 0.0, 0.0))
@@ -53,14 +53,14 @@ def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
     assert not simulation.robot.touching()
 
 
-def test_grazing_a_wall_counts_although_the_robot_hardly_moves_towards_it(simulate):
-    # The hull reaches a millimeter into the line of the wall while it drives along.
+def test_grazing_a_wall_is_a_collision_caused_by_the_robot(simulate):
+    # The hull overlaps the wall by a millimeter while the robot drives along it.
     wall = box("wall", 3.0, RADIUS + 0.05 - 0.001, 4.0, 0.1)
     (hit, *_) = started(collisions(simulate(solids=[wall], drive=(0.5, 0.0, 0.0)), 960))
     assert hit.data["robot_caused"] is True
 
 
-def test_a_cart_that_drives_into_a_waiting_robot_is_the_carts_fault_and_pushes_it(simulate):
+def test_cart_that_hits_a_stationary_robot_causes_the_collision_and_pushes_it(simulate):
     cart = Body("cart", CART, Pose3(-2.0), path=MotionPath((0.0, 4.0), (Pose2(-2, 0), Pose2(2, 0))))
     simulation = simulate(bodies=[cart])
     (hit,) = started(collisions(simulation, 720))
@@ -72,7 +72,7 @@ def test_a_cart_that_drives_into_a_waiting_robot_is_the_carts_fault_and_pushes_i
     assert truth.clearance == pytest.approx(0.0, abs=2e-3)
 
 
-def test_driving_into_a_standing_body_is_the_robots_fault(simulate):
+def test_robot_that_hits_a_stationary_body_causes_the_collision(simulate):
     (hit,) = started(collisions(simulate(bodies=[Body("cart", CART, Pose3(1.0))], drive=(0.5, 0.0, 0.0)), 720))
     assert (hit.name, hit.data["robot_caused"]) == ("cart", True)
 
@@ -86,13 +86,13 @@ def test_a_light_box_is_pushed_along_and_a_heavy_one_stops_the_robot(simulate):
         assert (simulation.truth().pose.x > 0.5) is moves
 
 
-def test_the_owner_is_named_although_all_solids_are_one_mesh(simulate):
+def test_collision_names_the_solid_although_all_solids_are_one_mesh(simulate):
     solids = [box("left", 0, 1, 0.4, 0.4), Solid(Cylinder(0.2, 1), Pose3(1, 0, 0.5), "post"), box("right", 0, -1, 1, 1)]
     (hit, *_) = collisions(simulate(solids=solids, drive=(0.4, 0.0, 0.0)), 720)
     assert hit.name == "post"
 
 
-def test_wheels_on_the_ground_are_no_collision_even_where_the_world_has_a_floor_of_its_own(simulate):
+def test_wheels_on_a_floor_solid_of_the_world_are_no_collision(simulate):
     floor = Solid(box("floor", 0, 0, 10, 10, 0.1).shape, Pose3(z=-0.05), "floor")
     simulation = simulate(solids=[floor], drive=(0.5, 0.0, 0.3))
     assert collisions(simulation, 480) == []
@@ -102,8 +102,8 @@ def test_wheels_on_the_ground_are_no_collision_even_where_the_world_has_a_floor_
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("pushable", [False, True])
 @pytest.mark.parametrize("seed", range(2))
-def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, monkeypatch, seed, pushable):
-    """Clearance rules out contacts for a while (conservative advancement); here it is checked against asking always."""
+def test_collisions_equal_those_of_a_query_after_every_tick(simulate, monkeypatch, seed, pushable):
+    """Clearance rules out contacts for a while (conservative advancement); compare with a query at every tick."""
     rng = random.Random(seed)
     places = [(rng.uniform(-3, 3), rng.uniform(-3, 3)) for _ in range(40)]
     solids = [box(f"box{k}", x, y, 0.2, 0.3) for k, (x, y) in enumerate(places) if abs(x) + abs(y) > 0.8]
@@ -122,37 +122,37 @@ def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, mo
             events += collisions(simulation, 96)
         return events, simulation.truth().pose
 
-    gated = run()
+    skipping = run()
     monkeypatch.setattr("simscen.sim.contact.clearance.SPEED_HORIZON_S", -1.0)
-    always = run()
-    assert started(always[0])
-    assert gated == always
+    polling = run()
+    assert started(polling[0])
+    assert skipping == polling
 
 
-THIN = (box("plate", 0, 0, 1.0, 0.01, 0.5),)
+THIN_PLATE = (box("plate", 0, 0, 1.0, 0.01, 0.5),)
 FAST_M_S = 0.95 * MAX_STEP_M * 240
 
 
 @pytest.mark.parametrize("offset_ticks", [0.0, 0.25, 0.5, 0.75])
-def test_a_thin_plate_at_the_greatest_speed_does_not_pass_through_the_robot_unnoticed(simulate, offset_ticks):
+def test_thin_plate_at_maximum_speed_collides_with_the_robot(simulate, offset_ticks):
     start = offset_ticks / 240
     path = MotionPath((0.0, 4 / FAST_M_S), (Pose2(0, -2, 0), Pose2(0, 2, 0)), start=start)
-    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.0, -2.0), path=path)])
+    simulation = simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.0, -2.0), path=path)])
     assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
 
 
 @pytest.mark.parametrize("offset_ticks", [0.0, 0.25, 0.5, 0.75])
-def test_a_thin_plate_that_turns_at_the_greatest_speed_does_not_pass_the_robot_unnoticed(simulate, offset_ticks):
+def test_thin_plate_rotating_at_maximum_speed_collides_with_the_robot(simulate, offset_ticks):
     seconds = math.pi / 2 * 0.51 / FAST_M_S
     path = MotionPath((0.0, seconds), (Pose2(0, -0.55, 0), Pose2(0, -0.55, math.pi / 2)), start=offset_ticks / 240)
-    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.0, -0.55), path=path)])
+    simulation = simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.0, -0.55), path=path)])
     assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
 
 
-def test_a_scripted_body_that_could_pass_through_the_robot_between_two_ticks_is_an_error(simulate):
+def test_path_that_moves_a_body_too_far_in_one_tick_is_an_error(simulate):
     turn = MotionPath((0.0, 0.004), (Pose2(0.5, -0.5, 0), Pose2(0.5, -0.5, math.pi / 2)))
     with pytest.raises(RunError, match=r"`plate` moves up to 0\.79 m in one physics tick"):
-        simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5), path=turn)])
-    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5))])
+        simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.5, -0.5), path=turn)])
+    simulation = simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.5, -0.5))])
     with pytest.raises(RunError, match="`plate` moves up to"):
         simulation.move("plate", turn)

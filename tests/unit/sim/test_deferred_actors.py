@@ -1,4 +1,4 @@
-"""Deferred actors: those that cannot be pushed collide in the engine once a robot comes near their path."""
+"""Tests of deferred actors, which are added to the engine when a robot comes near their path."""
 
 import math
 import random
@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -21,12 +21,12 @@ from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
-NAMES = [f"thing {number}" for number in range(10)]
+NAMES = [f"object {number}" for number in range(10)]
 
 
-def wild_path(rng, start, wide):
-    """At up to 5 m/s, from a place."""
-    places = [(start[0] + rng.gauss(0, wide), start[1] + rng.gauss(0, wide)) for _ in range(3)]
+def random_path(rng, start, spread):
+    """Return a random path from `start` with speeds up to 5 m/s."""
+    places = [(start[0] + rng.gauss(0, spread), start[1] + rng.gauss(0, spread)) for _ in range(3)]
     mode = rng.choice(["once", "loop", "back_and_forth"])
     poses = [Pose2(*start), *(Pose2(*place, rng.uniform(-3, 3)) for place in places)]
     if mode == "loop":
@@ -38,16 +38,16 @@ def wild_path(rng, start, wide):
     return MotionPath(tuple(times), tuple(poses), mode, rng.choice([0.0, 1.0]), ease)
 
 
-def thing(rng, name, start):
-    path = None if rng.random() < 0.3 else wild_path(rng, start, rng.choice([1, 5]))
+def random_body(rng, name, start):
+    path = None if rng.random() < 0.3 else random_path(rng, start, rng.choice([1, 5]))
     return Body(name, CRATE, Pose3(*start), path=path)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
-    """Held against where paths are at many moments."""
+    """Compare with the distances of the paths at 101 times."""
     rng = random.Random(seed)
-    bodies = [thing(rng, f"{k}", (rng.uniform(-20, 20), rng.uniform(-20, 20))) for k in range(60)]
+    bodies = [random_body(rng, f"{k}", (rng.uniform(-20, 20), rng.uniform(-20, 20))) for k in range(60)]
     simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), has_images=False)
     actors = list(simulation._scene.actors._actors.values())
     deferred, place = DeferredActors(actors), (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0)
@@ -56,37 +56,39 @@ def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
     def nearest(actor: Actor) -> float:
         if actor.path is None:
             return math.dist(actor.body.pose[:2], place[:2]) - actor.size
-        moments = (k / 100 * actor.path.times[-1] for k in range(101))
-        return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in moments) - actor.size
+        times = (k / 100 * actor.path.times[-1] for k in range(101))
+        return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in times) - actor.size
 
-    away = {actor.body.name: nearest(actor) for actor in actors}
-    strays = {actor.body.name: max(way.deviation for way in actor.segments) for actor in actors}
+    distances = {actor.body.name: nearest(actor) for actor in actors}
+    deviations = {actor.body.name: max(segment.deviation for segment in actor.segments) for actor in actors}
     names = {actor.body.name for actor in near}
     assert 0 < len(names) < 50
-    assert {name for name, distance in away.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
-    assert {name for name in names if away[name] > 3.2 + REQUERY_DISTANCE_M + strays[name]} == set()
-    assert {actor.body.name for actor in measured} >= {n for n, d in away.items() if 4.0 + strays[n] < d <= 6.0}
+    assert {name for name, distance in distances.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
+    assert {name for name in names if distances[name] > 3.2 + REQUERY_DISTANCE_M + deviations[name]} == set()
+    assert {actor.body.name for actor in measured} >= {
+        n for n, d in distances.items() if 4.0 + deviations[n] < d <= 6.0
+    }
     assert not names & {actor.body.name for actor in measured}
-    moved = (place[0] + REQUERY_DISTANCE_M, *place[1:])
-    assert deferred.activate_near([ProximityQuery(moved, 3.0 - REQUERY_DISTANCE_M, 6.0 - REQUERY_DISTANCE_M)]) == (
+    shifted = (place[0] + REQUERY_DISTANCE_M, *place[1:])
+    assert deferred.activate_near([ProximityQuery(shifted, 3.0 - REQUERY_DISTANCE_M, 6.0 - REQUERY_DISTANCE_M)]) == (
         [],
         [],
     )
 
 
-def course(seed, present):
-    """What two robots at up to 2 m/s meet among fast carts: truth and collisions of each beat, and who was present."""
+def drive_among_carts(seed, has_images):
+    """Return truths and collisions of two robots, and the numbers of actors in the engine and in total."""
     rng = random.Random(seed)
-    quick = build_robot_body(shipped("turtlebot"))
-    quick = replace(quick, limits=quick.limits.model_copy(update={"linear": 2.0, "linear_acceleration": 4.0}))
-    bodies = [thing(rng, name, (rng.uniform(-9, 9), rng.uniform(-9, 9))) for name in NAMES]
-    bodies += [thing(rng, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
+    fast = build_robot_body(robot_spec("turtlebot"))
+    fast = replace(fast, limits=fast.limits.model_copy(update={"linear": 2.0, "linear_acceleration": 4.0}))
+    bodies = [random_body(rng, name, (rng.uniform(-9, 9), rng.uniform(-9, 9))) for name in NAMES]
+    bodies += [random_body(rng, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
     placed = {
-        "a": RobotPlacement(quick, Pose2(0.0, 0.0)),
-        "b": RobotPlacement(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5)),
+        "a": RobotPlacement(fast, Pose2(0.0, 0.0)),
+        "b": RobotPlacement(build_robot_body(robot_spec("jackal")), Pose2(2.0, 1.5)),
     }
     simulation = Simulation(
-        merge_solids([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, has_images=present
+        merge_solids([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, has_images=has_images
     )
     beats = []
     for beat in range(48):
@@ -98,13 +100,13 @@ def course(seed, present):
             robot, name = simulation.robots[rng.choice("ab")], rng.choice(NAMES)
             here, there = robot.base_pose(), simulation.object_pose(name)
             beside = (here.x + rng.uniform(0.3, 1.0), here.y + rng.uniform(-1.0, 1.0))
-            what = beat // 8
-            if what in (0, 3):  # beside a cart, or into it
+            action = beat // 8
+            if action in (0, 3):  # beside a cart or overlapping it
                 robot.place(Pose2(there.x + rng.uniform(-0.9, 0.9), there.y + 0.5))
-            elif what == 1:
-                simulation.spawn(thing(rng, "new", beside))
-            elif what == 2:
-                simulation.move(name, wild_path(rng, there[:2], 3))
+            elif action == 1:
+                simulation.spawn(random_body(rng, "new", beside))
+            elif action == 2:
+                simulation.move(name, random_path(rng, there[:2], 3))
             else:
                 simulation.place(name, Pose2(*beside))
     count = len(simulation._scene.actors.names_by_id()), len(simulation._scene.actors.bodies())
@@ -126,7 +128,7 @@ def squeeze(seed, every=6, **observation):
 
     crate = Body("m", CRATE, Pose3(8.55 + rng.uniform(0.0, 0.05), rng.uniform(-0.1, 0.1)))
     bodies = [cart("a", 1, rng.uniform(2, 4)), cart("z", -1, -rng.uniform(3, 5)), crate]
-    placed = {"": RobotPlacement(build_robot_body(shipped("turtlebot")), Pose2(0.0, 0.0))}
+    placed = {"": RobotPlacement(build_robot_body(robot_spec("turtlebot")), Pose2(0.0, 0.0))}
     simulation = Simulation(merge_solids([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, **observation)
     robot = simulation.robots[""]
     robot.drive(Twist(0.65, 0.0, 0.0))
@@ -148,34 +150,34 @@ def test_observations_do_not_change_the_contacts_of_a_jammed_robot(seed):
 
 @pytest.mark.parametrize("seed", [4, 6])
 def test_robots_collide_as_if_all_actors_were_in_the_engine_from_the_start(seed):
-    """To the last bit."""
-    everybody, (all_there, all_known) = course(seed, present=True)
-    absence, (there, known) = course(seed, present=False)
-    assert absence == everybody
-    assert all_there == all_known == known > there
-    assert EventKind.COLLISION_STARTED in {event.kind for _, events in everybody for event in events}
+    """Images need all actors in the engine. Results are equal to the last bit."""
+    complete, (complete_in_engine, complete_total) = drive_among_carts(seed, has_images=True)
+    deferred, (in_engine, total) = drive_among_carts(seed, has_images=False)
+    assert deferred == complete
+    assert complete_in_engine == complete_total == total > in_engine
+    assert EventKind.COLLISION_STARTED in {event.kind for _, events in complete for event in events}
 
 
-def there(simulation):
+def actors_in_engine(simulation):
     return set(simulation._scene.actors.names_by_id().values())
 
 
-RADIUS = build_robot_body(shipped("turtlebot")).radius
+RADIUS = build_robot_body(robot_spec("turtlebot")).radius
 FAR = Body("far", CRATE, Pose3(7.5))
-COMES = Body("comes", CRATE, Pose3(0, 30), path=MotionPath((0.0, 60.0), (Pose2(0, 30), Pose2(0, 1.0))))
+APPROACHING = Body("approaching", CRATE, Pose3(0, 30), path=MotionPath((0.0, 60.0), (Pose2(0, 30), Pose2(0, 1.0))))
 
 
 def test_engine_has_actors_whose_path_comes_near_the_robot(simulate):
-    simulation = simulate(bodies=[FAR, COMES], has_images=False)
-    assert there(simulation) == {"comes"}
+    simulation = simulate(bodies=[FAR, APPROACHING], has_images=False)
+    assert actors_in_engine(simulation) == {"approaching"}
     simulation.place_robot(Pose2(4.0, 0.0))
-    assert there(simulation) == {"comes", "far"}
+    assert actors_in_engine(simulation) == {"approaching", "far"}
     assert simulation.truth().clearance == 2.0
     simulation.place_robot(Pose2(6.5, 0.0))
     assert simulation.truth().clearance == pytest.approx(7.3 - 6.5 - RADIUS, abs=0.001)
 
 
-@pytest.mark.parametrize("every", [12, 18 * 240], ids=["asked", "not asked"])
+@pytest.mark.parametrize("every", [12, 18 * 240], ids=["sampled often", "sampled once"])
 def test_robot_collides_with_an_actor_that_was_deferred(simulate, every):
     simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), has_images=False)
     for _ in range(18 * 240 // every):
@@ -187,26 +189,26 @@ def test_robot_collides_with_an_actor_that_was_deferred(simulate, every):
 
 def test_no_actor_is_deferred_if_one_can_be_pushed(simulate):
     simulation = simulate(bodies=[FAR], has_images=False)
-    assert there(simulation) == set()
+    assert actors_in_engine(simulation) == set()
     simulation.spawn(Body("light", CRATE, Pose3(-3.0), mass=1.0))
-    assert there(simulation) == {"far", "light"}
+    assert actors_in_engine(simulation) == {"far", "light"}
 
 
 def test_steered_actor_is_not_deferred(simulate):
     simulation = simulate(has_images=False)
     simulation.add_steered(FAR, 1.0)
-    assert there(simulation) == {"far"}
+    assert actors_in_engine(simulation) == {"far"}
 
 
 def test_distance_to_a_deferred_actor_is_an_error(simulate):
-    """Rather than that a collision with it is not seen."""
+    """Otherwise, a collision with it could be missed."""
     simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
         simulation._scene.actors.prepare_nearby(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)
 
 
-def test_scripted_body_that_collides_again_has_no_contact_with_the_ground(simulate):
-    """As if it had been created now: such a contact would cost time at each step."""
+def test_scripted_body_with_reenabled_collisions_has_no_ground_contact(simulate):
+    """Such a contact would cost time at each step."""
     client = simulate()._scene.client
     shape = engine.create_compound_shape(client, [Solid(Box((0.4, 0.4, 0.4)), Pose3())])
     inertia = ((0.0, 0.0, 0.0), Pose3())

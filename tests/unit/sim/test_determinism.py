@@ -9,7 +9,7 @@ import pytest
 RUN = """
 import sys
 sys.path.insert(0, {folder!r})
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
@@ -23,9 +23,9 @@ bodies = [
     Body("crate", (box("crate", 0, 0, 0.3, 0.3, 0.3),), Pose3(0.7, 0.1), mass=2.0),
     Body("cart", (box("cart", 0, 0, 0.5, 0.5),), Pose3(2, 2), path=MotionPath((0.0, 3.0), (Pose2(2, 2), Pose2(-2, 1)))),
 ]
-if {turned}:
+if {reverse}:
     bodies.reverse()
-body = build_robot_body(shipped({robot!r}))
+body = build_robot_body(robot_spec({robot!r}))
 simulation = SingleRobotSimulation(merge_solids(solids), bodies, body, Pose2(0.1, 0.2, 0.3), triangulate)
 for k in range(60):
     simulation.drive(Twist(0.5, 0.0, 0.4 - 0.02 * k))
@@ -36,26 +36,26 @@ print(simulation.robot.collisions())
 """
 
 
-def fresh(robot, turned=False):
-    code = RUN.format(folder=str(Path(__file__).parent), robot=robot, turned=turned)
+def run_in_new_process(robot, reverse=False):
+    code = RUN.format(folder=str(Path(__file__).parent), robot=robot, reverse=reverse)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
 
 
-def test_two_runs_in_one_process_and_one_in_a_fresh_one_are_equal(capsys):
-    code = RUN.format(folder=str(Path(__file__).parent), robot="turtlebot", turned=False)
+def test_runs_in_the_same_and_in_a_new_process_are_equal(capsys):
+    code = RUN.format(folder=str(Path(__file__).parent), robot="turtlebot", reverse=False)
     outputs = []
     for _ in range(2):
         exec(code, {})
         outputs.append(capsys.readouterr().out)
     assert "collision.started" in outputs[0]
-    assert outputs[0] == outputs[1] == fresh("turtlebot")
+    assert outputs[0] == outputs[1] == run_in_new_process("turtlebot")
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("robot", ["jackal", "car", "omni"])
-def test_two_fresh_processes_are_equal(robot):
-    assert fresh(robot) == fresh(robot)
+def test_runs_in_two_new_processes_are_equal(robot):
+    assert run_in_new_process(robot) == run_in_new_process(robot)
 
 
-def test_the_order_in_which_bodies_are_given_changes_nothing():
-    assert fresh("amr") == fresh("amr", turned=True)
+def test_order_of_bodies_does_not_change_the_run():
+    assert run_in_new_process("amr") == run_in_new_process("amr", reverse=True)

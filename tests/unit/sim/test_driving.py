@@ -4,7 +4,7 @@ import math
 
 import pybullet
 import pytest
-from playground import box, travelled
+from simulation_helpers import box, measure_motion
 
 from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2
@@ -24,22 +24,22 @@ def test_a_robot_at_rest_stays_where_it_is(simulate, robot):
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car", "omni"])
-def test_five_meters_straight_ahead_take_the_time_that_ramp_and_speed_say(simulate, robot):
+def test_robot_drives_straight_at_the_commanded_speed(simulate, robot):
     simulation = simulate(robot, drive=(0.5, 0.0, 0.0))
     simulation.step(TICKS)
-    begin = simulation.truth().pose
+    start = simulation.truth().pose
     simulation.step(10 * TICKS)
     end = simulation.truth().pose
-    assert end.x - begin.x == pytest.approx(5.0, rel=2e-3)
+    assert end.x - start.x == pytest.approx(5.0, rel=2e-3)
     assert abs(end.y) < 5e-3
     assert abs(end.yaw) < 2e-3
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "omni"])
-def test_a_turn_in_place_takes_the_time_that_its_rate_says_and_stays_in_place(simulate, robot):
+def test_turn_in_place_has_the_commanded_rate_and_stays_in_place(simulate, robot):
     simulation = simulate(robot, drive=(0.0, 0.0, 1.0))
     simulation.step(TICKS)
-    turned, _ = travelled(simulation, round(2 * math.pi * TICKS / 6) * 6)
+    turned, _ = measure_motion(simulation, round(2 * math.pi * TICKS / 6) * 6)
     assert turned == pytest.approx(2 * math.pi, rel=2e-3)
     pose = simulation.truth().pose
     assert math.hypot(pose.x, pose.y) < 5e-3
@@ -50,21 +50,21 @@ def test_a_turn_in_place_takes_the_time_that_its_rate_says_and_stays_in_place(si
 def test_a_circle_has_the_radius_of_speed_over_turn_rate(simulate, robot, speed, turn):
     simulation = simulate(robot, drive=(speed, 0.0, turn))
     simulation.step(2 * TICKS)
-    turned, length = travelled(simulation, 4 * TICKS)
+    turned, length = measure_motion(simulation, 4 * TICKS)
     assert length / turned == pytest.approx(speed / turn, rel=0.01)
 
 
-def test_a_base_accelerates_and_brakes_as_its_limits_say(simulate):
+def test_base_accelerates_and_brakes_at_its_limits(simulate):
     simulation = simulate("turtlebot", drive=(0.5, 0.0, 0.0))
     for tick in range(12, 96, 12):
         simulation.step(12)
         assert simulation.truth().twist.vx == pytest.approx(1.0 * tick / TICKS, abs=0.03)
     simulation.step(TICKS)
     simulation.drive(Twist(0.0, 0.0, 0.0))
-    begin = simulation.truth().pose.x
+    start = simulation.truth().pose.x
     simulation.step(TICKS)
-    # v²/2a with 1.5 m/s², plus half a period of the firmware.
-    assert simulation.truth().pose.x - begin == pytest.approx(0.5**2 / 3.0, abs=0.008)
+    # v²/2a with 1.5 m/s², plus the distance of half a firmware period.
+    assert simulation.truth().pose.x - start == pytest.approx(0.5**2 / 3.0, abs=0.008)
     assert abs(simulation.truth().twist.vx) < 1e-4
 
 
@@ -74,18 +74,18 @@ def test_commands_beyond_the_limits_are_clipped(simulate):
     assert simulation.truth().twist == pytest.approx((0.5, 0.0, 0.0), abs=2e-3)
 
 
-def test_an_omnidirectional_base_goes_sideways_and_drives_arcs(simulate):
+def test_omnidirectional_base_drives_sideways_and_in_arcs(simulate):
     simulation = simulate("omni", drive=(0.3, 0.4, 0.0))
     simulation.step(2 * TICKS)
     assert simulation.truth().twist == pytest.approx((0.3, 0.4, 0.0), abs=1e-6)
     simulation.drive(Twist(0.3, 0.4, 1.0))
     simulation.step(TICKS)
-    turned, length = travelled(simulation, 3 * TICKS)
+    turned, length = measure_motion(simulation, 3 * TICKS)
     assert length / turned == pytest.approx(0.5, rel=2e-3)
 
 
-def test_a_mecanum_base_goes_diagonally_on_two_of_its_wheels_and_its_encoders_know(simulate):
-    """Closed form: each of the two wheels rolls vx + vy over the radius a second, the others stand."""
+def test_encoders_of_a_mecanum_base_count_two_wheels_in_diagonal_motion(simulate):
+    """Closed form: two wheels turn at (vx + vy) / r, the other two not at all."""
     simulation = simulate("mecanum", drive=(0.3, 0.3, 0.0))
     simulation.step(2 * TICKS)
     before = simulation.encoders()
@@ -95,8 +95,8 @@ def test_a_mecanum_base_goes_diagonally_on_two_of_its_wheels_and_its_encoders_kn
     assert simulation.truth().twist == pytest.approx((0.3, 0.3, 0.0), abs=1e-6)
 
 
-def test_a_mecanum_base_turns_by_its_wheels_over_half_its_length_and_width(simulate):
-    """Closed form: (lx + ly) wz / r, forwards on the right."""
+def test_encoders_of_a_mecanum_base_count_all_wheels_in_a_turn(simulate):
+    """Closed form: (lx + ly) wz / r, positive on the right."""
     simulation = simulate("mecanum", drive=(0.0, 0.0, 1.0))
     simulation.step(2 * TICKS)
     before = simulation.encoders()
@@ -106,13 +106,13 @@ def test_a_mecanum_base_turns_by_its_wheels_over_half_its_length_and_width(simul
     assert rolled == pytest.approx([-wheel, wheel, -wheel, wheel], rel=1e-4)
 
 
-def test_a_car_cannot_turn_in_place_nor_tighter_than_its_steering(simulate):
+def test_car_cannot_turn_in_place_or_tighter_than_its_steering_limit(simulate):
     simulation = simulate("car", drive=(0.0, 0.0, 1.0))
     simulation.step(2 * TICKS)
     assert abs(simulation.truth().pose.yaw) < 1e-3
     simulation.drive(Twist(0.5, 0.0, 1.8))
     simulation.step(2 * TICKS)
-    turned, length = travelled(simulation, 4 * TICKS)
+    turned, length = measure_motion(simulation, 4 * TICKS)
     assert length / turned == pytest.approx(0.45 / math.tan(0.51), rel=0.01)
 
 
@@ -124,12 +124,12 @@ def test_a_car_drives_a_three_point_turn(simulate):
     assert 0.5 * math.pi < simulation.truth().pose.yaw < 1.2 * math.pi
 
 
-def test_skid_steering_loses_a_part_of_its_wheels_turning(simulate):
-    """Between no slip and the 1.8 that the solver's friction gives; Coulomb's at four points gives 1 + (a/b)²."""
+def test_skid_steered_robot_turns_less_than_its_wheels(simulate):
+    """The ratio is 1 without slip, about 1.8 with the friction of the solver, and 1 + (a/b)² by Coulomb's law."""
     simulation = simulate("jackal", drive=(0.0, 0.0, 1.0))
     simulation.step(TICKS)
     left, right = simulation.encoders()
-    turned, _ = travelled(simulation, 4 * TICKS)
+    turned, _ = measure_motion(simulation, 4 * TICKS)
     after = simulation.encoders()
     rolled = (after[1] - right - after[0] + left) * 0.098 / 0.37559
     assert 1.2 < rolled / turned < 1.9
@@ -147,7 +147,7 @@ def test_a_jackal_brakes_from_full_speed_without_tipping(simulate):
             assert math.hypot(pose.qx, pose.qy) < 0.02
 
 
-def test_being_set_down_elsewhere_leaves_the_robot_at_rest_and_its_encoders_unaware(simulate):
+def test_placed_robot_is_at_rest_and_its_encoders_do_not_change(simulate):
     for robot in ("turtlebot", "omni"):
         simulation = simulate(robot, drive=(0.5, 0.0, 0.0))
         simulation.step(TICKS)
@@ -161,7 +161,7 @@ def test_being_set_down_elsewhere_leaves_the_robot_at_rest_and_its_encoders_unaw
         assert simulation.encoders() == pytest.approx(before, abs=0.02)
 
 
-def test_a_push_moves_the_robot_the_way_it_points(simulate):
+def test_push_moves_the_robot_in_its_direction(simulate):
     for robot in ("turtlebot", "jackal", "omni"):
         simulation = simulate(robot)
         simulation.robot.push((0.0, 30.0))
@@ -186,7 +186,7 @@ def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
     assert simulation.robot.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
 
 
-def test_physics_that_diverges_ends_the_run_with_the_time(simulate):
+def test_diverging_physics_raise_an_error_with_the_time(simulate):
     simulation = simulate("turtlebot", [box("wall", 0.5, 0, 0.1, 2)])
     simulation.step(120)
     pybullet.resetBaseVelocity(
@@ -199,8 +199,8 @@ def test_physics_that_diverges_ends_the_run_with_the_time(simulate):
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car"])
-def test_a_wheel_touches_the_ground_in_one_point_however_fast_it_rolls(simulate, robot):
-    """Bullet alone keeps up to three points that have long rolled on: twice the cost of a step, for nothing."""
+def test_wheel_has_one_contact_point_with_the_ground_at_any_speed(simulate, robot):
+    """By default, Bullet keeps up to three outdated points, which doubles the cost of a step."""
     simulation = simulate(robot, drive=(9.0, 0.0, 0.0))
     simulation.step(2 * TICKS)
     points = pybullet.getContactPoints(simulation.robot.base.id, physicsClientId=simulation._scene.client)

@@ -1,10 +1,10 @@
-"""Slippery floor, against Coulomb's closed forms."""
+"""Tests of slippery floors against Coulomb's closed forms."""
 
 import math
 from dataclasses import replace
 
 import pytest
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 
 from simscen.core.environment.world_model import Patch, disc_outline
 from simscen.core.geometry import Pose2
@@ -18,58 +18,58 @@ def square(left, low, right, high):
     return ((left, low), (right, low), (right, high), (left, high))
 
 
-EVERYWHERE = square(-50, -50, 50, 50)
+WHOLE_FLOOR = square(-50, -50, 50, 50)
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.1, 0.2])
 def test_four_braked_wheels_slide_for_v_squared_over_2_mu_g(simulate, friction):
     simulation = simulate("jackal", drive=(1.0, 0.0, 0.0))
     simulation.step(3 * TICKS)
-    simulation.add_friction_patch("ice", Patch(EVERYWHERE, friction))
-    begin, speed = simulation.truth().pose.x, simulation.truth().twist.vx
+    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, friction))
+    start, speed = simulation.truth().pose.x, simulation.truth().twist.vx
     rolled = simulation.encoders()[0]
     simulation.drive(STOP)
     simulation.step(5 * TICKS)
-    slid = simulation.truth().pose.x - begin
-    braking = speed**2 / (2 * 3.0)  # the firmware's own way to stop, which is all that odometry sees
+    slid = simulation.truth().pose.x - start
+    braking = speed**2 / (2 * 3.0)  # the braking distance of the firmware, which odometry measures
     assert slid == pytest.approx(speed**2 / (2 * friction * GRAVITY_M_S2), rel=0.03)
     assert (simulation.encoders()[0] - rolled) * 0.098 == pytest.approx(braking, rel=0.25)
     assert slid > 1.4 * braking
 
 
-def test_spinning_wheels_drive_no_faster_than_mu_g_and_odometry_counts_what_they_spin(simulate):
+def test_spinning_wheels_accelerate_by_mu_g_and_odometry_counts_the_spin(simulate):
     simulation = simulate("jackal")
-    simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.05))
+    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.05))
     simulation.drive(Twist(2.0, 0.0, 0.0))
     simulation.step(2 * TICKS)
     assert simulation.truth().pose.x == pytest.approx(0.05 * GRAVITY_M_S2 * 2**2 / 2, rel=0.05)
     assert simulation.encoders()[0] * 0.098 > 2.5 * simulation.truth().pose.x
 
 
-def test_one_side_on_oil_turns_a_robot_that_brakes(simulate):
+def test_braking_with_one_side_on_oil_turns_the_robot(simulate):
     simulation = simulate("jackal", drive=(1.5, 0.0, 0.0))
     simulation.step(2 * TICKS)
     simulation.add_friction_patch("oil", Patch(square(-50, 0, 50, 50), 0.05))
     simulation.drive(STOP)
     simulation.step(TICKS)
-    assert simulation.truth().pose.yaw < -math.radians(5)  # towards the side that holds
+    assert simulation.truth().pose.yaw < -math.radians(5)  # towards the side with grip
 
 
 def test_newer_friction_patch_covers_older_ones_and_ends(simulate):
     simulation = simulate("turtlebot")
-    simulation.add_friction_patch("wet", Patch(EVERYWHERE, 0.3))
+    simulation.add_friction_patch("wet", Patch(WHOLE_FLOOR, 0.3))
     simulation.add_friction_patch("oil", Patch(disc_outline((0.0, 0.0), 1.0), 0.1, until=24))
     floor = simulation._scene.floor
     assert (floor.friction(0.5, 0.0), floor.friction(2.0, 0.0), floor.friction(99.0, 0.0)) == (0.1, 0.3, 1.0)
     simulation.step(25)
     assert floor.friction(0.5, 0.0) == 0.3
-    simulation.add_friction_patch("wet", Patch(EVERYWHERE, 1.0))
+    simulation.add_friction_patch("wet", Patch(WHOLE_FLOOR, 1.0))
     simulation.step(1)
     assert floor.friction(0.5, 0.0) == 1.0
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal", "car", "omni"])
-def test_a_patch_elsewhere_changes_nothing_at_all(simulate, robot):
+def test_distant_friction_patch_does_not_change_the_motion(simulate, robot):
     poses = []
     for patches in ([], [Patch(square(20, 20, 21, 21), 0.1)]):
         simulation = simulate(robot, drive=(0.4, 0.0, 0.3), pose=Pose2(0.1, 0.2, 0.3))
@@ -83,11 +83,11 @@ def test_a_patch_elsewhere_changes_nothing_at_all(simulate, robot):
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
     """A robot on ice is pressed against a wall, and pushed along it with `share` of the friction that it can have."""
-    body = build_robot_body(shipped("jackal"))
+    body = build_robot_body(robot_spec("jackal"))
     reach = max(x for x, _ in body.footprint)
     wall = box("wall", 1.0, 0.0, 1.0, 20.0)
     simulation = simulate(body, solids=[wall], pose=Pose2(0.5 - reach - 0.001, 0.0, 0.0))
-    simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.0))
+    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
     pressing = 0.5 * body.mass * GRAVITY_M_S2
     along = share * body.hull_friction * pressing
 
@@ -106,7 +106,7 @@ def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
 @pytest.mark.parametrize("friction", [0.5, 1.5])
 def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, friction):
     """Its motors press it against a wall with the force that they push it along with."""
-    body = replace(build_robot_body(shipped("omni")), hull_friction=friction)
+    body = replace(build_robot_body(robot_spec("omni")), hull_friction=friction)
     reach = max(x for x, _ in body.footprint)
     simulation = simulate(body, [box("wall", 1.0, 0.0, 1.0, 20.0)], pose=Pose2(0.499 - reach, 0.0, 0.0))
     simulation.drive(Twist(0.3, 0.2, 0.0))
@@ -115,10 +115,10 @@ def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, fri
 
 
 def test_casters_glide_without_friction(simulate):
-    """A robot whose wheels stand on ice keeps its speed, although its hull has friction."""
+    """A robot with its wheels on ice keeps its speed, although its hull has friction."""
     simulation = simulate("turtlebot", drive=(0.4, 0.0, 0.0))
     simulation.step(2 * TICKS)
-    simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.0))
+    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
     simulation.drive(STOP)
     simulation.step(2 * TICKS)
     assert simulation.truth().twist.vx == pytest.approx(0.4, abs=0.005)

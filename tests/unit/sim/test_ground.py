@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -16,27 +16,27 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.world_file import ramp_solid
 
 TICKS = 240
-FOOT = 0.5
+RAMP_START_M = 0.5
 
 
 def ramp(degrees, length=2.0, friction=1.0, width=2.0):
-    """A ramp that begins FOOT ahead, and its height."""
+    """Return a ramp that starts at x = RAMP_START_M."""
     height = length * math.tan(math.radians(degrees))
-    return ramp_solid((FOOT, 0.0), (FOOT + length, 0.0), width, height, "ramp", friction)
+    return ramp_solid((RAMP_START_M, 0.0), (RAMP_START_M + length, 0.0), width, height, "ramp", friction)
 
 
 @pytest.fixture
 def on_ground(simulate):
-    """Makes simulations in which a robot knows what it climbs."""
+    """Return a function that creates a simulation whose robot knows which obstacles it can climb."""
 
-    def make(robot, solids, **where):
-        body = build_robot_body(shipped(robot))
+    def make(robot, solids, **options):
+        body = build_robot_body(robot_spec(robot))
         reach = max((wheel.radius for wheel in body.wheels), default=0.0)
         return simulate(
             body,
             solids,
             obstacles=merge_solids(drive_obstacles(tuple(solids), reach, *compute_climb_limits(body))),
-            **where,
+            **options,
         )
 
     return make
@@ -46,8 +46,8 @@ def pitch(pose):
     return math.asin(2 * (pose.qw * pose.qy - pose.qz * pose.qx))
 
 
-def driven(simulation, seconds):
-    """Names of what was hit on the way."""
+def drive_into(simulation, seconds):
+    """Step the simulation; return the names of the solids that the robot hits."""
     hit = []
     for _ in range(round(seconds * TICKS / 24)):
         simulation.step(24)
@@ -57,102 +57,100 @@ def driven(simulation, seconds):
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car"])
-def test_a_ramp_of_5_degrees_is_climbed_and_odometry_counts_the_way_along_it(on_ground, robot):
+def test_robot_climbs_a_ramp_of_5_degrees_and_odometry_measures_along_it(on_ground, robot):
     simulation = on_ground(robot, [ramp(5)], drive=(0.4, 0.0, 0.0))
-    begin = simulation.encoders()[0]
-    assert driven(simulation, 4.5) == []
+    start = simulation.encoders()[0]
+    assert drive_into(simulation, 4.5) == []
     pose = simulation.truth().pose
-    up = (pose.x - FOOT) * math.tan(math.radians(5))
+    up = (pose.x - RAMP_START_M) * math.tan(math.radians(5))
     assert pose.z == pytest.approx(up, abs=2e-3)
     assert pitch(pose) == pytest.approx(-math.radians(5), abs=2e-3)
-    radius = shipped(robot).drive.wheel_radius
-    along = FOOT + (pose.x - FOOT) / math.cos(math.radians(5))
-    assert (simulation.encoders()[0] - begin) * radius == pytest.approx(along, rel=0.01)
-    assert simulation.truth().clearance > 0.1  # a ramp that it climbs is no obstacle
+    radius = robot_spec(robot).drive.wheel_radius
+    along = RAMP_START_M + (pose.x - RAMP_START_M) / math.cos(math.radians(5))
+    assert (simulation.encoders()[0] - start) * radius == pytest.approx(along, rel=0.01)
+    assert simulation.truth().clearance > 0.1  # a ramp that the robot can climb is no obstacle
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr"])
-def test_a_ramp_of_30_degrees_is_hit_and_not_climbed(on_ground, robot):
+def test_robot_collides_with_a_ramp_of_30_degrees(on_ground, robot):
     simulation = on_ground(robot, [ramp(30)], drive=(0.4, 0.0, 0.0))
-    assert "ramp" in driven(simulation, 4)
+    assert "ramp" in drive_into(simulation, 4)
     assert simulation.truth().pose.z < 0.02
 
 
-def test_a_robot_that_stands_on_a_ramp_stands_still_on_its_plane(on_ground):
-    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(FOOT + 1.0, 0.2, math.pi / 2))
-    driven(simulation, 2)
+def test_robot_on_a_ramp_stays_at_rest(on_ground):
+    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(RAMP_START_M + 1.0, 0.2, math.pi / 2))
+    drive_into(simulation, 2)
     pose = simulation.truth().pose
-    assert pose.x == pytest.approx(FOOT + 1.0, abs=2e-3)
+    assert pose.x == pytest.approx(RAMP_START_M + 1.0, abs=2e-3)
     assert pose.z == pytest.approx(math.tan(math.radians(5)), abs=2e-3)
-    assert pitch(pose) == pytest.approx(0.0, abs=2e-3)  # it looks along the slope, so that it rolls instead
+    assert pitch(pose) == pytest.approx(0.0, abs=2e-3)  # it faces across the slope, so it rolls instead
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal"])
 @pytest.mark.parametrize(("share", "over"), [(0.9, True), (1.4, False)])
-def test_a_driven_wheel_climbs_a_step_of_r_times_1_minus_1_over_the_root_of_1_plus_friction_squared(
-    on_ground, robot, share, over
-):
-    """Without a run-up, by its own friction alone; wheels behind it push, so that skid steering gets higher."""
-    body = build_robot_body(shipped(robot))
+def test_driven_wheels_climb_steps_up_to_the_limit_of_their_friction(on_ground, robot, share, over):
+    """Without a run-up, the limit is r (1 - 1 / sqrt(1 + mu²)). Skid steering climbs higher: rear wheels push."""
+    body = build_robot_body(robot_spec(robot))
     step = share * compute_climb_limits(body).step
     if robot == "jackal" and not over:
         return
     simulation = on_ground(robot, [box("step", 1.0, 0, 1.0, 2, step)], pose=Pose2(0.3, 0, 0), drive=(0.05, 0, 0))
-    driven(simulation, 12)
+    drive_into(simulation, 12)
     assert (simulation.truth().pose.x > 0.7) == over
 
 
-def test_a_sill_of_6_mm_is_driven_over_and_is_no_collision(on_ground):
-    simulation = on_ground("turtlebot", [box("sill", FOOT, 0, 0.05, 2, 0.006)], drive=(0.4, 0, 0))
+def test_robot_drives_over_a_sill_of_6_mm_without_a_collision(on_ground):
+    simulation = on_ground("turtlebot", [box("sill", RAMP_START_M, 0, 0.05, 2, 0.006)], drive=(0.4, 0, 0))
     heights = []
     for _ in range(30):
-        assert driven(simulation, 0.1) == []
+        assert drive_into(simulation, 0.1) == []
         heights.append(simulation.truth().pose.z)
     assert max(heights) == pytest.approx(0.006, abs=1e-3)
     assert simulation.truth().pose.x > 1.0
 
 
-def test_a_step_that_the_hull_cannot_pass_is_hit(on_ground):
+def test_robot_collides_with_a_step_that_its_hull_cannot_pass(on_ground):
     simulation = on_ground("turtlebot", [box("step", 1.0, 0, 1, 2, 0.05)], drive=(0.4, 0, 0))
-    assert "step" in driven(simulation, 2)
+    assert "step" in drive_into(simulation, 2)
 
 
 @pytest.mark.parametrize(("share", "climbs"), [(0.9, False), (1.15, True)])
 @pytest.mark.parametrize("robot", ["jackal", "turtlebot"])
-def test_friction_holds_a_robot_on_a_slope_whose_tangent_is_below_it(on_ground, robot, share, climbs):
-    """tan θ = μ x the share of the weight on driven wheels; a quarter less or more decides."""
-    degrees, body = 6.0, build_robot_body(shipped(robot))
+def test_robot_climbs_a_slope_only_with_enough_friction(on_ground, robot, share, climbs):
+    """The limit is tan θ = μ times the share of the weight on driven wheels."""
+    degrees, body = 6.0, build_robot_body(robot_spec(robot))
     low, high = 0.01, 1.0
     for _ in range(40):
         middle = (low + high) / 2
         low, high = (middle, high) if grip_angle(body, middle) < math.radians(degrees) else (low, middle)
     surface = ramp(degrees, friction=share * high)
-    simulation = on_ground(robot, [surface], pose=Pose2(FOOT + 0.8, 0, 0), drive=(0.3, 0, 0))
-    driven(simulation, 2)
-    assert (simulation.truth().pose.x > FOOT + 0.8) == climbs
+    simulation = on_ground(robot, [surface], pose=Pose2(RAMP_START_M + 0.8, 0, 0), drive=(0.3, 0, 0))
+    drive_into(simulation, 2)
+    assert (simulation.truth().pose.x > RAMP_START_M + 0.8) == climbs
 
 
-def test_a_height_field_carries_wheels_as_a_ramp_does(on_ground):
+def test_robot_climbs_a_height_field_like_a_ramp(on_ground):
     steps = np.linspace(0.0, 3.0, 31)
     x, y = np.meshgrid(steps, np.linspace(-1.0, 1.0, 21))
-    z = np.clip(x - FOOT, 0.0, 1.0) * math.tan(math.radians(5))
+    z = np.clip(x - RAMP_START_M, 0.0, 1.0) * math.tan(math.radians(5))
     number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
     sw, se, nw, ne = (part.ravel() for rows in (number[:-1], number[1:]) for part in (rows[:, :-1], rows[:, 1:]))
     faces = np.concatenate((np.column_stack((sw, se, ne)), np.column_stack((sw, ne, nw))))
     drivable_solids = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
     simulation = on_ground("turtlebot", [drivable_solids], drive=(0.4, 0.0, 0.0))
-    assert driven(simulation, 5) == []
+    assert drive_into(simulation, 5) == []
     assert simulation.truth().pose.z == pytest.approx(math.tan(math.radians(5)), abs=3e-3)
 
 
-def test_a_base_that_never_leaves_the_plane_is_stopped_by_a_ramp(on_ground):
+def test_planar_base_is_stopped_by_a_ramp(on_ground):
     simulation = on_ground("omni", [ramp(10)], drive=(0.4, 0.0, 0.0))
-    assert "ramp" in driven(simulation, 4)
+    assert "ramp" in drive_into(simulation, 4)
     assert simulation.truth().pose.z == 0.0
 
 
 def test_walls_leave_the_ground_flat(simulate):
-    """Wheels touch nothing of a world of walls, so that its runs are what they were."""
+    """Walls contain no drivable surfaces."""
     from simscen.core.geometry.meshes import drivable_solids
 
     mesh = merge_solids([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
@@ -164,18 +162,18 @@ def test_walls_leave_the_ground_flat(simulate):
 
 
 def test_objects_and_robots_are_placed_on_top_of_a_platform(on_ground):
-    """A crate that is spawned on a platform stands on it, and lies still."""
+    """A crate that is spawned on a platform stays at rest on it."""
     simulation = on_ground("turtlebot", [box("platform", 3.0, 0, 2.0, 2.0, 0.03)])
     crate = (Solid(Box((0.2, 0.2, 0.2)), Pose3(z=0.1), "crate"),)
     simulation.spawn(Body("crate", crate, Pose3(3.5, 0.5, 0.0), mass=2.0))
     simulation.place_robot(Pose2(2.8, -0.2, 0.5))
-    assert driven(simulation, 1) == []
+    assert drive_into(simulation, 1) == []
     assert simulation.truth().pose.z == pytest.approx(0.03, abs=1e-3)
     assert simulation.robot.objects()["crate"].z == pytest.approx(0.03, abs=2e-3)
 
 
-def test_an_imu_on_a_slope_feels_gravity_ahead(on_ground):
-    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(FOOT + 1.0, 0.0, 0.0))
-    driven(simulation, 1)
+def test_imu_on_a_slope_measures_gravity_along_x(on_ground):
+    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(RAMP_START_M + 1.0, 0.0, 0.0))
+    drive_into(simulation, 1)
     base_from_world = simulation.truth().pose.rotation().T
     assert (base_from_world @ (0.0, 0.0, 9.81))[0] == pytest.approx(9.81 * math.sin(math.radians(5)), abs=0.02)

@@ -23,7 +23,7 @@ ROUND = {
 
 @pytest.mark.parametrize("shape", ROUND)
 def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
-    """Brute force: the distance of every vertex to each plane of the hull of those that are kept."""
+    """Brute force: measure the distance of every vertex to each plane of the reduced hull."""
     full = ROUND[shape].vertices
     kept = reduce_hull_vertices(ROUND[shape])
     assert len(kept) < len(ConvexHull(full).vertices) / 2
@@ -34,26 +34,26 @@ def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
     assert all(tuple(row) in rows for row in kept.tolist())
 
 
-def test_a_hull_of_few_corners_is_kept_whole():
+def test_hull_with_few_corners_keeps_its_volume():
     box = trimesh.creation.box((1, 2, 3)).subdivide().subdivide().subdivide()
     assert len(box.vertices) > MAX_HULL_VERTICES
     assert ConvexHull(reduce_hull_vertices(mesh(box))).volume == pytest.approx(6.0)
     assert len(reduce_hull_vertices(mesh(box))) < 100
 
 
-def test_flat_point_set_is_kept_whole():
+def test_flat_point_set_is_not_reduced():
     flat = Mesh(BALL.vertices * [1, 1, 0], BALL.faces)
     assert reduce_hull_vertices(flat) is flat.vertices
 
 
 def test_object_with_80_000_faces_can_be_pushed_and_rendered(simulate):
-    """Bullet's commands take 131 072 vertices, and its renderer three for each face."""
+    """Bullet's commands accept at most 131 072 vertices, and its renderer needs three for each face."""
     fine = mesh(trimesh.creation.cylinder(0.3, 0.6, sections=20_000))
-    told = []
+    clearances = []
     for shape in (Cylinder(0.3, 0.6), fine):
         simulation = simulate(bodies=[Body("drum", (Solid(shape, Pose3(z=0.3), "drum"),), Pose3(1.5), 2.0)])
         simulation.step(24)
-        told.append(simulation.truth().clearance)
-    assert told[1] == pytest.approx(told[0], abs=2e-3)
+        clearances.append(simulation.truth().clearance)
+    assert clearances[1] == pytest.approx(clearances[0], abs=2e-3)
     _, depth = simulation.robot.image(Pose3(z=0.3), 32, 24, 1.0, 10.0)
     assert depth[12, 16] == pytest.approx(1.2, abs=0.02)

@@ -21,7 +21,7 @@ SHAPES = [
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
-def test_mass_properties_are_those_trimesh_integrates_over_the_surface(shape):
+def test_mass_properties_equal_those_of_trimesh(shape):
     surface = triangulate(shape)
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     mesh.density = 3.0 / mesh.volume
@@ -31,7 +31,7 @@ def test_mass_properties_are_those_trimesh_integrates_over_the_surface(shape):
     assert ours.tensor == pytest.approx(mesh.moment_inertia, rel=0.01, abs=1e-3)
 
 
-def test_two_halves_of_a_box_are_the_box():
+def test_inertia_of_two_halves_equals_that_of_the_whole_box():
     halves = [Solid(Box((0.2, 0.3, 0.1)), Pose3(x=side)) for side in (-0.1, 0.1)]
     whole = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
     ours = inertia_of_solids(halves, 2.0)
@@ -39,7 +39,7 @@ def test_two_halves_of_a_box_are_the_box():
     assert ours.tensor == pytest.approx(whole.tensor)
 
 
-def test_principal_axes_of_a_turned_box_are_the_boxs_own():
+def test_principal_moments_do_not_change_with_rotation():
     box = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
     moments, frame = box.transformed(Pose3.from_rpy(1, 2, 3, 0.3, -0.2, 0.9)).principal()
     assert sorted(moments) == pytest.approx(sorted(np.diag(box.tensor)))
@@ -50,7 +50,7 @@ def test_principal_axes_of_a_turned_box_are_the_boxs_own():
     assert math.isclose(np.linalg.det(turn), 1.0)
 
 
-def test_massless_parts_change_nothing():
+def test_massless_parts_do_not_change_the_inertia():
     box = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
-    nothing = MassProperties(0.0, np.array([5.0, 0.0, 0.0]), np.zeros((3, 3)))
-    assert combine([box, nothing]).tensor == pytest.approx(box.tensor)
+    massless = MassProperties(0.0, np.array([5.0, 0.0, 0.0]), np.zeros((3, 3)))
+    assert combine([box, massless]).tensor == pytest.approx(box.tensor)

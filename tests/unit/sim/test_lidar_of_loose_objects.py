@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -19,8 +19,8 @@ CRATES = [Body(f"crate {k}", CRATE, Pose3.planar(Pose2(1.0 + 0.5 * k, 0.4 * (k %
 FAN = RayFan(-math.pi, math.pi / 45, 90)
 
 
-def drive(simulate, every, looking):
-    """What a level fan meets, every fifth of a second; every so many ticks somebody else is `looking`."""
+def drive(simulate, every, observe):
+    """Return the scans of a level fan at 5 Hz; call `observe` every `every` ticks."""
     simulation = simulate(solids=[WALL], bodies=CRATES, drive=(0.4, 0.0, 0.0))
     rays, scans = LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot), []
     for tick in range(0, 3612, 12):
@@ -33,34 +33,34 @@ def drive(simulate, every, looking):
         if tick % 48 == 0:
             scans.append(np.minimum(rays.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
         if tick % every == 0:
-            looking(simulation)
+            observe(simulation)
         simulation.step(12)
     return simulation, np.array(scans)
 
 
 def test_scan_does_not_depend_on_other_lidars(simulate):
-    """Things that are pushed leave their homes, and are at home again where they come to rest."""
-    other, at_home = [], []
+    """Pushed objects leave their rest poses, and get new ones where they come to rest."""
+    other, resting = [], []
 
-    def look(simulation):
-        homes = simulation.robot.rest_poses
+    def observe(simulation):
+        rest_poses = simulation.robot.rest_poses
         other or other.append(LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot, frozenset({"crate 1"})))
         other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
-        at_home.append({name for name, pose in simulation.robot.objects().items() if homes.get(name) == pose})
+        resting.append({name for name, pose in simulation.robot.objects().items() if rest_poses.get(name) == pose})
 
-    _, alone = drive(simulate, 3612, lambda _: None)
-    _, watched = drive(simulate, 36, look)
-    assert np.array_equal(alone, watched)
-    assert at_home[0] == {body.name for body in CRATES}
-    assert any(len(names) == 5 and "crate 0" not in names for names in at_home), "which the robot has pushed"
-    assert any(len(names) < 2 for names in at_home), "whatever comes or goes wakes everything"
-    assert at_home[-1] == {"late", *(body.name for body in CRATES[:5])}, "where it has come to rest"
+    _, expected = drive(simulate, 3612, lambda _: None)
+    _, observed = drive(simulate, 36, observe)
+    assert np.array_equal(expected, observed)
+    assert resting[0] == {body.name for body in CRATES}
+    assert any(len(names) == 5 and "crate 0" not in names for names in resting), "the robot has pushed it"
+    assert any(len(names) < 2 for names in resting), "spawning and removing wake all objects"
+    assert resting[-1] == {"late", *(body.name for body in CRATES[:5])}, "all have come to rest"
 
 
 def test_scan_equals_the_minimum_over_single_objects(simulate):
-    apart = []
+    separate = []
 
-    def look(simulation):
+    def observe(simulation):
         scene = RayScene(merge_solids([WALL]))
         scene.set_bodies(
             {
@@ -68,8 +68,8 @@ def test_scan_equals_the_minimum_over_single_objects(simulate):
                 for name, (body, pose) in simulation.robot.bodies_and_poses().items()
             }
         )
-        apart.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
+        separate.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
 
-    _, scans = drive(simulate, 48, look)
-    assert np.abs(scans - np.array(apart)).max() < 1e-5
+    _, scans = drive(simulate, 48, observe)
+    assert np.abs(scans - np.array(separate)).max() < 1e-5
     assert (scans < 6.0).sum() > 500

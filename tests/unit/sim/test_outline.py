@@ -9,12 +9,12 @@ from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid
 from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, outlines_in_z_range
 
 
-def test_convex_hull_is_shapelys():
+def test_convex_hull_equals_that_of_shapely():
     points = np.random.default_rng(1).normal(size=(500, 2))
     hull = Polygon(convex_hull(points))
-    theirs = MultiPoint(points).convex_hull
+    expected = MultiPoint(points).convex_hull
     assert hull.exterior.is_ccw
-    assert hull.symmetric_difference(theirs).area < 1e-6
+    assert hull.symmetric_difference(expected).area < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -30,17 +30,17 @@ def test_convex_hull_is_shapelys():
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_footprint_covers_what_the_shape_covers_from_above(shape, area):
+def test_footprint_has_the_area_of_the_shape_seen_from_above(shape, area):
     placed = Solid(shape, Pose3.planar(Pose2(1.0, 2.0, 0.3), 0.5))
     assert Polygon(footprint([placed])).area == pytest.approx(area, rel=0.01)
 
 
-def test_a_lying_cylinder_covers_a_rectangle():
+def test_footprint_of_a_lying_cylinder_is_a_rectangle():
     lying = Solid(Cylinder(0.1, 0.6), Pose3.from_rpy(0, 0, 0.1, math.pi / 2, 0, 0))
     assert Polygon(footprint([lying])).bounds == pytest.approx((-0.1, -0.3, 0.1, 0.3), abs=1e-3)
 
 
-def test_extremes_of_a_box_are_its_corners():
+def test_hull_points_of_a_box_include_its_corners():
     assert hull_points(Box((2.0, 4.0, 6.0))).max(axis=0).tolist() == [1.0, 2.0, 3.0]
 
 
@@ -52,8 +52,8 @@ def test_a_circle_has_its_corners_on_the_circle_counterclockwise():
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("shape", ["cloud", "disc", "square", "line", "far", "same"])
-def test_the_hull_of_many_points_is_shapelys(shape, seed):
-    """Of many, most are left out beforehand; none of the corners is."""
+def test_convex_hull_of_many_points_equals_that_of_shapely(shape, seed):
+    """Most points are discarded beforehand, but none of the corners."""
     rng = np.random.default_rng(seed)
     cloud = rng.normal(size=(3000, 2))
     points = {
@@ -68,10 +68,10 @@ def test_the_hull_of_many_points_is_shapelys(shape, seed):
     assert ours.hausdorff_distance(MultiPoint(points).convex_hull) <= 2e-9
 
 
-def test_a_shape_has_an_outline_for_each_place_and_none_where_it_does_not_reach():
+def test_outlines_are_those_of_the_solids_in_the_z_range():
     box = Box((0.4, 0.2, 0.2))
     solids = [Solid(box, Pose3.planar(Pose2(x, 0.0, 0.0), z)) for x, z in ((0.0, 0.5), (1.0, 0.5), (2.0, 3.0))]
-    for _ in range(2):  # the second time it is known
+    for _ in range(2):  # the second result is cached
         here, there = (Polygon(outline).bounds for outline in outlines_in_z_range(solids, (0.0, 1.0)))
         assert (here, there) == (pytest.approx((-0.2, -0.1, 0.2, 0.1)), pytest.approx((0.8, -0.1, 1.2, 0.1)))
     assert len(outlines_in_z_range(solids, (0.0, 4.0))) == 3

@@ -4,7 +4,7 @@ import math
 
 import pybullet
 import pytest
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -18,8 +18,8 @@ def crate(x=3.0, mass=5.0):
     return Body("crate", CRATE, Pose3(x), mass=mass)
 
 
-def slowing(simulation):
-    """The deceleration in m/s² that friction gives it while it slides."""
+def sliding_deceleration(simulation):
+    """Return the deceleration of the sliding crate in m/s²."""
     places = []
     for _ in range(3):
         places.append(simulation.object_pose("crate").x)
@@ -27,22 +27,22 @@ def slowing(simulation):
     return (2 * places[1] - places[0] - places[2]) * 20.0**2
 
 
-def test_a_force_accelerates_by_newton_and_friction_and_no_longer_than_it_lasts(simulate):
+def test_pushed_crate_accelerates_by_force_minus_friction_for_the_duration(simulate):
     simulation = simulate(bodies=[crate()])
     simulation.push_object("crate", (10.0, 0.0))
     simulation.step(6)
-    friction = slowing(simulation)
+    friction = sliding_deceleration(simulation)
     assert 1.0 < friction < 10.0
     simulation.step(480)
-    begin = simulation.object_pose("crate").x
-    force, lasts = 60.0, 0.5
-    simulation.push_object("crate", (force * lasts, 0.0), lasts)
+    start = simulation.object_pose("crate").x
+    force, duration = 60.0, 0.5
+    simulation.push_object("crate", (force * duration, 0.0), duration)
     simulation.step(120)
-    speed = (force / 5.0 - friction) * lasts
-    assert simulation.object_pose("crate").x - begin == pytest.approx(speed * lasts / 2, rel=0.05)
+    speed = (force / 5.0 - friction) * duration
+    assert simulation.object_pose("crate").x - start == pytest.approx(speed * duration / 2, rel=0.05)
     simulation.step(720)
-    way = speed * lasts / 2 + speed**2 / (2 * friction)
-    assert simulation.object_pose("crate").x - begin == pytest.approx(way, rel=0.05)
+    distance = speed * duration / 2 + speed**2 / (2 * friction)
+    assert simulation.object_pose("crate").x - start == pytest.approx(distance, rel=0.05)
 
 
 def test_long_resting_object_can_be_pushed(simulate):
@@ -54,14 +54,14 @@ def test_long_resting_object_can_be_pushed(simulate):
     assert simulation.object_pose("crate").x > before + 0.2
 
 
-def test_a_pushed_crate_that_hits_the_robot_is_felt(simulate):
+def test_pushed_crate_that_hits_the_robot_is_a_collision(simulate):
     simulation = simulate(bodies=[crate(1.0)])
     simulation.push_object("crate", (-25.0, 0.0))
     simulation.step(240)
     assert [event.name for event in simulation.robot.collisions()][:1] == ["crate"]
 
 
-def test_push_of_an_unmovable_or_removed_object_fails(simulate):
+def test_push_of_an_immovable_or_removed_object_has_no_effect(simulate):
     simulation = simulate(bodies=[crate(mass=0.0)])
     assert simulation.mass("crate") == 0.0
     simulation.push_object("crate", (10.0, 0.0))
@@ -82,7 +82,7 @@ def test_teleported_object_keeps_its_mass(simulate):
     assert simulation.mass("crate") == 5.0
 
 
-def test_motion_tells_the_path_until_it_is_over(simulate):
+def test_motion_returns_the_path_until_its_end(simulate):
     path = MotionPath((0.0, 1.0), (Pose2(3, 0), Pose2(3, 1)))
     simulation = simulate(bodies=[crate(mass=0.0)])
     assert simulation.motion("crate") is None
@@ -93,12 +93,14 @@ def test_motion_tells_the_path_until_it_is_over(simulate):
     assert simulation.motion("crate") is None
 
 
-def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
+def test_force_on_the_robot_adds_its_impulse_evenly_over_its_duration(simulate):
     """Half a meter above the ground there is no friction: the change of momentum is force times time."""
     simulation = simulate("turtlebot")
     number, client = simulation.robot.base.id, simulation._scene.client
-    place, turn = pybullet.getBasePositionAndOrientation(number, physicsClientId=client)
-    pybullet.resetBasePositionAndOrientation(number, (*place[:2], place[2] + 0.5), turn, physicsClientId=client)
+    position, orientation = pybullet.getBasePositionAndOrientation(number, physicsClientId=client)
+    pybullet.resetBasePositionAndOrientation(
+        number, (*position[:2], position[2] + 0.5), orientation, physicsClientId=client
+    )
     simulation.robot.push_for((0.9, 0.0), 0.1)
     speeds = []
     for _ in range(3):
@@ -107,7 +109,7 @@ def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
     assert speeds == pytest.approx([0.25, 0.5, 0.5], rel=0.03)
 
 
-def test_a_robot_that_is_placed_elsewhere_touches_only_what_is_there(simulate):
+def test_placed_robot_touches_only_objects_at_its_new_pose(simulate):
     simulation = simulate(bodies=[crate(0.5, mass=0.0)])
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)

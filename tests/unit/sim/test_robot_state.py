@@ -5,12 +5,12 @@ import pybullet
 from simscen.core.geometry import Pose2
 
 
-def test_the_engine_is_asked_for_a_robots_pose_once_for_each_tick(simulate, monkeypatch):
-    simulation, asked = simulate(drive=(0.3, 0.0, 0.2)), []
+def test_pose_is_read_from_the_engine_once_per_tick(simulate, monkeypatch):
+    simulation, calls = simulate(drive=(0.3, 0.0, 0.2)), []
     simulation.truth()
     real = pybullet.getBasePositionAndOrientation
     monkeypatch.setattr(
-        "pybullet.getBasePositionAndOrientation", lambda *args, **more: asked.append(args) or real(*args, **more)
+        "pybullet.getBasePositionAndOrientation", lambda *args, **more: calls.append(args) or real(*args, **more)
     )
     for _ in range(10):
         simulation.step(6)
@@ -18,10 +18,10 @@ def test_the_engine_is_asked_for_a_robots_pose_once_for_each_tick(simulate, monk
         assert simulation.base_pose() == truth.pose
         assert simulation.robot.base_twist() == truth.twist
         simulation.robot.base_velocity()
-    assert len(asked) == 10
+    assert len(calls) == 10
 
 
-def test_a_robot_that_was_set_down_elsewhere_is_seen_there_within_the_same_tick(simulate):
+def test_placed_robot_has_its_new_pose_within_the_same_tick(simulate):
     simulation = simulate(drive=(0.3, 0.0, 0.0))
     simulation.step(120)
     assert simulation.robot.base_velocity()[0][0] > 0.1

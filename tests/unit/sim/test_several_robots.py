@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -14,40 +14,40 @@ from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
-FRONT = Twist(0.3, 0.0, 0.0)
+FORWARD = Twist(0.3, 0.0, 0.0)
 
 
 @pytest.fixture
-def meet():
-    """Makes simulations of robots by name and closes them."""
-    made = []
+def simulate_robots():
+    """Return a function that creates simulations of robots by name, and close them after the test."""
+    simulations = []
 
     def make(solids=(), **robots):
         placed = {
-            name: RobotPlacement(build_robot_body(shipped(model)), Pose2(*pose))
+            name: RobotPlacement(build_robot_body(robot_spec(model)), Pose2(*pose))
             for name, (model, *pose) in robots.items()
         }
-        made.append(Simulation(merge_solids(list(solids)), [], placed, triangulate))
-        return made[-1]
+        simulations.append(Simulation(merge_solids(list(solids)), [], placed, triangulate))
+        return simulations[-1]
 
     yield make
-    for simulation in made:
+    for simulation in simulations:
         simulation.close()
 
 
 def drive(simulation, ticks, **commands):
-    """The truths of all robots, every 24 ticks, while they drive what they are told."""
-    told = []
+    """Drive robots with constant commands; return the truths of all robots every 24 ticks."""
+    truths = []
     for _ in range(ticks // 24):
         for name, twist in commands.items():
             simulation.robots[name].drive(twist)
         simulation.step(24)
-        told.append({name: robot.truth() for name, robot in simulation.robots.items()})
-    return told
+        truths.append({name: robot.truth() for name, robot in simulation.robots.items()})
+    return truths
 
 
-def corners(simulation, name, body):
-    """The footprint of a robot in the world, densely sampled."""
+def sample_footprint(simulation, name, body):
+    """Return densely sampled points of the footprint of a robot in the world."""
     ring = np.array(body.footprint)
     edges = zip(ring, np.roll(ring, -1, axis=0), strict=True)
     points = np.concatenate([a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in edges])
@@ -55,19 +55,19 @@ def corners(simulation, name, body):
 
 
 @pytest.mark.slow
-def test_the_clearance_of_each_counts_the_other_as_measured_by_brute_force(meet):
-    amr, turtlebot = build_robot_body(shipped("amr")), build_robot_body(shipped("turtlebot"))
+def test_clearance_between_two_robots_equals_brute_force(simulate_robots):
+    amr, turtlebot = build_robot_body(robot_spec("amr")), build_robot_body(robot_spec("turtlebot"))
     for x, y, yaw in ((1.3, 0.4, 0.7), (0.2, 1.1, 2.0), (-1.2, -0.6, -1.0)):
-        simulation = meet(a=("amr", 0.0, 0.0, 0.3), b=("turtlebot", x, y, yaw))
-        here, there = corners(simulation, "a", amr), corners(simulation, "b", turtlebot)
-        apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1)).min()
+        simulation = simulate_robots(a=("amr", 0.0, 0.0, 0.3), b=("turtlebot", x, y, yaw))
+        outline_a, outline_b = sample_footprint(simulation, "a", amr), sample_footprint(simulation, "b", turtlebot)
+        expected = np.hypot(*(outline_a[:, None] - outline_b[None]).transpose(2, 0, 1)).min()
         for name in "ab":
-            assert simulation.robots[name].truth().clearance == pytest.approx(apart, abs=0.01)
+            assert simulation.robots[name].truth().clearance == pytest.approx(expected, abs=0.01)
 
 
-def test_a_collision_names_the_other_robot_on_both_sides_and_whose_doing_it_was(meet):
-    simulation = meet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 1.0, 0.0, 0.0))
-    drive(simulation, 720, a=FRONT)
+def test_collision_of_two_robots_names_the_other_robot_and_the_cause(simulate_robots):
+    simulation = simulate_robots(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 1.0, 0.0, 0.0))
+    drive(simulation, 720, a=FORWARD)
     hit, was_hit = (simulation.robots[name].collisions()[0] for name in "ab")
     assert (hit.name, was_hit.name) == ("b", "a")
     assert hit.tick == was_hit.tick
@@ -77,30 +77,34 @@ def test_a_collision_names_the_other_robot_on_both_sides_and_whose_doing_it_was(
     assert simulation.robots["b"].base_pose().x > 1.0, "it is pushed"
 
 
-def test_each_robot_is_an_object_for_the_other(meet):
-    simulation = meet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 2.0, 0.0, 0.0))
+def test_each_robot_is_an_object_for_the_other(simulate_robots):
+    simulation = simulate_robots(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 2.0, 0.0, 0.0))
     a = simulation.robots["a"]
     assert list(a.truth().objects) == ["b"]
     assert a.truth().objects["b"] == simulation.robots["b"].base_pose()
     rays = LiveRayCaster(RayScene(merge_solids([])), a)
-    (ahead, back) = rays.cast(np.array([[0.3, 0.0, 0.1]] * 2), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), 5.0)
-    radius = build_robot_body(shipped("turtlebot")).radius
-    assert ahead == pytest.approx(1.7 - radius, abs=0.02)
-    assert math.isinf(back), "it does not see itself"
+    (front, back) = rays.cast(np.array([[0.3, 0.0, 0.1]] * 2), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), 5.0)
+    radius = build_robot_body(robot_spec("turtlebot")).radius
+    assert front == pytest.approx(1.7 - radius, abs=0.02)
+    assert math.isinf(back), "a robot does not see itself"
 
 
-def test_a_robot_far_away_changes_nothing_bit_for_bit(meet):
+def test_distant_robots_do_not_change_any_bit_of_the_motion(simulate_robots):
     walls = [box("wall", 3.0, 0.0, 0.2, 4.0)]
-    alone = meet(walls, a=("turtlebot", 0.0, 0.0, 0.1))
-    among = meet(walls, b=("jackal", 40.0, 5.0, 1.0), a=("turtlebot", 0.0, 0.0, 0.1), aa=("amr", -30.0, 5.0, 1.0))
+    single = simulate_robots(walls, a=("turtlebot", 0.0, 0.0, 0.1))
+    several = simulate_robots(
+        walls, b=("jackal", 40.0, 5.0, 1.0), a=("turtlebot", 0.0, 0.0, 0.1), aa=("amr", -30.0, 5.0, 1.0)
+    )
     turn = Twist(0.3, 0.0, 0.2)
-    first = drive(alone, 2400, a=turn)
-    second = drive(among, 2400, a=turn, b=Twist(0.5, 0.0, 0.5), aa=FRONT)
-    same = [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in first]
-    assert same == [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in second]
+    first = drive(single, 2400, a=turn)
+    second = drive(several, 2400, a=turn, b=Twist(0.5, 0.0, 0.5), aa=FORWARD)
+    expected = [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in first]
+    assert expected == [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in second]
 
 
-def test_the_order_in_which_robots_are_named_changes_nothing(meet):
+def test_order_of_robots_does_not_change_the_run(simulate_robots):
     robots = {"a": ("turtlebot", 0.0, 0.0, 0.0), "b": ("turtlebot", 0.9, 0.1, math.pi)}
-    told = [drive(meet(**order), 720, a=FRONT, b=FRONT) for order in (robots, dict(reversed(robots.items())))]
-    assert told[0] == told[1]
+    truths = [
+        drive(simulate_robots(**order), 720, a=FORWARD, b=FORWARD) for order in (robots, dict(reversed(robots.items())))
+    ]
+    assert truths[0] == truths[1]

@@ -4,7 +4,7 @@ import math
 
 import pybullet
 import pytest
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -13,8 +13,8 @@ from simscen.sim.objects.idle_objects import RestDetector
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 BALL = (Solid(Sphere(0.1), Pose3(z=0.1), "ball"),)
-LONG = 5 * 240
-"""Ticks after which everything that rests is asleep."""
+SETTLING_TICKS = 5 * 240
+"""Number of ticks after which all resting objects are asleep."""
 
 
 def run(simulation, ticks, every=6):
@@ -24,14 +24,14 @@ def run(simulation, ticks, every=6):
 
 
 def engine_pose(simulation, name):
-    """What the engine itself says of a body whose center of mass is above its origin."""
+    """Return the position of the center of mass of an object in the engine."""
     number = simulation._scene.actors._actors[name].id
     return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._scene.client)[0]
 
 
 def test_resting_object_does_not_creep(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0)])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     before = simulation.object_pose("crate")
     run(simulation, 20 * 240)
     assert simulation.object_pose("crate") == before
@@ -49,7 +49,7 @@ def test_unstable_object_tips_over(simulate):
     plank, lean = (box("plank", 0, 0, 0.2, 0.2, 2.0),), math.atan2(0.1, 1.0) + 2e-4
     pose = Pose3.from_rpy(3.0, 0.0, 0.1 * math.sin(lean), 0.0, lean, 0.0)
     simulation = simulate(bodies=[Body("plank", plank, pose, 5.0)])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     assert simulation.object_pose("plank").apply([[0.0, 0.0, 2.0]])[0, 2] < 0.5
 
 
@@ -74,18 +74,18 @@ def test_resting_object_is_slow_and_not_accelerating_at_each_check(monkeypatch, 
 def test_slowly_rolling_object_keeps_rolling(simulate):
     """Bullet's own threshold would stop a ball of 0.1 m/s after two seconds."""
     simulation = simulate(bodies=[Body("ball", BALL, Pose3(2.0), 1.0)])
-    run(simulation, LONG)
-    simulation.spawn(Body("other", CRATE, Pose3(-5.0)))  # what is changed wakes everything
+    run(simulation, SETTLING_TICKS)
+    simulation.spawn(Body("other", CRATE, Pose3(-5.0)))  # a change wakes all objects
     run(simulation, 6)
     number = simulation._scene.actors._actors["ball"].id
     pybullet.resetBaseVelocity(number, (0.1, 0, 0), (0, 1.0, 0), physicsClientId=simulation._scene.client)
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     assert engine_pose(simulation, "ball")[0] == pytest.approx(2.5, abs=0.02)
 
 
-def test_a_robot_that_comes_slowly_wakes_and_pushes_what_sleeps(simulate):
+def test_slow_robot_wakes_and_pushes_a_sleeping_object(simulate):
     simulation = simulate("amr", bodies=[Body("crate", CRATE, Pose3(1.2), 3.0)])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     before = simulation.object_pose("crate").x
     simulation.drive(Twist(0.1, 0.0, 0.0))
     run(simulation, 12 * 240)
@@ -94,34 +94,34 @@ def test_a_robot_that_comes_slowly_wakes_and_pushes_what_sleeps(simulate):
 
 def test_sleeping_poses_equal_those_of_the_engine(simulate):
     simulation = simulate("amr", bodies=[Body("crate", CRATE, Pose3(1.6), 3.0)])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     for tick in range(0, 8 * 240, 6):
         if tick == 240:
             simulation.drive(Twist(0.4, 0.0, 0.0))
         simulation.step(6)
         x, y, _ = engine_pose(simulation, "crate")
-        told = simulation.truth().objects["crate"]
-        upright = told.apply([[0.0, 0.0, 0.2]])[0]
+        pose = simulation.truth().objects["crate"]
+        upright = pose.apply([[0.0, 0.0, 0.2]])[0]
         assert upright[:2] == pytest.approx([x, y], abs=1e-6)
     assert x > 1.65
 
 
-@pytest.mark.parametrize("looked", [True, False])
-def test_object_falls_when_its_support_is_removed(simulate, looked):
+@pytest.mark.parametrize("is_sampled", [True, False])
+def test_object_falls_when_its_support_is_removed(simulate, is_sampled):
     upper = Body("upper", CRATE, Pose3(2.0, 0.0, 0.4), 2.0)
     simulation = simulate(bodies=[Body("lower", CRATE, Pose3(2.0), 5.0), upper])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     assert simulation.object_pose("upper").z == pytest.approx(0.4, abs=2e-3)
     simulation.remove("lower")
-    if looked:
+    if is_sampled:
         simulation.truth()
     run(simulation, 240)
     assert simulation.object_pose("upper").z == pytest.approx(0.0, abs=2e-3)
 
 
-def test_a_scripted_cart_pushes_what_slept(simulate):
+def test_scripted_cart_pushes_a_sleeping_object(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0), 3.0), Body("cart", CRATE, Pose3(2.0))])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     simulation.move("cart", MotionPath((0.0, 4.0), (Pose2(2.0, 0.0, 0.0), Pose2(4.0, 0.0, 0.0))))
     run(simulation, 5 * 240)
     assert simulation.object_pose("crate").x > 4.3
@@ -129,7 +129,7 @@ def test_a_scripted_cart_pushes_what_slept(simulate):
 
 def test_object_placed_on_a_sleeping_one_wakes_it(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 0.5)])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     simulation.spawn(Body("anvil", CRATE, Pose3(2.3, 0.0, 0.5), 50.0))
     run(simulation, 240)
     assert simulation.object_pose("crate") != Pose3(2.0)
@@ -141,7 +141,7 @@ FAR_CART = Body("far cart", CRATE, Pose3(-8.0), path=MotionPath((0.0, 60.0), (Po
 
 def test_object_sleeps_while_a_script_moves_a_distant_object(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), FAR_CART])
-    run(simulation, LONG)
+    run(simulation, SETTLING_TICKS)
     before = engine_pose(simulation, "crate")
     run(simulation, 20 * 240)
     assert engine_pose(simulation, "crate") == before
@@ -149,18 +149,18 @@ def test_object_sleeps_while_a_script_moves_a_distant_object(simulate):
 
 
 @pytest.mark.parametrize("start", [0.0, 8.0])
-def test_a_cart_that_comes_from_afar_pushes_what_sleeps(simulate, start):
-    """Also one that stood beside it all the while."""
-    begin = Pose2(2.58 if start else -1.0, 3.0)
-    path = MotionPath((0.0, 8.0), (begin, Pose2(4.0, 3.0)), start=start)
+def test_cart_that_arrives_or_starts_beside_a_sleeping_object_pushes_it(simulate, start):
+    """With `start` 8 s, the cart waits beside the crate first."""
+    first = Pose2(2.58 if start else -1.0, 3.0)
+    path = MotionPath((0.0, 8.0), (first, Pose2(4.0, 3.0)), start=start)
     cart = Body("cart", CRATE, Pose3(*path.poses[0][:2]), path=path)
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0, 3.0), 3.0), cart, FAR_CART])
     run(simulation, round((start + 8.5) * 240))
-    slides = (4.0 - begin.x) ** 2 / 8.0**2 / (2 * 0.6 * 9.81)
-    assert simulation.object_pose("crate").x == pytest.approx(4.4 + slides, abs=0.01)
+    sliding = (4.0 - first.x) ** 2 / 8.0**2 / (2 * 0.6 * 9.81)
+    assert simulation.object_pose("crate").x == pytest.approx(4.4 + sliding, abs=0.01)
 
 
-def test_a_whole_stack_that_is_pushed_at_its_bottom_moves(simulate):
+def test_stack_pushed_at_its_bottom_moves_as_a_whole(simulate):
     cart = Body("cart", CRATE, Pose3(-1.0), path=MotionPath((0.0, 20.0), (Pose2(-1, 3), Pose2(4, 3))))
     stack = [Body(f"crate{k}", CRATE, Pose3(3.0, 3.0, 0.4 * k), 3.0) for k in range(3)]
     simulation = simulate(bodies=[*stack, cart])
@@ -177,7 +177,7 @@ def test_pushed_object_pushes_another_one(simulate):
 
 
 def test_object_falls_when_a_script_moves_its_support(simulate):
-    """A drawer that is pulled out after everything has gone to sleep, faster than what lies on it could follow."""
+    """The drawer is pulled out after all objects fell asleep, faster than the crate on it could follow."""
     path = MotionPath((0.0, 0.1), (Pose2(2.0, 3.0), Pose2(4.0, 3.0)), start=6.0)
     drawer = Body("drawer", CRATE, Pose3(2.0, 3.0), path=path)
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0, 3.0, 0.4), 2.0), drawer, FAR_CART])
@@ -188,7 +188,7 @@ def test_object_falls_when_a_script_moves_its_support(simulate):
 
 
 def test_object_is_pushed_away_by_a_scripted_placement(simulate):
-    """A path that jumps: nothing comes along on the way there."""
+    """The path of the cart jumps to the crate."""
     path = MotionPath((0.0, 1.0, 1.0, 2.0), (Pose2(-6, 3), Pose2(-6, 3), Pose2(2.3, 3), Pose2(2.3, 3)), start=6.0)
     simulation = simulate(
         bodies=[Body("crate", CRATE, Pose3(2.0, 3.0), 2.0), Body("cart", CRATE, Pose3(-6, 3), path=path)]
@@ -197,8 +197,8 @@ def test_object_is_pushed_away_by_a_scripted_placement(simulate):
     assert simulation.object_pose("crate").x < 1.95
 
 
-def test_a_ball_rolls_through_where_a_cart_has_been(simulate):
-    """The engine has the cart where it is, not where it was when somebody last came near."""
+def test_ball_rolls_through_the_former_place_of_a_cart(simulate):
+    """The engine must have the current pose of the cart, not the one when an object last came near."""
     path = MotionPath((0.0, 4.0, 8.0, 9.0), (Pose2(3, 3), Pose2(3, 9), Pose2(3, 9), Pose2(3, 9)))
     ball = Body("ball", BALL, Pose3(1.0, 3.0), 1.0)
     simulation = simulate(bodies=[ball, Body("cart", CRATE, Pose3(3.0, 3.0), path=path)])

@@ -6,7 +6,7 @@ import pybullet
 import pytest
 import shapely
 import trimesh
-from playground import box, shipped
+from simulation_helpers import box, robot_spec
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
@@ -22,7 +22,7 @@ from simscen.sim.contact.static_distance import (
 from simscen.worlds.geometry.triangulation import merge_solids
 
 
-def test_distances_to_triangles_are_trimeshs():
+def test_distances_to_triangles_equal_those_of_trimesh():
     rng = np.random.default_rng(3)
     corners = rng.normal(size=(300, 3, 3))
     point = rng.normal(size=3)
@@ -30,12 +30,12 @@ def test_distances_to_triangles_are_trimeshs():
     assert point_to_triangles(point, corners) == pytest.approx(np.linalg.norm(closest - point, axis=1))
 
 
-def test_a_triangle_without_area_is_as_far_as_its_edges():
+def test_distance_to_a_triangle_without_area_is_that_to_its_edges():
     flat = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
     assert point_to_triangles(np.array([1.5, 2.0, 0.0]), flat) == pytest.approx([2.0])
 
 
-def test_no_point_moves_farther_than_the_bound_and_the_bound_is_not_idle():
+def test_max_displacement_is_a_tight_upper_bound():
     rng, extent = np.random.default_rng(5), 0.4
     points = rng.normal(size=(400, 3))
     points *= extent / np.linalg.norm(points, axis=1, keepdims=True)
@@ -44,58 +44,60 @@ def test_no_point_moves_farther_than_the_bound_and_the_bound_is_not_idle():
             before = Pose3.from_rpy(*rng.normal(size=3), *rng.uniform(-1, 1, 3))
             step = Pose3.from_rpy(*rng.normal(0.0, 0.1, 3), 0.0, turn, 0.0)
             after = before.compose(step)
-            said = Pose3(*after.position, *(flip * part for part in after.quaternion))
-            moved = np.linalg.norm(after.apply(points) - before.apply(points), axis=1)
-            assert moved.max() <= max_displacement(before, said, extent) + 1e-12
+            signed = Pose3(*after.position, *(flip * part for part in after.quaternion))
+            displacements = np.linalg.norm(after.apply(points) - before.apply(points), axis=1)
+            assert displacements.max() <= max_displacement(before, signed, extent) + 1e-12
             if flip > 0:
                 farthest = math.dist(before.position, after.position) + 2 * extent * math.sin(turn / 2)
-                assert max_displacement(before, said, extent) <= 1.5 * farthest
+                assert max_displacement(before, signed, extent) <= 1.5 * farthest
 
 
 @pytest.fixture
-def proximity():
+def static_distance():
     solids = [
         box("shelf", 0, 0, 2, 2),
         Solid(Cylinder(0.3, 1), Pose3(3, 0, 0.5), "post"),
         Solid(Extrusion(((0, 0), (2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2)), 1.0), Pose3(5, 5), "corner"),
         Solid(Box((20, 20, 0.1)), Pose3(z=-0.05), "floor"),
     ]
-    made = StaticDistance(merge_solids(solids), build_robot_body(shipped("turtlebot")), 2.0)
-    yield made
-    made.close()
+    distances = StaticDistance(merge_solids(solids), build_robot_body(robot_spec("turtlebot")), 2.0)
+    yield distances
+    distances.close()
 
 
-def test_the_owner_is_the_solid_whose_surface_is_nearest(proximity):
-    assert proximity.nearest_solid_name((1.01, 0.5, 0.2)) == "shelf"
-    assert proximity.nearest_solid_name((2.71, 0.0, 0.2)) == "post"
-    assert proximity.nearest_solid_name((50.0, 0.0, 0.2)) == ""
+def test_nearest_solid_name_is_that_of_the_nearest_surface(static_distance):
+    assert static_distance.nearest_solid_name((1.01, 0.5, 0.2)) == "shelf"
+    assert static_distance.nearest_solid_name((2.71, 0.0, 0.2)) == "post"
+    assert static_distance.nearest_solid_name((50.0, 0.0, 0.2)) == ""
 
 
-def test_distances_are_to_the_nearest_solid_but_the_floor(proximity):
-    assert proximity.distance(Pose3(1.9, 0.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
-    assert proximity.distance(Pose3(1.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
-    assert proximity.distance(Pose3(-9.0, -9.0)) == math.inf
+def test_distance_is_to_the_nearest_solid_except_the_floor(static_distance):
+    assert static_distance.distance(Pose3(1.9, 0.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+    assert static_distance.distance(Pose3(1.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert static_distance.distance(Pose3(-9.0, -9.0)) == math.inf
 
 
-def test_a_hollow_solid_is_hollow(proximity):
-    assert proximity.distance(Pose3(6.0, 6.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+def test_concave_solid_is_not_replaced_by_its_convex_hull(static_distance):
+    assert static_distance.distance(Pose3(6.0, 6.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
 
 
-def test_the_same_place_gives_the_same_distance_whatever_was_asked_before(proximity):
-    first = proximity.distance(Pose3(1.9, 0.3))
+def test_distance_does_not_depend_on_earlier_queries(static_distance):
+    first = static_distance.distance(Pose3(1.9, 0.3))
     for x in range(10):
-        proximity.distance(Pose3(x, x / 2))
-    assert proximity.distance(Pose3(1.9, 0.3)) == first
+        static_distance.distance(Pose3(x, x / 2))
+    assert static_distance.distance(Pose3(1.9, 0.3)) == first
 
 
 def drum_robot(radius, height):
-    """A robot that is nothing but an upright cylinder."""
+    """Return a robot whose hull is an upright cylinder."""
     return replace(
-        build_robot_body(shipped("turtlebot")), casters=(), hull=(Solid(Cylinder(radius, height), Pose3(z=height / 2)),)
+        build_robot_body(robot_spec("turtlebot")),
+        casters=(),
+        hull=(Solid(Cylinder(radius, height), Pose3(z=height / 2)),),
     )
 
 
-def test_distances_on_a_way_through_a_crowd_are_shapelys():
+def test_distances_along_a_path_among_many_solids_equal_those_of_shapely():
     rng = np.random.default_rng(11)
     corner = Extrusion(((0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 1), (0, 1)), 1.0)
     kinds = (Box((0.6, 0.4, 1.0)), Cylinder(0.3, 1.0), corner)
@@ -105,58 +107,58 @@ def test_distances_on_a_way_through_a_crowd_are_shapelys():
     plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
     poses = [Pose3(2.0, 2.0)]
     for turn in rng.normal(0.0, 0.15, 800).tolist():
-        onward = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
-        poses.append(onward if 0 < onward.x < 24 and 0 < onward.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
+        following = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
+        poses.append(following if 0 < following.x < 24 and 0 < following.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
     expected = plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
     expected[expected > 1.0] = math.inf
-    made = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
-    said = np.array([made.distance(pose) for pose in poses])
-    made.close()
+    distances = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
+    measured = np.array([distances.distance(pose) for pose in poses])
+    distances.close()
     outside = expected > 0
     assert outside.sum() > 500
     assert np.isinf(expected).sum() > 100
-    assert said[outside] == pytest.approx(expected[outside], abs=1e-4)
-    assert (said[~outside] <= 0).all()
+    assert measured[outside] == pytest.approx(expected[outside], abs=1e-4)
+    assert (measured[~outside] <= 0).all()
 
 
-def test_the_nearest_of_two_changes_with_each_step_between_them():
-    made = StaticDistance(
+def test_distance_is_correct_while_the_nearest_solid_alternates():
+    distances = StaticDistance(
         merge_solids([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0
     )
     for k in range(20):
         y = 0.05 * (-1) ** (k // 2)
-        assert made.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
-    made.close()
+        assert distances.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
+    distances.close()
 
 
-def test_a_reach_ends_where_it_ends():
-    made = StaticDistance(merge_solids([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
-    assert made.distance(Pose3(0.2995)) == math.inf
-    assert made.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
-    assert made.distance(Pose3(0.2995)) == math.inf
-    made.close()
+def test_distance_beyond_the_range_is_infinite():
+    distances = StaticDistance(merge_solids([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
+    assert distances.distance(Pose3(0.2995)) == math.inf
+    assert distances.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
+    assert distances.distance(Pose3(0.2995)) == math.inf
+    distances.close()
 
 
-def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from():
-    made = StaticDistance(
+def test_distance_of_a_tilted_robot_is_measured_from_its_top():
+    distances = StaticDistance(
         merge_solids([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0
     )
-    leans = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
-    assert made.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - leans, abs=1e-3)
-    made.close()
+    overhang = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
+    assert distances.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - overhang, abs=1e-3)
+    distances.close()
 
 
 def test_distant_solids_are_built_only_when_needed():
     rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
-    made = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
+    distances = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
     for k in range(200):
-        assert made.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
-    assert 20 <= len(made._shape_pairs) <= 44
-    made.close()
+        assert distances.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
+    assert 20 <= len(distances._shape_pairs) <= 44
+    distances.close()
 
 
 def wall_of_many_triangles(columns, rows):
-    """The plane x = 5 from y = -10 to 10, up to 2 m: every triangle with corners of its own."""
+    """Return the plane x = 5 from y = -10 to 10, up to 2 m, without vertices shared by triangles."""
     y, z = np.meshgrid(np.linspace(-10, 10, columns + 1), np.linspace(0, 2, rows + 1), indexing="ij")
     grid = np.stack((np.full_like(y, 5.0), y, z), axis=-1)
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
@@ -165,13 +167,15 @@ def wall_of_many_triangles(columns, rows):
 
 
 @pytest.mark.slow
-def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any():
+def test_distance_to_a_solid_with_more_triangles_than_bullet_supports():
     wall = wall_of_many_triangles(400, 60)
     assert len(wall.faces) == 48_000
-    made = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
+    distances = StaticDistance(
+        merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0
+    )
     for y in (-9.0, -3.3, 0.0, 9.5):
-        assert made.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    made.close()
+        assert distances.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    distances.close()
 
 
 def test_every_face_is_in_one_tile():
@@ -181,54 +185,58 @@ def test_every_face_is_in_one_tile():
     assert [len(tile) for tile in split_into_tiles(wall.vertices, wall.faces)] == [40_000, 8_000]
 
 
-def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
+def test_hull_of_more_points_than_bullet_supports_keeps_its_bounds():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
-    made = StaticDistance(merge_solids([]), build_robot_body(shipped("turtlebot")), 2.0)
-    shape = create_hull_of_solids(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
-    low, high = pybullet.getAABB(create_static_body(made._client, shape), physicsClientId=made._client)
+    distances = StaticDistance(merge_solids([]), build_robot_body(robot_spec("turtlebot")), 2.0)
+    shape = create_hull_of_solids(
+        distances._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")]
+    )
+    low, high = pybullet.getAABB(create_static_body(distances._client, shape), physicsClientId=distances._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
-    made.close()
+    distances.close()
 
 
-def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
+def test_only_the_part_of_a_large_solid_near_the_robot_is_built():
     wall = wall_of_many_triangles(400, 60)
-    made = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
-    assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    assert sum(len(made._parts.faces(part)) for part in made._shape_pairs) < 0.5 * len(wall.faces)
-    assert made.nearest_solid_name((5.0, 1.0, 0.5)) == "wall"
-    assert made.enclosing_solids((4.0, 0.0, 0.5)) == []
+    distances = StaticDistance(
+        merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0
+    )
+    assert distances.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    assert sum(len(distances._parts.faces(part)) for part in distances._shape_pairs) < 0.5 * len(wall.faces)
+    assert distances.nearest_solid_name((5.0, 1.0, 0.5)) == "wall"
+    assert distances.enclosing_solids((4.0, 0.0, 0.5)) == []
 
 
-def room_of_many_triangles():
-    """A closed box of 12 x 12 x 2 m from the origin, of some thousand triangles."""
+def block_of_many_triangles():
+    """Return a closed box of 12 x 12 x 2 m, centered on the origin, with some thousand triangles."""
     box = trimesh.creation.box((12.0, 12.0, 2.0)).subdivide().subdivide().subdivide().subdivide()
     return Mesh(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
 
 
-def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
-    made = StaticDistance(
-        merge_solids([Solid(room_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
-        build_robot_body(shipped("turtlebot")),
+def test_point_inside_a_solid_of_many_tiles_is_enclosed():
+    distances = StaticDistance(
+        merge_solids([Solid(block_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
+        build_robot_body(robot_spec("turtlebot")),
         2.0,
     )
-    assert [made.name(k) for k in made.enclosing_solids((1.0, 1.0, 0.5))] == ["block"]
-    assert [made.name(k) for k in made.enclosing_solids((20.0, 0.0, 0.5))] == ["shelf"]
-    assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
-    assert not made.is_convex(0)
-    assert made.is_convex(1)
+    assert [distances.name(k) for k in distances.enclosing_solids((1.0, 1.0, 0.5))] == ["block"]
+    assert [distances.name(k) for k in distances.enclosing_solids((20.0, 0.0, 0.5))] == ["shelf"]
+    assert distances.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert not distances.is_convex(0)
+    assert distances.is_convex(1)
 
 
-def test_a_line_through_a_place_tells_whether_a_surface_winds_around_it():
-    """Trimesh asks along rays of its own; where the line meets a corner or passes a hole it does not answer."""
+def test_enclosure_along_a_line_equals_that_of_trimesh():
+    """The result is None if the line meets a corner or passes through a hole."""
     rng = np.random.default_rng(8)
     block, ring = trimesh.creation.box((2.0, 2.0, 2.0)).subdivide(), trimesh.creation.annulus(0.5, 1.5, 3.0)
     both = trimesh.util.concatenate([block, ring.apply_translation((1.0, 0.4, 0.3))])
     places = rng.uniform(-2.5, 2.5, (300, 3))
     inside = block.contains(places) | ring.contains(places)
-    said = [encloses_along_line(both.triangles, tuple(place)) for place in places.tolist()]
+    found = [encloses_along_line(both.triangles, tuple(place)) for place in places.tolist()]
     assert 20 < inside.sum() < 280
-    assert said == inside.tolist()
+    assert found == inside.tolist()
     assert encloses_along_line(block.triangles, (1.0, 1.0, 1.0)) is None  # a corner
     lidless = block.triangles[block.triangles[:, :, 2].min(axis=1) < 0.99]
     assert encloses_along_line(lidless, (0.1, 0.2, 0.0)) is None

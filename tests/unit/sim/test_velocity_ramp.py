@@ -14,7 +14,7 @@ speeds = st.floats(-3, 3)
 
 
 @given(st.lists(st.builds(Twist, speeds, speeds, speeds), min_size=1, max_size=40))
-def test_no_command_makes_it_faster_or_harder_than_the_limits(commands):
+def test_velocity_and_acceleration_never_exceed_the_limits(commands):
     ramp, before = VelocityRamp(LIMITS, PERIOD, is_holonomic=False), STOP
     for command in commands:
         ramp.command(command)
@@ -34,7 +34,7 @@ def test_velocity_ramp_reaches_the_command_and_then_stops():
     assert ramp.velocity == Twist(0.25, 0.0, 0.0)
 
 
-def test_turning_round_brakes_to_a_stop_first():
+def test_reversing_brakes_to_a_stop_first():
     ramp = VelocityRamp(LIMITS, PERIOD, is_holonomic=False)
     ramp.command(Twist(0.1, 0.0, 0.0))
     ramp.advance()
@@ -45,7 +45,7 @@ def test_turning_round_brakes_to_a_stop_first():
     assert ramp.velocity.vx == pytest.approx(-0.1)
 
 
-def test_only_a_holonomic_base_goes_sideways():
+def test_holonomic_base_drives_sideways_within_the_limits():
     ramp = VelocityRamp(LIMITS, PERIOD, is_holonomic=True)
     ramp.command(Twist(0.0, 5.0, 0.0))
     for _ in range(20):

@@ -1,11 +1,11 @@
-"""Tests of walls that are added to the engine when something comes near."""
+"""Tests of walls that are added to the engine when a body comes near."""
 
 import math
 from itertools import product
 
 import pybullet
 import pytest
-from playground import box
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -21,45 +21,45 @@ WORLD = [box("near wall", 2.0, 0, 0.2, 6.0), box("far wall", -9.0, 0, 1.0, 6.0),
 CRATE = Body("crate", (box("crate", 0, 0, 1.0, 1.0, 0.2),), Pose3(-3.0), mass=5.0)
 
 
-def into_a_wall(simulation):
+def drive_into_a_wall(simulation):
     simulation.drive(Twist(0.5, 0.0, 0.0))
 
 
-def pushed_into_a_wall_far_away(simulation):
+def push_crate_into_a_distant_wall(simulation):
     simulation.push_object("crate", (-50.0, 0.0))
 
 
-def set_down_beside_a_post(simulation):
+def place_beside_a_post(simulation):
     simulation.robot.place(Pose2(30.0, 29.5, 1.5))
     simulation.drive(Twist(0.4, 0.0, 0.0))
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("happens", [into_a_wall, pushed_into_a_wall_far_away, set_down_beside_a_post])
-def test_a_large_world_is_that_in_which_all_walls_stand_from_the_start(simulate, monkeypatch, happens):
-    """To the last bit until something touches a wall; from then on the engine solves contacts in another order."""
-    courses = []
-    for few in (10**9, 0):
-        monkeypatch.setattr(walls, "SMALL_WORLD_FACES", few)
+@pytest.mark.parametrize("action", [drive_into_a_wall, push_crate_into_a_distant_wall, place_beside_a_post])
+def test_run_with_walls_added_later_equals_one_with_all_walls_from_the_start(simulate, monkeypatch, action):
+    """Equal to the last bit until a body touches a wall; then the engine solves contacts in another order."""
+    runs = []
+    for max_faces in (10**9, 0):
+        monkeypatch.setattr(walls, "SMALL_WORLD_FACES", max_faces)
         simulation = simulate(solids=WORLD, bodies=[CRATE])
-        happens(simulation)
-        course = []
+        action(simulation)
+        samples = []
         for _ in range(160):
             simulation.step(6)
-            course.append((simulation.truth().pose, simulation.object_pose("crate"), simulation.robot.collisions()))
-        courses.append(course)
-    at_once, near = courses
-    touched = next((k for k, (_, crate, events) in enumerate(at_once) if events or crate.x < -7.8), None)
+            samples.append((simulation.truth().pose, simulation.object_pose("crate"), simulation.robot.collisions()))
+        runs.append(samples)
+    all_walls, near_walls = runs
+    touched = next((k for k, (_, crate, events) in enumerate(all_walls) if events or crate.x < -7.8), None)
     assert touched is not None
-    assert near[: touched - 1] == at_once[: touched - 1]
-    assert [(event.tick, event.name) for event in near[touched][2]] == [
-        (event.tick, event.name) for event in at_once[touched][2]
+    assert near_walls[: touched - 1] == all_walls[: touched - 1]
+    assert [(event.tick, event.name) for event in near_walls[touched][2]] == [
+        (event.tick, event.name) for event in all_walls[touched][2]
     ]
-    assert near[-1][0].y == pytest.approx(at_once[-1][0].y, abs=0.01)
-    assert near[-1][1].x == pytest.approx(at_once[-1][1].x, abs=0.01)
+    assert near_walls[-1][0].y == pytest.approx(all_walls[-1][0].y, abs=0.01)
+    assert near_walls[-1][1].x == pytest.approx(all_walls[-1][1].x, abs=0.01)
 
 
-def test_walls_that_nothing_comes_near_are_not_put_up(simulate, monkeypatch):
+def test_walls_without_bodies_near_them_are_not_added_to_the_engine(simulate, monkeypatch):
     monkeypatch.setattr(walls, "SMALL_WORLD_FACES", 0)
     simulation = simulate(solids=WORLD, pose=Pose2(0.0, 4.0, math.pi))
     simulation.drive(Twist(0.5, 0.0, 0.0))

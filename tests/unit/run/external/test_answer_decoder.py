@@ -49,7 +49,7 @@ def test_there_is_an_example_of_each_topic() -> None:
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("name", EXAMPLES)
 @given(data=st.data())
-def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
+def test_corrupted_bytes_are_refused_or_decoded(name: str, data) -> None:
     sound = bytearray(EXAMPLES[name])
     for _ in range(data.draw(st.integers(0, 3))):
         sound[data.draw(st.integers(0, len(sound) - 1))] = data.draw(st.integers(0, 255))
@@ -77,7 +77,7 @@ def test_without_a_transform_the_correction_follows_from_the_filtered_odometry()
 
 
 @pytest.mark.parametrize("rows", [[241, *[0.5] * 18], [-1, *[0.5] * 18], [240, float("nan"), *[0.5] * 17], [240, 1]])
-def test_filtered_odometry_that_is_none_is_refused(rows: list[float]) -> None:
+def test_invalid_filtered_odometry_is_refused(rows: list[float]) -> None:
     with pytest.raises(ProtocolViolation):
         understand(**{"/odometry/filtered/exact": messages.float64_array(rows)})
 
@@ -98,7 +98,7 @@ def test_costmap_is_recorded_unchanged() -> None:
         ("map", 0.05, 2, (float("nan"), 0, 0)),
     ],
 )
-def test_a_costmap_that_is_none_is_refused(frame: str, resolution: float, width: int, origin) -> None:
+def test_an_invalid_costmap_is_refused(frame: str, resolution: float, width: int, origin) -> None:
     said = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
     with pytest.raises(ProtocolViolation, match="local costmap"):
         understand(**{"/local_costmap/costmap": said})
@@ -132,7 +132,7 @@ def test_any_event_is_accepted_or_refused_and_can_be_logged(said) -> None:
 
 
 @given(st.dictionaries(st.sampled_from(["protocol", "name", "version", "topics", "step", "about"]), json_values))
-def test_any_welcome_is_taken_or_refused_and_can_be_logged(told) -> None:
+def test_any_welcome_is_accepted_or_refused_and_can_be_logged(told) -> None:
     told.setdefault("protocol", 1)
     with suppress(ProtocolViolation, wire.Malformed):
         welcome = Welcome.parse(wire.WELCOME, json.dumps(told).encode(), TopicTable.build([]))
@@ -140,7 +140,7 @@ def test_any_welcome_is_taken_or_refused_and_can_be_logged(told) -> None:
 
 
 @given(st.binary(max_size=80))
-def test_any_answer_is_read_or_malformed(body: bytes) -> None:
+def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
     with suppress(wire.Malformed):
         wire.from_answer(body)
     with suppress(wire.Malformed):
@@ -160,13 +160,13 @@ def test_any_answer_is_read_or_malformed(body: bytes) -> None:
         '{"kind": "plan.made", "data": {"x": "' + 5000 * "x" + '"}}',
     ],
 )
-def test_an_event_that_no_log_takes_is_refused(said: str) -> None:
+def test_an_event_that_cannot_be_logged_is_refused(said: str) -> None:
     with pytest.raises(ProtocolViolation):
         for event in understand(**{"/simscen/events": messages.string(said)}).events:
             GoalTracker(True, 240).process(240, event)
 
 
 @pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
-def test_a_welcome_that_no_log_takes_is_refused(told: str) -> None:
+def test_a_welcome_that_cannot_be_logged_is_refused(told: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
         Welcome.parse(wire.WELCOME, told.encode(), TopicTable.build([]))

@@ -38,13 +38,13 @@ def failed(play, text: str, **limits: float) -> RunError:
         (ONE + "peer._connection.close(); time.sleep(60)", "closed its socket, but still runs"),
     ],
 )
-def test_a_process_that_is_gone_has_crashed(play, text: str, says: str) -> None:
+def test_a_stack_whose_process_ended_has_crashed(play, text: str, says: str) -> None:
     error = failed(play, text)
     assert error.kind == "stack-crashed"
     assert says in str(error)
 
 
-def test_a_crash_shows_the_end_of_what_was_printed(play, tmp_path: Path) -> None:
+def test_a_crash_shows_the_end_of_the_output(play, tmp_path: Path) -> None:
     error = failed(play, ONE + "print('on the way', flush=True)\nraise KeyError('no scan')")
     assert error.tail.splitlines()[0] == "on the way"
     assert error.tail.splitlines()[-1] == "KeyError: 'no scan'"
@@ -59,7 +59,7 @@ def test_a_crash_shows_the_end_of_what_was_printed(play, tmp_path: Path) -> None
         (RAW + "os.kill(os.getpid(), signal.SIGSTOP)", "no answer to HELLO within 0.2 s"),
     ],
 )
-def test_a_stack_that_never_says_hello_is_not_waited_for(play, text: str, says: str) -> None:
+def test_a_stack_without_welcome_is_a_timeout(play, text: str, says: str) -> None:
     error = failed(play, text, start_limit=0.2)
     assert error.kind == "stack-timeout"
     assert says in str(error)
@@ -76,7 +76,7 @@ def test_a_stack_that_never_says_hello_is_not_waited_for(play, text: str, says: 
         ONE + "while True: print('x' * 60000)",
     ],
 )
-def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
+def test_a_stack_without_answer_is_a_timeout(play, text: str) -> None:
     error = failed(play, text, answer_limit=0.2)
     assert error.kind == "stack-timeout"
     assert "no answer to the step of t = 0.000 s (tick 0) within 0.2 s" in str(error)
@@ -160,12 +160,12 @@ def test_protocol_violations_are_reported(play, text: str, says: str) -> None:
     assert says in str(error)
 
 
-def test_a_stack_that_cannot_go_on_says_why(play) -> None:
+def test_a_stack_that_gives_up_before_the_first_step_gives_its_reason(play) -> None:
     error = failed(play, HELLO + "peer.give_up('no map server is active')")
     assert (error.kind, str(error)) == ("stack-failed", "stack mine: no map server is active")
 
 
-def test_a_stack_that_gives_up_on_its_way_says_why(play) -> None:
+def test_a_stack_that_gives_up_during_the_run_gives_its_reason(play) -> None:
     error = failed(play, ONE + "peer.give_up('the battery is empty')")
     assert (error.kind, str(error)) == ("stack-failed", "stack mine: the battery is empty")
 
@@ -184,7 +184,7 @@ def test_a_program_that_cannot_be_started_is_reported(load, argv: tuple[str, ...
     assert told.value.kind == "stack-crashed"
 
 
-def test_nothing_is_left_of_a_stack_and_what_it_started(play, tmp_path: Path) -> None:
+def test_all_processes_of_a_stack_are_killed_after_the_run(play, tmp_path: Path) -> None:
     """Its children leave session, group and standard streams behind, and ignore SIGTERM."""
     escape = (
         "def escape(name):\n"

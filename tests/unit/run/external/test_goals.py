@@ -19,7 +19,7 @@ def told(run) -> list[tuple[str, str]]:
     ]
 
 
-def test_a_stack_that_drives_to_its_goal_and_says_so_passes(play) -> None:
+def test_a_stack_that_reaches_and_reports_its_goal_passes(play) -> None:
     run = play(HELLO + DRIVE)
     assert run.result.outcome is Outcome.PASSED
     assert told(run) == [("goal.accepted", "desk"), ("goal.reached", "desk"), ("navigation.ended", "SUCCEEDED")]
@@ -28,7 +28,7 @@ def test_a_stack_that_drives_to_its_goal_and_says_so_passes(play) -> None:
     assert accepted.data == {"x": 2.0, "y": 1.0, "yaw": 0.0, "index": 0}
 
 
-def test_a_stack_that_says_reached_where_it_is_not_fails(play) -> None:
+def test_a_stack_that_falsely_reports_its_goal_as_reached_fails(play) -> None:
     run = play(HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n" + STAND)
     assert told(run)[-1] == ("navigation.ended", "SUCCEEDED")
     assert run.result.outcome is Outcome.FAILED
@@ -39,7 +39,7 @@ def test_a_stack_that_says_reached_where_it_is_not_fails(play) -> None:
     assert run.result.outcome is Outcome.FAILED
 
 
-def test_a_stack_that_is_there_and_says_nothing_has_not_reached_its_goal(play) -> None:
+def test_a_goal_that_the_stack_does_not_report_is_not_reached(play) -> None:
     silent = DRIVE.replace("peer.goals.accept()", "True").replace("peer.goals.reached()", "pass")
     run = play(HELLO + silent)
     assert told(run) == []
@@ -69,7 +69,7 @@ def test_a_failure_has_one_of_nav2s_codes(play, said: str, name: str, number: in
     assert (ended.name, ended.data["error_code"]) == ("FAILED", number)
 
 
-def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_says(play) -> None:
+def test_on_goal_failure_determines_whether_the_other_goals_follow(play) -> None:
     text = HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.failed(208, go_on={})\n" + STAND
     assert told(play(text.format(False), goals=THREE))[-1] == ("navigation.ended", "FAILED")
     assert len(told(play(text.format(False), goals=THREE))) == 3
@@ -105,7 +105,7 @@ def test_a_stack_cannot_claim_that_a_goal_was_preempted(play) -> None:
     assert run.result.outcome is Outcome.FAILED
 
 
-def test_a_goal_that_an_event_sends_goes_first_and_those_that_wait_follow(play) -> None:
+def test_a_goal_sent_by_an_event_precedes_the_waiting_goals(play) -> None:
     events = "[{when: {time: 0.5}, do: {new_goal: {name: detour, pose: {x: 1, y: 2}}}}]"
     accept = (
         "for step in peer:\n    goal = peer.goals.accept()\n    if goal and step.seconds > 1: peer.goals.reached()\n"
@@ -130,7 +130,7 @@ def test_cancel_is_reported_at_once(play) -> None:
     assert run.trace.events[-2].tick == 120 or run.trace.events[-3].tick == 120
 
 
-def test_the_time_of_a_goal_is_kept_even_if_the_stack_does_not(play) -> None:
+def test_the_timeout_of_a_goal_is_enforced_if_the_stack_ignores_it(play) -> None:
     goals = "[{name: a, pose: {x: 2, y: 1}, timeout: 0.5}, {name: b, pose: {x: 3, y: 1}}]"
     text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + STAND
     run = play(text, goals=goals)
@@ -141,7 +141,7 @@ def test_the_time_of_a_goal_is_kept_even_if_the_stack_does_not(play) -> None:
     assert told(run) == [("goal.accepted", "a"), ("goal.failed", "a"), ("goal.accepted", "b")]
 
 
-def test_replans_and_recoveries_that_a_stack_tells_of_are_counted(play) -> None:
+def test_replans_and_recoveries_that_a_stack_reports_are_counted(play) -> None:
     said = (
         "    if step.tick == 12:\n"
         "        peer.goals.report('plan.made', 'desk', reason='blocked', length=1.5)\n"
@@ -168,7 +168,7 @@ def test_log_contains_name_and_version_of_the_stack(play, tmp_path) -> None:
     }
 
 
-def test_lines_of_the_stack_are_in_rosout(play, tmp_path) -> None:
+def test_log_lines_of_the_stack_are_in_rosout(play, tmp_path) -> None:
     from mcap.reader import make_reader
 
     play(HELLO + "for step in peer:\n    if step.tick == 24: step.log('a wall', 30)\n" + STAND, time_limit="0.3")

@@ -26,14 +26,14 @@ def kinds(run) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
-def test_unsupported_mode_differs_from_a_failure(play, mode: str) -> None:
+def test_an_unsupported_mode_is_a_protocol_error(play, mode: str) -> None:
     with pytest.raises(RunError) as error:
         play(OLD + DRIVE, navigation=f"{{mode: {mode}}}")
     assert error.value.kind == "stack-protocol"
     assert f"sends goals by {mode}, which this stack does not support; it supports navigate_to_pose" in str(error.value)
 
 
-def test_a_stack_that_says_nothing_of_modes_takes_goals_one_after_the_other(play) -> None:
+def test_a_stack_without_modes_gets_goals_one_after_the_other(play) -> None:
     older = "import json\n" + OLD.replace("Peer(", "Older(").replace(
         "peer =",
         "class Older(Peer):\n"
@@ -64,7 +64,7 @@ def test_via_goals_are_passed_in_each_loop(play) -> None:
     assert wrong == {"goal a", "goal b", "goal a#2", "goal b#2"}
 
 
-def test_a_drive_fails_as_a_whole_and_the_next_loop_follows(play) -> None:
+def test_a_failure_ends_all_goals_of_a_loop_and_the_next_loop_follows(play) -> None:
     text = (
         "for step in peer:\n    if peer.goals.accept(): peer.goals.failed(308, go_on=True)\n    step.drive(0.0, 0.0)\n"
     )
@@ -77,7 +77,7 @@ def test_a_drive_fails_as_a_whole_and_the_next_loop_follows(play) -> None:
     assert failed.data["error_name"] == "NO_VALID_PATH"
 
 
-def test_a_wait_is_kept_by_the_peer_and_by_the_engine(play) -> None:
+def test_peer_and_engine_wait_after_a_goal_for_its_wait_time(play) -> None:
     goals = (
         "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 1, y: 1}, on_reached: {wait: 1}}]"
     )
@@ -108,7 +108,7 @@ def test_impossible_event_is_an_error(play, said, says: str) -> None:
     assert error.value.kind == "stack-protocol"
 
 
-def test_another_goal_ends_the_drive_for_all_its_poses(play) -> None:
+def test_a_new_goal_cancels_all_poses_of_the_current_loop(play) -> None:
     events = "[{when: {time: 0.5}, do: {new_goal: {name: detour, pose: {x: 1, y: 2}}}}]"
     accept = "for step in peer:\n    goal = peer.goals.accept()\n"
     text = accept + "    if goal and step.seconds > 1: peer.goals.reached()\n    step.drive(0.0, 0.0)\n"

@@ -54,7 +54,7 @@ def log_of(answer) -> bytes:
 
 
 @pytest.mark.slow
-def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbors_log_stays_the_same(session) -> None:
+def test_a_faulty_stack_does_not_change_the_log_of_another_run(session) -> None:
     answers = session("out", BROKEN)
     alone = session("alone", {"fine": GOOD})["fine"]
     assert {name: answer.result.error.kind for name, answer in answers.items() if answer.result.error} == KINDS
@@ -72,7 +72,7 @@ def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbors_log_stays_th
     assert 100_000 < printed.stat().st_size < 2_000_000
 
 
-def test_a_stack_has_the_limits_of_the_caller_and_not_those_of_the_engines_worker(session) -> None:
+def test_a_stack_has_the_resource_limits_of_the_caller_not_of_the_worker(session) -> None:
     show = (
         "import resource\nfor what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE): print(*resource.getrlimit(what))\n"
     )
@@ -108,7 +108,7 @@ def processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
 LINGERS = "if os.fork() == 0:\n    os.setsid()\n    while True: time.sleep(60)\n"
 
 
-def test_a_worker_that_is_killed_takes_its_stack_and_what_that_started_along(session, processes) -> None:
+def test_killing_a_worker_ends_its_stack_and_the_processes_that_it_started(session, processes) -> None:
     kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
     # The keeper is the parent of a stack, the worker the parent of the keeper.
     answers = session("out", {"worker": LINGERS + HELLO + "next(iter(peer))\n" + kill + "time.sleep(60)", "fine": GOOD})
@@ -117,7 +117,7 @@ def test_a_worker_that_is_killed_takes_its_stack_and_what_that_started_along(ses
     assert not processes()
 
 
-def test_a_supervisor_that_is_killed_takes_every_stack_along(load, processes, tmp_path: Path) -> None:
+def test_killing_the_supervisor_ends_every_stack(load, processes, tmp_path: Path) -> None:
     loaded = load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
     pid = os.fork()
     if pid == 0:
@@ -137,7 +137,7 @@ def _until(done) -> None:
         time.sleep(0.01)
 
 
-def test_an_interrupted_session_leaves_no_stack_behind(load, processes, tmp_path: Path) -> None:
+def test_interrupting_a_session_ends_every_stack(load, processes, tmp_path: Path) -> None:
     from simscen.run.process.supervisor import Interrupted
 
     loaded = load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)

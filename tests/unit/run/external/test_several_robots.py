@@ -83,7 +83,7 @@ def test_each_stack_gets_its_robot_name_and_has_its_own_output(fleet, tmp_path: 
         ("peer.give_up('no map')", "stack-failed", "stack mine of robot `right`: no map"),
     ],
 )
-def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_path, does, kind, told) -> None:
+def test_an_error_names_the_robot_and_ends_all_stacks(fleet, tmp_path, does, kind, told) -> None:
     steps = "for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': "
     with pytest.raises(RunError) as raised:
         simulate(fleet(HELLO + steps + does, answer_limit=2.0), stack_log=tmp_path / "stack.log")
@@ -115,7 +115,7 @@ def test_both_stacks_get_end_before_waiting(fleet, tmp_path: Path) -> None:
     assert [(tmp_path / f"stack.{name}.log").read_text().split()[-1] for name in ("left", "right")] == ["met", "met"]
 
 
-def test_a_worker_that_is_killed_takes_the_stacks_of_all_robots_along(load_fleet, tmp_path: Path) -> None:
+def test_killing_a_worker_ends_the_stacks_of_all_robots(load_fleet, tmp_path: Path) -> None:
     """The keeper is the parent of a stack, the worker the parent of the keeper."""
     kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
     told = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
@@ -133,7 +133,7 @@ def assert_gone(folder: Path) -> None:
         assert not Path(f"/proc/{(folder / f'pid.{name}').read_text()}").exists(), name
 
 
-def test_a_robot_of_its_own_has_no_name(load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_single_robot_has_no_name(load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the environment of simscen itself says."""
     monkeypatch.setenv("SIMSCEN_ROBOT", "somebody")
     told = "print(repr(peer.robot_name), 'SIMSCEN_ROBOT' in os.environ)\n"

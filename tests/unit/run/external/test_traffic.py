@@ -37,7 +37,7 @@ def test_big_answers_and_big_frames_do_not_block_each_other(play) -> None:
 
 
 @pytest.mark.parametrize(("every", "ticks"), [("True", {6, 12, 18, 24}), ("False", {12, 24})])
-def test_a_stack_is_asked_for_each_command_or_whenever_a_sensor_speaks(play, tmp_path: Path, every, ticks) -> None:
+def test_steps_are_sent_for_each_command_or_for_each_reading(play, tmp_path: Path, every, ticks) -> None:
     ask = f'peer = Peer("mine", topics=["/odom"], every_beat={every})\n'
     text = "for step in peer:\n    print(step.tick, step.command_due, len(step.messages))\n    step.drive(0.0, 0.0)\n"
     play(ask + text, time_limit="0.1")
@@ -93,7 +93,7 @@ def test_a_command_holds_until_the_next_one(play) -> None:
     assert {tuple(row) for row in run.trace.command.values} == {(0.2, 0.0, 0.0)}
 
 
-def test_an_empty_plan_says_that_none_is_followed(play) -> None:
+def test_an_empty_plan_clears_the_current_plan(play) -> None:
     """An object that is to appear on the plan finds none."""
     events = "[{when: {time: 0.5}, do: {spawn: {name: box, box: [0.1, 0.1, 0.1], on_plan: 0.5}}, required: false}]"
     text = HELLO + (
@@ -129,7 +129,7 @@ def test_stack_with_ground_truth_corrects_wheel_odometry(play, tmp_path: Path) -
     assert corrections[-1][:2] == pytest.approx((1, 1), abs=0.05)  # where the wheels began to count
 
 
-def test_a_plan_that_comes_with_the_end_of_a_goal_is_for_the_next(play) -> None:
+def test_a_plan_sent_with_the_end_of_a_goal_belongs_to_the_next_goal(play) -> None:
     events = "[{when: {time: 0.5}, do: {spawn: {name: box, box: [0.1, 0.1, 0.1], on_plan: 0.5}}, required: false}]"
     text = HELLO + (
         "for step in peer:\n"

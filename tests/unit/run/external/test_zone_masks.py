@@ -43,7 +43,7 @@ def drawn(around: Surroundings, zones: Zones, later: Zones = NO_ZONES) -> dict[s
     return {topic.name: grid.cells.tolist() for topic, grid in ZoneMasks(around, later).changed_masks(zones)}
 
 
-def test_zone_that_an_event_begins_is_sent_again(play, tmp_path: Path) -> None:
+def test_mask_is_sent_again_when_an_event_enables_a_zone(play, tmp_path: Path) -> None:
     events = "[{name: x, when: {time: 0.5}, do: {keepout: {region: far}}}]"
     topics = ["/keepout_zones"]
     stack = "{external: mine, keepout: [near]}"
@@ -54,7 +54,7 @@ def test_zone_that_an_event_begins_is_sent_again(play, tmp_path: Path) -> None:
     assert [event.name for event in run.trace.of_kind(EventKind.ZONE_SWITCHED)] == ["far"]
 
 
-def test_speed_limits_that_begin_and_end(play, tmp_path: Path) -> None:
+def test_speed_mask_is_sent_again_when_events_switch_its_zones(play, tmp_path: Path) -> None:
     events = (
         "[{name: x, when: {time: 0.2}, do: {speed_zone: {region: far, speed_limit: 0.1}}}, "
         "{name: y, when: {time: 0.4}, do: {speed_zone: {region: near, enabled: false}}}]"

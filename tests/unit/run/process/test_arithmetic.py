@@ -48,7 +48,7 @@ def test_a_worker_has_the_fingerprint_of_its_caller(chosen: dict[str, str]) -> N
     assert caller == worker != ""
 
 
-def test_the_choice_of_a_user_changes_the_fingerprint() -> None:
+def test_kernel_variables_of_the_user_change_the_fingerprint() -> None:
     assert printed(PINNED, {**NONE_CHOSEN, **CHOSEN}) != printed(PINNED, NONE_CHOSEN)
 
 

@@ -65,7 +65,7 @@ def log_of(job: Job, folder: Path) -> bytes:
     return (folder / "run.mcap").read_bytes()
 
 
-def test_files_of_the_same_content_are_used_where_they_are(job: Job, tmp_path: Path) -> None:
+def test_existing_files_with_the_same_content_are_not_copied(job: Job, tmp_path: Path) -> None:
     unpacker = Unpacker(tmp_path / "there", receive)
     unpacked = unpacker.unpack(pack(job, send), tmp_path / "run")
     assert unpacked.scenario == job.scenario
@@ -74,7 +74,9 @@ def test_files_of_the_same_content_are_used_where_they_are(job: Job, tmp_path: P
 
 
 @pytest.mark.parametrize("change", ["removed", "changed"])
-def test_a_machine_without_the_files_gets_them_and_runs_to_the_same_log(job: Job, tmp_path: Path, change: str) -> None:
+def test_a_machine_without_the_files_receives_them_and_writes_the_same_log(
+    job: Job, tmp_path: Path, change: str
+) -> None:
     packed, expected = pack(job, send), log_of(job, tmp_path / "log")
     home = tmp_path / "here"
     if change == "removed":
@@ -88,7 +90,7 @@ def test_a_machine_without_the_files_gets_them_and_runs_to_the_same_log(job: Job
     assert log_of(unpacked, tmp_path / "again") == expected
 
 
-def test_files_of_the_package_are_found_in_the_package_of_each_machine(job: Job, tmp_path: Path) -> None:
+def test_files_of_simscen_are_read_from_the_package_on_each_machine(job: Job, tmp_path: Path) -> None:
     packed = pack(job, send)
     assert job.scenario.robot.path.is_relative_to(PACKAGE_FOLDER)
     assert not any(Path(path).is_relative_to(PACKAGE_FOLDER) for path in packed.files)
@@ -96,7 +98,7 @@ def test_files_of_the_package_are_found_in_the_package_of_each_machine(job: Job,
     assert unpacked.scenario.robot.path == job.scenario.robot.path
 
 
-def test_a_queue_gives_each_job_to_one_runner_and_remembers_to_which() -> None:
+def test_a_queue_gives_each_job_to_one_runner_and_records_which() -> None:
     queue = JobQueue()
     jobs = [PackedJob(number, b"", {}) for number in range(3)]
     for job in jobs:

@@ -74,7 +74,7 @@ def test_successful_run_returns_its_result(session):
         ("prepare-memory", "out-of-memory", "exceeded its memory limit"),
     ],
 )
-def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbors_alone(session, fault, kind, told):
+def test_a_faulty_run_is_an_error_with_its_cause_and_the_other_run_passes(session, fault, kind, told):
     answers, _ = session(fault, "fine", workers=2)
     assert answers[fault].outcome is Outcome.ERROR
     assert answers[fault].result.error.kind == kind
@@ -93,7 +93,7 @@ def daemons():
     return found
 
 
-def test_the_log_of_a_crashed_worker_shows_where_it_was(session):
+def test_the_log_of_a_crashed_worker_shows_where_it_crashed(session):
     answers, _ = session("segfault")
     assert "faulty_fork_server.py" in answers["segfault"].result.error.tail
 
@@ -104,7 +104,7 @@ def test_a_run_beyond_its_wall_limit_is_killed_and_reported(session, fault):
     assert answers[fault].result.error.kind == "timeout"
 
 
-def test_of_a_flood_the_log_keeps_the_beginning_and_the_end(session, tmp_path, capfd):
+def test_the_worker_log_keeps_start_and_end_of_a_long_output(session, tmp_path, capfd):
     answers, _ = session("flood")
     assert answers["flood"].outcome is Outcome.PASSED
     (log,) = tmp_path.rglob("worker.log")
@@ -116,13 +116,13 @@ def test_of_a_flood_the_log_keeps_the_beginning_and_the_end(session, tmp_path, c
     assert capfd.readouterr().out == ""
 
 
-def test_when_the_fork_server_dies_its_runs_are_errors_and_the_rest_still_runs(session):
+def test_remaining_runs_pass_after_a_run_kills_the_fork_server(session):
     answers, _ = session("kill-parent", "fine")
     assert answers["kill-parent"].result.error.kind == "crashed"
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-def test_a_neighbor_of_a_run_that_kills_the_fork_server_runs_again_by_itself(session):
+def test_concurrent_runs_are_repeated_after_a_run_kills_the_fork_server(session):
     answers, _ = session("kill-parent", "long", "fine", workers=2)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["long", "fine"]
     assert answers["kill-parent"].result.error.kind == "crashed"
@@ -162,7 +162,7 @@ def test_a_fork_server_that_cannot_start_is_an_error_of_every_run_with_its_reaso
     assert all("No module named 'no_such_module'" in answer.result.error.tail for answer in answers.values())
 
 
-def test_stray_bytes_on_the_pipes_are_no_message(session):
+def test_stray_bytes_on_the_pipes_are_ignored(session):
     answers, _ = session("stray-bytes", "fine", workers=2)
     assert answers["stray-bytes"].outcome is Outcome.PASSED
     assert answers["fine"].outcome is Outcome.PASSED
@@ -175,13 +175,13 @@ def test_output_during_preparation_is_in_the_worker_log(session, tmp_path):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
-def test_a_folder_that_cannot_be_written_is_an_error_that_says_so(session, tmp_path):
+def test_an_output_folder_that_cannot_be_written_is_an_error_with_the_reason(session, tmp_path):
     (tmp_path / "out").mkdir(mode=0o500)
     answers, _ = session("fine")
     assert "Permission denied" in answers["fine"].result.error.message
 
 
-def test_a_folder_that_cannot_be_made_is_an_error_that_says_so(session, tmp_path):
+def test_an_output_folder_that_cannot_be_created_is_an_error_with_the_reason(session, tmp_path):
     (tmp_path / "out").write_text("")
     answers, _ = session("fine")
     assert (answers["fine"].result.error.kind, "Not a directory writing" in answers["fine"].result.error.message) == (
@@ -190,17 +190,17 @@ def test_a_folder_that_cannot_be_made_is_an_error_that_says_so(session, tmp_path
     )
 
 
-def test_five_crashes_of_five_are_five_errors(session):
+def test_each_crashed_run_is_an_error(session):
     answers, _ = session("segfault", "kill", "exit-0", "exception", "sys-exit", workers=2)
     assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 5
 
 
-def test_fail_fast_answers_the_rest_as_not_run(session):
+def test_fail_fast_reports_the_remaining_runs_as_not_run(session):
     answers, _ = session("exception", "fine", fail_fast=True)
     assert answers["fine"].result.error.kind == "not-run"
 
 
-def test_an_interrupted_session_answers_every_run(session):
+def test_an_interrupted_session_has_a_result_for_every_run(session):
     def interrupt(number, _):
         raise Interrupted(number)
 

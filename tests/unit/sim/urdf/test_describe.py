@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from playground import shipped
+from simulation_helpers import robot_spec
 
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.body.outline import hull_points
@@ -10,8 +10,8 @@ from simscen.sim.urdf.writer import to_urdf
 
 
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
-def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
-    spec = shipped(name)
+def test_robot_read_back_from_its_urdf_is_the_same(tmp_path, name):
+    spec = robot_spec(name)
     body = build_robot_body(spec)
     (tmp_path / "robot.urdf").write_text(to_urdf(body))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
@@ -22,13 +22,13 @@ def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
     ]
     assert again.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
     assert again.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
-    for ours, theirs in zip(body.hull, again.hull, strict=False):
-        there = theirs.pose.apply(hull_points(theirs.shape))
-        assert ours.pose.apply(hull_points(ours.shape)) == pytest.approx(there, abs=1e-6)
+    for original, read_back in zip(body.hull, again.hull, strict=False):
+        there = read_back.pose.apply(hull_points(read_back.shape))
+        assert original.pose.apply(hull_points(original.shape)) == pytest.approx(there, abs=1e-6)
 
 
-def test_an_omnidirectional_urdf_stands_on_its_lowest_point_and_goes_sideways(tmp_path, simulate):
-    spec = shipped("omni")
+def test_omnidirectional_robot_from_urdf_touches_the_ground_and_drives_sideways(tmp_path, simulate):
+    spec = robot_spec("omni")
     (tmp_path / "robot.urdf").write_text(to_urdf(build_robot_body(spec)))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
     body = build_robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 import trimesh
-from playground import shipped
+from simulation_helpers import robot_spec
 
 from simscen.core.errors import InvalidInput
 from simscen.loading.builders import read_mesh
@@ -24,8 +24,8 @@ def infer(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
-def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
-    spec = shipped(name)
+def test_drive_of_a_shipped_robot_is_inferred_from_its_urdf(infer, name):
+    spec = robot_spec(name)
     found = infer(to_urdf(build_robot_body(spec)))
     assert found.drive.type == spec.drive.type
     assert found.drive.wheel_radius == pytest.approx(spec.drive.wheel_radius)
@@ -33,8 +33,8 @@ def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
     assert sorted(found.sensors) == ["imu", "lidar", "odom"]
 
 
-def test_the_lidar_sits_on_its_link_or_on_top(infer):
-    text = to_urdf(build_robot_body(shipped("amr")))
+def test_lidar_is_mounted_at_its_link_or_on_top(infer):
+    text = to_urdf(build_robot_body(robot_spec("amr")))
     assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.38 + 0.02)
     link = (
         '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
@@ -46,25 +46,25 @@ def test_the_lidar_sits_on_its_link_or_on_top(infer):
 
 @pytest.mark.parametrize(("rpy", "roll"), [("3.14159 0 0.5", math.pi), ("0 0 0.5", 0.0), ("0 0.2 0.5", 0.0)])
 def test_lidar_is_upside_down_if_its_link_is(infer, rpy, roll):
-    """Other tilts are not taken over, since the frame of a link need not be that of the scan."""
+    """Other tilts are ignored, since the frame of a link need not be that of the scan."""
     link = (
         '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
         f'<origin xyz="0.3 0.1 0.25" rpy="{rpy}"/></joint></robot>'
     )
-    mount = infer(to_urdf(build_robot_body(shipped("amr"))).replace("</robot>", link)).sensors["lidar"].lidar.mount
+    mount = infer(to_urdf(build_robot_body(robot_spec("amr"))).replace("</robot>", link)).sensors["lidar"].lidar.mount
     assert (mount.roll, mount.pitch) == (roll, 0.0)
     assert mount.yaw == pytest.approx(0.5, abs=1e-4)
 
 
-def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
-    text = to_urdf(build_robot_body(shipped("amr"))).replace(
+def test_velocity_limits_of_wheel_joints_limit_the_robot(infer):
+    text = to_urdf(build_robot_body(robot_spec("amr"))).replace(
         '<axis xyz="0 1 0" />', '<axis xyz="0 1 0"/><limit effort="1" velocity="5"/>'
     )
     assert infer(text).limits.linear == pytest.approx(0.5)
 
 
 def test_wheels_on_a_suspension_are_not_steered(infer):
-    text = to_urdf(build_robot_body(shipped("turtlebot")))
+    text = to_urdf(build_robot_body(robot_spec("turtlebot")))
     for side in ("left", "right"):
         text = text.replace(
             f'<joint name="wheel_{side}" type="continuous">\n    <parent link="base_link" />',
@@ -76,12 +76,12 @@ def test_wheels_on_a_suspension_are_not_steered(infer):
     assert infer(text).drive.type == "differential"
 
 
-def test_a_robot_without_wheels_is_not_guessed(infer):
+def test_drive_of_a_robot_without_wheels_is_not_inferred(infer):
     with pytest.raises(InvalidInput, match="cannot be inferred from its wheels: it has no movable joints"):
-        infer(to_urdf(build_robot_body(shipped("omni"))))
+        infer(to_urdf(build_robot_body(robot_spec("omni"))))
 
 
-@pytest.mark.skipif(not JACKAL.exists(), reason="the Jackal of others is not here: see CONTRIBUTING.md")
+@pytest.mark.skipif(not JACKAL.exists(), reason="shared/data/jackal_urdf is missing: see CONTRIBUTING.md")
 def test_the_jackal_is_skid_steered():
     spec = infer_robot_spec(JACKAL)
     assert spec.drive.type == "skid_steer"
@@ -100,7 +100,7 @@ SWIVEL = """
 
 
 def test_a_wheel_that_trails_its_steering_axis_is_a_caster(infer):
-    text = to_urdf(build_robot_body(shipped("turtlebot"))).replace("</robot>", SWIVEL)
+    text = to_urdf(build_robot_body(robot_spec("turtlebot"))).replace("</robot>", SWIVEL)
     assert infer(text.replace("TRAIL", "-0.015")).drive.type == "differential"
     with pytest.raises(InvalidInput, match="only front steering is simulated"):
         infer(text.replace("TRAIL", "0"))
@@ -136,7 +136,7 @@ def test_wheels_may_be_round_meshes(tmp_path, stretch):
     assert drive.wheel_separation == pytest.approx(0.4)
 
 
-def add(text, joint):
+def add_joint(text, joint):
     """Return a URDF with a joint and its link, a short cylinder along y unless COLLISION is something else."""
     link = (
         '<link name="part">COLLISION<inertial><mass value="0.1"/></inertial></link><joint name="extra" TYPE>'
@@ -154,21 +154,21 @@ def add(text, joint):
 @pytest.mark.parametrize("name", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("height", ["0.35", "0.08"])
 def test_round_links_above_the_ground_are_not_wheels(infer, name, height):
-    """They were: a tilting camera made a robot unusable, two rollers of a belt made it a skid-steer robot."""
-    text = to_urdf(build_robot_body(shipped(name)))
-    assert infer(add(text, {"0.35": height})).drive == infer(text).drive
+    """Regression: a tilting camera made a robot unusable, two rollers of a belt made it a skid-steer robot."""
+    text = to_urdf(build_robot_body(robot_spec(name)))
+    assert infer(add_joint(text, {"0.35": height})).drive == infer(text).drive
 
 
 def test_small_rollers_on_the_ground_are_not_driven(infer):
-    text = to_urdf(build_robot_body(shipped("turtlebot")))
+    text = to_urdf(build_robot_body(robot_spec("turtlebot")))
     radius = infer(text).drive.wheel_radius
     roller = {"0.1 0.05 0.35": "-0.1 0 0.02"}
-    assert infer(add(text, roller)).drive.wheel_radius == radius
+    assert infer(add_joint(text, roller)).drive.wheel_radius == radius
 
 
 @pytest.mark.parametrize(("limit", "drive"), [("1e+16", "differential"), ("40", "differential"), ("6.3", None)])
 def test_revolute_joints_with_limits_of_many_turns_are_wheels(infer, limit, drive):
-    text = to_urdf(build_robot_body(shipped("amr"))).replace('type="continuous"', 'type="revolute"')
+    text = to_urdf(build_robot_body(robot_spec("amr"))).replace('type="continuous"', 'type="revolute"')
     text = text.replace('<axis xyz="0 1 0" />', f'<axis xyz="0 1 0"/><limit lower="-{limit}" upper="{limit}"/>')
     if drive:
         assert infer(text).drive.type == drive
@@ -190,12 +190,12 @@ def test_revolute_joints_with_limits_of_many_turns_are_wheels(infer, limit, driv
 )
 def test_the_reason_is_given_for_each_joint_without_a_wheel(infer, joint, reason):
     with pytest.raises(InvalidInput) as error:
-        infer(add(to_urdf(build_robot_body(shipped("omni"))), joint))
+        infer(add_joint(to_urdf(build_robot_body(robot_spec("omni"))), joint))
     assert error.value.problems[0].message.endswith(f": left: none; right: none; no wheels: extra ({reason})")
 
 
 def test_wheels_on_one_side_are_named(infer):
-    text = to_urdf(build_robot_body(shipped("turtlebot"))).replace(
+    text = to_urdf(build_robot_body(robot_spec("turtlebot"))).replace(
         '<joint name="wheel_right" type="continuous">', '<joint name="wheel_right" type="fixed">'
     )
     with pytest.raises(InvalidInput, match=r"left: wheel_left; right: none$"):
@@ -234,7 +234,7 @@ def car(limit):
   <joint name="SIDE_rolling" type="continuous"><parent link="SIDE_knuckle"/><child link="SIDE_front"/>
   <axis xyz="0 1 0"/></joint>""".replace("LIMIT", limit)
     wheels = front.replace("SIDE", "left").replace("Y", "0.14") + front.replace("SIDE", "right").replace("Y", "-0.14")
-    return to_urdf(build_robot_body(shipped("turtlebot"))).replace("</robot>", f"{wheels}</robot>")
+    return to_urdf(build_robot_body(robot_spec("turtlebot"))).replace("</robot>", f"{wheels}</robot>")
 
 
 @pytest.mark.parametrize(
@@ -247,5 +247,5 @@ def test_limits_of_the_steering_joints_limit_the_inner_wheel(infer, lower, upper
 
 
 @pytest.mark.parametrize("limit", ["", '<limit lower="-3.2" upper="3.2"/>', '<limit effort="1"/>'])
-def test_car_without_limits_of_its_steering_joints_has_a_usual_limit(infer, limit):
+def test_car_without_limits_of_its_steering_joints_has_the_default_limit(infer, limit):
     assert infer(car(limit)).drive.max_steering == 0.5

@@ -1,4 +1,4 @@
-"""The Jackal of Clearpath, from its own URDF, drives and slips."""
+"""Tests of driving and slip of Clearpath's Jackal, built from its published URDF."""
 
 import math
 from pathlib import Path
@@ -18,7 +18,7 @@ JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
 @pytest.fixture
 def jackal():
     if not JACKAL.is_dir():
-        pytest.skip("the Jackal of others is not here: see CONTRIBUTING.md")
+        pytest.skip("shared/data/jackal_urdf is missing: see CONTRIBUTING.md")
     drive = {"type": "skid_steer", "wheel_radius": 0.098, "wheel_separation": 0.37559, "wheel_base": 0.262,
              "turning_scale": 1.6}  # fmt: skip
     limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
@@ -47,10 +47,10 @@ def test_the_jackal_drives_a_square_of_two_meters(jackal):
     """With feedback from the true pose, as a controller would: four sides, four turns in place."""
     corners, odometer = [], jackal.encoders()
     for side in range(4):
-        begin, heading = jackal.truth().pose.plane, side * math.pi / 2
+        start, heading = jackal.truth().pose.plane, side * math.pi / 2
         drive_until(
             jackal,
-            lambda pose, begin=begin: begin.distance(pose) >= 2.0 - 0.04,
+            lambda pose, start=start: start.distance(pose) >= 2.0 - 0.04,
             lambda pose, heading=heading: Twist(0.5, 0.0, 2 * wrap(heading - pose.yaw)),
             seconds=10,
         )
@@ -67,16 +67,16 @@ def test_the_jackal_drives_a_square_of_two_meters(jackal):
     assert wrap(jackal.truth().pose.yaw) == pytest.approx(0.0, abs=0.05)
     left, right = (now - before for now, before in zip(jackal.encoders(), odometer, strict=True))
     by_wheels = (right - left) * 0.098 / 0.37559
-    assert by_wheels > 1.15 * 2 * math.pi, "its wheels turn further than the robot does"
+    assert by_wheels > 1.15 * 2 * math.pi, "the wheels turn farther than the robot"
 
 
 def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
     jackal.drive(Twist(0.0, 0.0, 1.0))
     jackal.step(240)
-    begin, rolled = jackal.truth().pose, jackal.encoders()
+    start, rolled = jackal.truth().pose, jackal.encoders()
     jackal.step(480)
     end, after = jackal.truth().pose, jackal.encoders()
-    turned = math.remainder(end.yaw - begin.yaw, 2 * math.pi)
+    turned = math.remainder(end.yaw - start.yaw, 2 * math.pi)
     by_wheels = (after[1] - rolled[1] - after[0] + rolled[0]) * 0.098 / 0.37559
-    assert math.hypot(end.x - begin.x, end.y - begin.y) < 0.1
+    assert math.hypot(end.x - start.x, end.y - start.y) < 0.1
     assert 1.2 < by_wheels / turned < 2.0

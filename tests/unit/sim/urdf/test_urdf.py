@@ -31,7 +31,7 @@ FRONT_WHEEL = WHEEL.replace('link="base"', 'link="knuckle_{side}"').replace("0.1
     'name="{side}', 'name="front_{side}').replace('link="{side}"', 'link="front_{side}"')  # fmt: skip
 BASE = """
   <link name="base">
-    <visual><geometry><mesh filename="package://gone/nowhere.dae"/></geometry></visual>
+    <visual><geometry><mesh filename="package://missing/visual.dae"/></geometry></visual>
     <collision><origin xyz="0.05 0 0.1"/><geometry>{geometry}</geometry></collision>
     <inertial><origin xyz="0.05 0 0.05"/><mass value="4"/><inertia ixx="0.05" iyy="0.06" izz="0.08"/></inertial>
   </link>"""
@@ -43,9 +43,9 @@ def robot(geometry=BOX, extra="", base=BASE):
     return f'<?xml version="1.0"?>\n<robot name="cart">{base.format(geometry=geometry)}{wheels}{extra}\n</robot>\n'
 
 
-def spec(drive=DIFFERENTIAL, urdf="robot.urdf", **more):
+def spec(drive=DIFFERENTIAL, urdf="robot.urdf", **fields):
     return RobotSpec.model_validate(
-        {"simscen": 1, "name": "cart", "urdf": urdf, "drive": drive, "limits": LIMITS, "sensors": {}, **more}
+        {"simscen": 1, "name": "cart", "urdf": urdf, "drive": drive, "limits": LIMITS, "sensors": {}, **fields}
     )
 
 
@@ -59,18 +59,18 @@ def read_mesh(path):
 
 @pytest.fixture
 def load(tmp_path):
-    def load(text, **more):
+    def load(text, **fields):
         (tmp_path / "robot.urdf").write_bytes(text if isinstance(text, bytes) else text.encode())
-        return build_robot_body(spec(**more), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
+        return build_robot_body(spec(**fields), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
 
     return load
 
 
 @pytest.fixture
 def refusal(load):
-    def refusal(text, **more):
+    def refusal(text, **fields):
         with pytest.raises(InvalidInput) as caught:
-            load(text, **more)
+            load(text, **fields)
         return caught.value.problems[0]
 
     return refusal
@@ -93,12 +93,12 @@ def test_the_base_frame_is_on_the_ground_under_the_middle_of_the_axle(load):
     assert body.chassis.center == pytest.approx([-0.05, 0.0, 0.1])
 
 
-def test_a_mass_in_the_specification_rules(load):
+def test_specified_mass_overrides_that_of_the_urdf(load):
     assert load(robot(), mass=46.0).mass == pytest.approx(46.0)
 
 
-def test_visuals_cost_nothing_even_when_their_meshes_are_missing(load):
-    assert "nowhere" in robot()
+def test_missing_meshes_of_visuals_are_ignored(load):
+    assert "missing" in robot()
     assert load(robot()).hull
 
 
@@ -129,7 +129,7 @@ def test_swivel_casters_of_a_differential_drive_are_not_steered_wheels(load):
     assert not any(wheel.is_steered for wheel in body.wheels)
 
 
-def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
+def test_casters_of_the_urdf_on_the_ground_are_replaced_by_generated_ones(load):
     caster = """
   <link name="caster"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
   <joint name="c" type="fixed"><parent link="base"/><child link="caster"/><origin xyz="-0.1 0 -0.03"/></joint>"""
@@ -142,9 +142,9 @@ def test_urdf_robot_drives(load):
     simulation = SingleRobotSimulation(merge_solids([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
-    begin = simulation.truth().pose.x
+    start = simulation.truth().pose.x
     simulation.step(480)
-    assert simulation.truth().pose.x - begin == pytest.approx(1.0, rel=0.01)
+    assert simulation.truth().pose.x - start == pytest.approx(1.0, rel=0.01)
     simulation.close()
 
 
@@ -185,31 +185,31 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
         ("http://example.org/base.stl", "only model://, package://, file://, Fuel and relative paths are read"),
     ],
 )
-def test_38_meshes_outside_are_not_opened(refusal, written, why):
+def test_38_meshes_outside_the_root_are_not_opened(refusal, written, why):
     problem = refusal(robot(f'<mesh filename="{written}"/>'))
     assert why in problem.message
     assert problem.line > 1
 
 
 @pytest.mark.parametrize("written", ["package://cart/base.stl", "model://cart/base.stl", "file://cart/base.stl"])
-def test_a_mesh_is_found_by_every_way_to_write_it_that_worlds_know(refusal, tmp_path, written):
+def test_mesh_is_found_by_every_uri_scheme_that_worlds_support(refusal, tmp_path, written):
     (tmp_path / "cart").mkdir()
     (tmp_path / "cart" / "base.stl").write_bytes(stl(4000))
     assert "STL header says" in refusal(robot(f'<mesh filename="{written}"/>')).message
 
 
-def test_38_a_link_that_leads_outside_is_not_followed(refusal, tmp_path):
+def test_38_a_symbolic_link_out_of_the_root_is_not_followed(refusal, tmp_path):
     (tmp_path / "base.stl").symlink_to("/etc/passwd")
     assert "outside the scenario root" in refusal(robot('<mesh filename="base.stl"/>')).message
 
 
-def test_39_a_folder_is_no_urdf(tmp_path):
+def test_39_a_folder_instead_of_a_urdf_is_refused(tmp_path):
     (tmp_path / "robot.urdf").mkdir()
     with pytest.raises(InvalidInput, match="not a regular file"):
         build_robot_body(spec(), tmp_path / "cart.robot.yaml", [tmp_path])
 
 
-def test_40_a_pipe_is_no_mesh(refusal, tmp_path):
+def test_40_a_named_pipe_instead_of_a_mesh_is_refused(refusal, tmp_path):
     os.mkfifo(tmp_path / "base.stl")
     assert "not a regular file" in refusal(robot('<mesh filename="base.stl"/>')).message
 
@@ -268,7 +268,7 @@ def test_50_negative_masses_are_refused(refusal):
         ('<joint name="j" type="fixed"><child link="left"/></joint>', "<joint> without <parent>"),
     ],
 )  # fmt: skip
-def test_trees_that_are_none_are_refused(refusal, extra, message):
+def test_invalid_link_trees_are_refused(refusal, extra, message):
     assert message in refusal(robot(extra=extra)).message
 
 
@@ -279,7 +279,7 @@ def test_several_mistakes_are_reported_at_once(load):
     assert len(caught.value.problems) == 2
 
 
-def test_wheels_that_are_not_found_can_be_named(load, refusal):
+def test_wheels_that_are_not_found_can_be_specified(load, refusal):
     text = robot().replace("cylinder", "box").replace('radius="0.05" length="0.03"', 'size="0.1 0.1 0.03"')
     problem = refusal(text)
     assert "no driven wheels" in problem.message and "left" in problem.hint
@@ -299,7 +299,7 @@ def test_a_urdf_outside_the_root_is_refused(tmp_path):
         build_robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
 
 
-def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
+def test_car_is_steered_by_the_wheels_below_vertical_joints(load):
     steering = "".join(
         f"""
   <link name="knuckle_{side}"/>
@@ -327,7 +327,7 @@ def test_xacro_files_are_expanded(tmp_path):
 
 
 @pytest.mark.parametrize("size", [25.0, 1e3, 1e30, 3e38])
-def test_a_mesh_in_other_units_is_refused_where_it_is_named(refusal, tmp_path, size):
+def test_mesh_in_wrong_units_is_refused_at_its_line(refusal, tmp_path, size):
     corners = np.array([[0, 0, 0], [size, 0, 0], [0, size, 0], [0, 0, size]], dtype="<f4")
     faces = b"".join(
         bytes(12) + corners[list(face)].tobytes() + bytes(2) for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
@@ -340,14 +340,14 @@ def test_a_mesh_in_other_units_is_refused_where_it_is_named(refusal, tmp_path, s
 
 
 @pytest.mark.parametrize("geometry", ['<box size="25 0.36 0.2"/>', '<sphere radius="11"/>'])
-def test_a_giant_is_no_robot(refusal, geometry):
+def test_oversized_shapes_are_refused(refusal, geometry):
     problem = refusal(robot(geometry=geometry))
     assert problem.code in ("SC402", "SC400")
     assert "reaches" in problem.message
 
 
-def test_a_body_of_shapes_has_the_same_bounds(tmp_path):
+def test_oversized_body_without_urdf_is_refused(tmp_path):
     data = {"simscen": 1, "name": "cart", "drive": DIFFERENTIAL, "limits": LIMITS, "sensors": {}, "mass": 9}
-    ship = RobotSpec.model_validate({**data, "body": [{"box": [1000, 1, 1], "z": 0.1}]})
+    oversized = RobotSpec.model_validate({**data, "body": [{"box": [1000, 1, 1], "z": 0.1}]})
     with pytest.raises(InvalidInput, match=r"robot 'cart' reaches 500 m from its base, more than 10 m"):
-        build_robot_body(ship, tmp_path / "cart.robot.yaml")
+        build_robot_body(oversized, tmp_path / "cart.robot.yaml")

@@ -1,4 +1,4 @@
-"""A folder to expand xacro files in."""
+"""Fixtures that expand xacro files in a temporary folder."""
 
 import pytest
 
@@ -11,7 +11,7 @@ from simscen.sim.urdf.xml_source import read_xml
 @pytest.fixture
 def expand(tmp_path):
     def expand(text, **files):
-        """What the inside of a <robot> expands to; `files` lie beside it, `pkg__name` in a folder pkg."""
+        """Expand the content of a <robot>; `files` are written beside it, `pkg__name` into a folder pkg."""
         for name, content in {"main": text, **files}.items():
             path = tmp_path / f"{name.replace('__', '/')}.xacro"
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -3,7 +3,7 @@
 
 import pytest
 
-TYPICAL = [
+PYTHON_ACCESS = [
     "(lambda: 1)()",
     "().__class__.__base__.__subclasses__()",
     "''.__class__",
@@ -30,7 +30,7 @@ TYPICAL = [
     "b'a'",
     "...",
 ]
-ENDLESS = [
+COSTLY = [
     "9**9**9",
     "2**-2**2**2**2**2**9",
     "10**300",
@@ -54,8 +54,8 @@ ENDLESS = [
 ]
 
 
-@pytest.mark.parametrize("expression", TYPICAL)
-def test_an_expression_reaches_no_python(refusal, expression):
+@pytest.mark.parametrize("expression", PYTHON_ACCESS)
+def test_expression_cannot_access_python(refusal, expression):
     problem = refusal(f'<a v="${{{expression}}}"/>')
 
     assert problem.code == "SC400"
@@ -63,12 +63,12 @@ def test_an_expression_reaches_no_python(refusal, expression):
     assert problem.message.startswith(f"${{{expression.replace('&lt;', '<')}}}: ")
 
 
-@pytest.mark.parametrize("expression", ENDLESS)
-def test_an_expression_takes_neither_long_nor_much(refusal, expression):
+@pytest.mark.parametrize("expression", COSTLY)
+def test_expression_that_needs_much_time_or_memory_is_refused(refusal, expression):
     assert refusal(f'<a v="${{{expression}}}"/>').code == "SC400"
 
 
-def test_the_environment_is_not_read(refusal, value, monkeypatch):
+def test_environment_variables_are_not_read(refusal, value, monkeypatch):
     monkeypatch.setenv("SECRET", "hunter2")
 
     problem = refusal('<a v="$(env SECRET)"/>')
@@ -91,8 +91,8 @@ def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, written):
     (tmp_path.parent / "outside.xacro").write_text("<robot/>")
     (tmp_path / "link.xacro").symlink_to(tmp_path.parent / "outside.xacro")
 
-    told = refusal(f'<xacro:include filename="{written}"/>').message
-    assert "outside the scenario root" in told or "not the name of a package" in told
+    message = refusal(f'<xacro:include filename="{written}"/>').message
+    assert "outside the scenario root" in message or "not the name of a package" in message
 
 
 def test_existence_of_an_optional_file_outside_is_not_revealed(refusal):
@@ -101,7 +101,7 @@ def test_existence_of_an_optional_file_outside_is_not_revealed(refusal):
         assert problem.message == f"include '{written}': outside the scenario root and the world paths"
 
 
-def test_a_link_out_of_the_root_is_no_package(refusal, tmp_path):
+def test_symbolic_link_out_of_the_root_is_no_package(refusal, tmp_path):
     (tmp_path / "pkg").symlink_to(tmp_path.parent)
     assert "there is no package 'pkg'" in refusal('<xacro:include filename="$(find pkg)/x.xacro"/>').message
 
@@ -112,11 +112,11 @@ BOMBS = {
         f'<xacro:macro name="m{n}"><xacro:m{n + 1}/><xacro:m{n + 1}/></xacro:macro>' for n in range(40)
     )
     + '<xacro:macro name="m40"><a/></xacro:macro><xacro:m0/>',
-    "macros that double and make nothing": "".join(
+    "macros that double without output": "".join(
         f'<xacro:macro name="m{n}"><xacro:m{n + 1}/><xacro:m{n + 1}/></xacro:macro>' for n in range(40)
     )
     + '<xacro:macro name="m40"/><xacro:m0/>',
-    "texts that double": "".join(
+    "strings that double": "".join(
         f'<xacro:property name="p{n}" value="${{p{n + 1}}}${{p{n + 1}}}"/>' for n in range(40)
     )
     + '<xacro:property name="p40" value="xx"/><a v="${p0}"/>',
@@ -137,5 +137,5 @@ BOMBS = {
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("name", BOMBS)
-def test_expansion_ends(refusal, name):
+def test_endless_expansion_is_refused(refusal, name):
     assert refusal(BOMBS[name]).code == "SC400"

@@ -14,7 +14,7 @@ CASES = {
     "namespaces of functions": '<a v="${math.cos(0)} ${python.abs(-2)} ${python.isinstance(3, int)} ${python.sum([1, 2])}"/>',
     "comparisons": '<a v="${1 &lt; 2 &lt; 3} ${1 == 1.0} ${\'a\' in \'abc\'} ${3 not in [1, 2]} ${not 0} ${None is None}"/>',
     "booleans": '<xacro:property name="t" value="true"/><a v="${t} ${t and 3} ${False or \'x\'} ${\'y\' if t else \'n\'}"/>',
-    "texts": '<a v="${\'a b\'.split(\' \')[1]} ${\'aB\'.upper()} ${\'x,y\'.replace(\',\', \'-\')} ${\'-\'.join([\'a\', \'b\'])}"/>',
+    "strings": '<a v="${\'a b\'.split(\' \')[1]} ${\'aB\'.upper()} ${\'x,y\'.replace(\',\', \'-\')} ${\'-\'.join([\'a\', \'b\'])}"/>',
     "lists": '<xacro:property name="l" value="${[1, 2, 3]}"/><a v="${l[0]} ${l[-1]} ${l[1:]} ${len(l)} ${l.pop(0)} ${l}"/>',
     "dictionaries": '<xacro:property name="d" value="${dict(a=1, b=2)}"/><a v="${d[\'a\'] + d[\'b\']}"/>',
     "literals": "".join(
@@ -33,10 +33,10 @@ CASES = {
     "macros": '<xacro:macro name="m" params="a b:=2 c:=\'x y\' d:=${1 + 1} *e **f"><k v="${a} ${b} ${c} ${d}">'
     '<xacro:insert_block name="e"/><xacro:insert_block name="f"/></k></xacro:macro>'
     '<xacro:m a="1"><e1 z="1"/><f1><f2/><f3/></f1></xacro:m><xacro:m b="${7}" a="8"><e1/><f1/></xacro:m>',
-    "macros see who calls them": '<xacro:macro name="i"><a v="${x}"/></xacro:macro>'
+    "macros see the scope of the caller": '<xacro:macro name="i"><a v="${x}"/></xacro:macro>'
     '<xacro:macro name="o" params="x"><xacro:i/></xacro:macro><xacro:o x="3"/>',
     "three quotes": '<xacro:macro name="m" params="ns:=\'\'\'"><a v="[${ns}]"/></xacro:macro><xacro:m/>',
-    "forwarded": '<xacro:macro name="m" params="x:=^ y:=^|4 z=^|${5 + 1}"><a v="${x} ${y} ${z}"/></xacro:macro>'
+    "forwarded parameters": '<xacro:macro name="m" params="x:=^ y:=^|4 z=^|${5 + 1}"><a v="${x} ${y} ${z}"/></xacro:macro>'
     '<xacro:property name="x" value="1"/><xacro:property name="y" value="2"/><xacro:m/><xacro:m x="9"/>',
     "macros in macros": '<xacro:macro name="o"><xacro:macro name="i"><a/></xacro:macro><xacro:i/></xacro:macro><xacro:o/>',
     "macros are redefined": '<xacro:macro name="m"><a/></xacro:macro><xacro:macro name="m"><b/></xacro:macro><xacro:m/>',
@@ -65,24 +65,24 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_expands_as_xacro_does(expand, tmp_path, name):
+def test_expansion_equals_that_of_xacro(expand, tmp_path, name):
     ours = expand(CASES[name], **FILES)
     theirs = xacro.process_file(str(tmp_path / "main.xacro"), verbosity=0).documentElement
 
     assert flat_ours(ours) == flat_theirs(theirs)
-    assert ours.children  # something came of it
+    assert ours.children  # the expansion is not empty
 
 
 def flat_ours(element):
-    return element.tag, _told(element.attributes), [flat_ours(child) for child in element.children]
+    return element.tag, _sorted_attributes(element.attributes), [flat_ours(child) for child in element.children]
 
 
 def flat_theirs(node):
     children = [flat_theirs(child) for child in node.childNodes if isinstance(child, Element)]
-    return node.tagName, _told(dict(node.attributes.items())), children
+    return node.tagName, _sorted_attributes(dict(node.attributes.items())), children
 
 
-def _told(attributes):
+def _sorted_attributes(attributes):
     return sorted((name, str(text)) for name, text in attributes.items() if not name.startswith("xmlns"))
 
 

@@ -1,4 +1,4 @@
-"""Robots and small worlds for tests of physics and sensors."""
+"""Helpers for tests of physics and sensors: robots, boxes, and driven motion."""
 
 import math
 from pathlib import Path
@@ -12,18 +12,18 @@ from simscen.model.robot import RobotSpec
 ROBOTS = Path(__file__).parents[3] / "simscen/data/robots"
 
 
-def shipped(name):
-    """A shipped robot as specified."""
+def robot_spec(name):
+    """Return the specification of a shipped robot."""
     return RobotSpec.model_validate(yaml.safe_load((ROBOTS / f"{name}.robot.yaml").read_text()))
 
 
 def box(name, x, y, length, width, height=1.0, yaw=0.0):
-    """A box that stands on the ground."""
+    """Return a box on the ground."""
     return Solid(Box((length, width, height)), Pose3.planar(Pose2(x, y, yaw), height / 2), name)
 
 
-def travelled(simulation, ticks, every=6):
-    """Run on; the heading turned in rad (full turns count) and the path driven in m."""
+def measure_motion(simulation, ticks, every=6):
+    """Step the simulation; return the heading turned in rad (full turns count) and the path driven in m."""
     turned = length = 0.0
     before = simulation.truth().pose.plane
     for _ in range(ticks // every):
