@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from simulation_helpers import box
 from shapely.geometry import Point, Polygon
 from shapely.geometry import box as rectangle
 from shapely.ops import unary_union
+from simulation_helpers import box
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid, Sphere

@@ -1,6 +1,6 @@
 import pytest
-from simulation_helpers import robot_spec
 from shapely.geometry import Point, Polygon
+from simulation_helpers import robot_spec
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry.shapes import Sphere
