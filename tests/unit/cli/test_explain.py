@@ -91,7 +91,7 @@ def test_signals_are_listed_with_units_and_explained(simscen) -> None:
         ("update_min_a", "amcl.update_min_a (key)"),
         ("stack.localizer.alpha1", "Rotation noise from rotation."),
         ("events.when", "Trigger of the event."),
-        ("sensors.lidar.mount.yaw", "0: straight ahead, positive: to the left"),
+        ("sensors.lidar.mount.yaw", "0: straight ahead, positive: to the"),
         ("physics.tick_rate", "frequency in Hz"),
         ("GOAL_OCCUPIED", "Nav2's error code 206."),
         ("206", "GOAL_OCCUPIED (error code)"),
