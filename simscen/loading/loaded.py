@@ -72,7 +72,7 @@ class LoadedScenario:
     """Valid scenario, or valid variation of a scenario. All checks that do not need its built world have passed.
 
     A scenario of several robots has a view of each robot: a scenario with this robot alone. `spec`, `tree`, and `notes`
-    are those of all robots, all other fields those of the first view.
+    then cover all robots, and all other fields are those of the first view.
     """
 
     id: str
@@ -165,7 +165,7 @@ class LoadedScenario:
 
     @property
     def expectation(self) -> ExpectedFailure | None:
-        """The failure that the scenario expects, or None. Its line is 0 if `expected` is in an extended file."""
+        """The failure that the scenario expects, or None. Its line is 0 if an extended file contains `expected`."""
         expected = self.spec.expected
         if expected is None:
             return None

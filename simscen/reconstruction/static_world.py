@@ -74,9 +74,10 @@ def offset_poses(poses: Array, offset: Pose2) -> Array:
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams in the frame of the lidar `poses` (n, 3), for `ranges` (n, beams) in m.
+    """Return the ends (n, beams, 2) of beams with `ranges` (n, beams) in m, in the same frame as `poses` (n, 3).
 
-    `angles` (beams,) are in rad relative to the lidar. The end of a beam is not finite if its range is not.
+    `poses` are those of the lidar, and `angles` (beams,) are in rad relative to it. The end of a beam is not finite if
+    its range is not.
     """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):
@@ -90,7 +91,7 @@ RESOLUTION_M = 0.05
 MARGIN_M = 1.0
 """Distance between the border of the map and all hits and poses."""
 TARGET_SCANS = 1500
-"""Minimum number of scans to use of a long drive. At most twice as many scans are used."""
+"""Minimum number of scans that are used from a long drive. At most twice as many scans are used."""
 BODY_RADIUS_M = 0.15
 """Assumed minimum radius of a robot. Cells at most this far from the driven path are free."""
 MAX_RANGE_M = 15.0

@@ -9,9 +9,9 @@ PARTIAL_SUFFIX = ".partial.mcap"
 
 
 class LogFile:
-    """Unbuffered file with the name `run.partial.mcap` until `finish` renames it to `run.mcap`.
+    """Unbuffered file, named for example `run.partial.mcap` until `finish` renames it to `run.mcap`.
 
-    Methods raise RunError of kind "output" if the file cannot be written. `failed` is then True.
+    Methods raise RunError of kind "output" if the file cannot be written. After a failed `write`, `failed` is True.
     """
 
     def __init__(self, path: Path) -> None:

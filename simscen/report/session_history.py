@@ -40,7 +40,10 @@ class PastSession:
 
 
 def past_sessions(folder: Path) -> list[PastSession]:
-    """Return at most MAX_SHOWN_SESSIONS sessions next to `folder` that are older than its session, newest first."""
+    """Return at most MAX_SHOWN_SESSIONS sessions that are older than that in `folder`, newest first.
+
+    They are in the same parent folder.
+    """
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
     sessions = (past for each in folders[index + 1 :] if (past := _read_session(each)) is not None)

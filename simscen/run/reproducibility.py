@@ -46,7 +46,7 @@ def cpu_flags() -> list[str]:
 
 @cache
 def arithmetic_fingerprints() -> dict[str, str]:
-    """Return a digest of sample results of each library (OpenBLAS, C math library, NumPy), by name.
+    """Return digests of sample results of OpenBLAS, the C math library, and NumPy, and the CPU features of NumPy.
 
     The digests show differences in the last bits, because these libraries choose processor instructions at run time.
     """
@@ -164,8 +164,8 @@ class ScenarioDigests(NamedTuple):
     Attributes:
         run: Digest of all files, options, versions, and processor features that affect a run, except the seed. An old
             result is reused only if this digest is equal.
-        definition: Digest of the scenario without the parameters of its stacks, and of its world, robots, maps, and
-            meshes. Results of two stacks are compared only if this digest is equal.
+        definition: Digest of the world, robots, maps, and meshes, and of the scenario without the parameters of its
+            stacks. Results of two stacks are compared only if this digest is equal.
     """
 
     run: str

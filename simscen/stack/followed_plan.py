@@ -14,7 +14,7 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Costmap changes within this distance of the plan, or within a larger inscribed radius, cause a new check."""
+"""Costmap changes within this distance of the plan cause a new check. A larger inscribed radius replaces it."""
 WATCH_EVERY_POINTS = 4
 """Every n-th point of the plan is checked for changes nearby."""
 MAX_DEFERRED_MOTION_M = 0.5
@@ -26,7 +26,7 @@ COMPARISON_DISTANCE_M = 1.0
 MIN_SHIFT_M = 0.01
 """Shift of the map frame in the odom frame above which the controller gets the path again."""
 ROUNDING_M = 1e-9
-"""Largest shift that rounding alone can cause."""
+"""Smaller shifts are ignored, because rounding alone can cause them."""
 
 
 class FollowedPlan:

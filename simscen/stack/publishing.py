@@ -19,7 +19,7 @@ from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, Localizer, SupportsArc
 
 BELIEF_RATE_HZ, LOCAL_PLAN_RATE_HZ = 10.0, 5.0
-"""Rates at which beliefs without new scans, and local plans, are published."""
+"""Rate at which the belief is published while no scan arrives, and maximum rate of local plans."""
 MAX_CELLS_PER_SECOND = 125_000
 """Maximum number of cells published per second for each costmap. It limits the rate of large costmaps."""
 _OCCUPANCY_TABLE = np.array(
@@ -57,7 +57,7 @@ class Publisher:
         return self._localizer.belief
 
     def updates(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
-        """Return what to publish after a controller period. The robot follows `plan`, or None."""
+        """Return what to publish after a controller period. `plan` is the path that the robot follows, if any."""
         local_plan: Path | None = None
         grids: tuple[CostGrid, ...] = ()
         if plan is not None and tick >= self._local_plan_due:

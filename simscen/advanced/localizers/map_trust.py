@@ -15,8 +15,8 @@ class ScanResiduals(NamedTuple):
     """Residuals of the beams of one scan that end on the mapped area.
 
     explained:    share of these beams that the map explains
-    mean_square:  mean squared distance of the endpoints from obstacles, in units of `sigma_hit`²; 0 for beams that the
-                  map does not explain
+    mean_square:  mean square of the distances of the endpoints from obstacles, in units of `sigma_hit`². Each distance
+                  is multiplied by the probability that the map explains the beam.
     """
 
     explained: float

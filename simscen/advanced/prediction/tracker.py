@@ -38,17 +38,17 @@ GATE_M, GATE_SIGMAS = 0.25, 3.0
 MIN_START_RADIUS_M = 0.15
 """Minimum radius of a cluster that starts a track outside formerly free space."""
 MIN_HIDDEN_RADIUS_M = 0.3
-"""Minimum radius of a new track whose cluster is partly hidden: that of a person."""
+"""Radius that a new track has at least if its cluster is partly hidden: that of a person."""
 RADIUS_GAIN = 0.3
 """Gain of the update of a track's radius by a completely visible cluster."""
 
 
 @fast_dataclass(eq=False)
 class ScanClusters:
-    """The clusters of a scan, all its hits `points` (m,) in the lidar frame, and the lidar's pose in the odom frame.
+    """Clusters of a scan. `points` (n,) are all hits of the scan in the lidar frame.
 
-    For each cluster, `appeared` states whether it is in formerly free space, and `was_occupied` whether an earlier scan
-    hit something there.
+    `lidar` is the pose of the lidar in the odom frame. For each cluster, `appeared` states whether it is in formerly
+    free space, and `was_occupied` whether an earlier scan hit something there.
     """
 
     tick: int

@@ -173,7 +173,7 @@ class Pose3(NamedTuple):
         )  # fmt: skip
 
     def _transform_point(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return `point_in_a` for `a_from_b` and `point_in_b`. Level poses do not need numpy, which is faster."""
+        """Return `point_in_a` for `a_from_b` and `point_in_b`. Level poses are computed faster, without numpy."""
         if self.qx != 0 or self.qy != 0:
             x, y, z = self.apply(np.array([point]))[0].tolist()
             return x, y, z

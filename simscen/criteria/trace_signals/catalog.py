@@ -45,7 +45,7 @@ class Signal:
         evidence: Kinds of information that a log must contain for this signal, besides the truth.
         minimum: Smallest possible value.
         maximum: Greatest possible value.
-        required_arguments: Keys of arguments. Exactly one of them must be given.
+        required_arguments: Keys of arguments of which exactly one must be given; empty if none is needed.
         optional_arguments: Keys of arguments that may be given.
     """
 

@@ -47,7 +47,7 @@ class SessionSummary:
 
 
 class SessionSummaryBuilder:
-    """Collects numbers of runs for a SessionSummary."""
+    """Collects the RunNumbers of each run for a SessionSummary."""
 
     def __init__(self) -> None:
         self._runs: list[tuple[tuple[str, str, int, str], RunNumbers | None]] = []

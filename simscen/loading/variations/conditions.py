@@ -28,7 +28,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
 _FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "min": min, "max": max, "hypot": math.hypot, "wrap": wrap}
 GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
-    "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with words of Python"
+    "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with keywords of Python"
 )
 """Hint with the syntax of conditions."""
 

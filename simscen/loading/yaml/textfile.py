@@ -13,7 +13,7 @@ from simscen.core.errors import Problem
 MAX_FILE_BYTES = 1 << 20
 """Largest size of a text file: 1 MiB."""
 
-# C0 and C1 controls, lone surrogates, bidirectional overrides (CVE-2021-42574), and the line breaks of YAML 1.1 that
+# C0 and C1 controls, noncharacters, bidirectional overrides (CVE-2021-42574), and the line breaks of YAML 1.1 that
 # editors do not treat as line breaks.
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
 

@@ -14,7 +14,7 @@ from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.static_world import StaticWorld, offset_poses
 
 TARGET_SCANS = 40
-"""Minimum number of scans to use of a long drive. At most twice as many scans are used."""
+"""Minimum number of scans that are used from a long drive. At most twice as many scans are used."""
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 """Changes of the mount for the numerical derivatives of the ranges."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
@@ -25,8 +25,8 @@ ratio, the estimate starts at the nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Maximum difference from the expected range of a beam that is used. While the mount is estimated, this limit is halved
-after each Gauss-Newton step, down to 0.1 m."""
+"""Beams whose range differs by more from the expected range are ignored. While the mount is estimated, this limit is
+halved after each Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
 """Minimum number of beams for estimating the mount."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)

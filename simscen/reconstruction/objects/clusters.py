@@ -20,9 +20,9 @@ MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
 """Maximum distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
 TRUE_WALL_DISTANCE_M = 0.12
-"""Maximum distance from a wall of a hit that belongs to the wall, for true poses."""
+"""A hit that is nearer to a wall belongs to the wall. For true poses."""
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""Maximum distance from a wall of a hit that belongs to the wall, for estimated poses: constant, and per m of range."""
+"""The same for estimated poses: a constant, and an addition per m of range."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,9 +75,9 @@ def _count(number: int) -> str:
 MAX_TRUTH_GAP_S = 1.0
 """Maximum time without ground truth for complete evidence."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
-"""Minimum and maximum delay of the first ground truth or scan that is due to a late subscription of the recorder.
+"""If the first ground truth or scan comes between these times after the first message, the recorder subscribed late.
 
-With such a delay, the log is judged from the first ground truth or scan on.
+The log is then judged from the first ground truth or scan on.
 """
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
 """Maximum distance that the robot drives before the first pose of AMCL, for complete evidence."""
@@ -149,7 +149,7 @@ class ForeignTraceReader:
         return None
 
     def _reason_missing(self, role: str, topic: str) -> str:
-        """Return the reason why the log has no messages with a role, and other topics with poses."""
+        """Return why the log has no messages with a role, followed by a list of the other topics that contain poses."""
         if role in self._decoded.problems:
             return self._decoded.problems[role]
         if topic in self._topics:

@@ -1,7 +1,7 @@
 """Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
 ROS messages lose precision: headings become quaternions, and ranges become float32. A topic `NAME/exact` has the values
-of the topic `NAME` in full precision. Its n-th message in a frame belongs to the n-th message on `NAME`.
+of the topic `NAME` in full precision. In one STEP or ANSWER, its n-th message belongs to the n-th on `NAME`.
 """
 
 from collections.abc import Iterable, Mapping

@@ -78,7 +78,7 @@ class CollisionTracker:
         self._events: list[Event] = []
 
     def has_contact_at(self, tick: int) -> bool:
-        """Return whether the robot touched anything at `tick`, the tick of the last update or a later tick."""
+        """Return whether the robot touched anything at `tick`, which must not be before the last update."""
         return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property

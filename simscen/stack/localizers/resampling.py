@@ -64,8 +64,8 @@ def decode_bins(keys: Keys) -> tuple[Keys, Keys, Keys]:
 class KldBound:
     """KLD bound: number of samples for which the sampled distribution differs from the true one by at most `error`.
 
-    `z` is the quantile of the standard normal distribution for the required probability. As in nav2_amcl, the default
-    0.99 is the quantile itself, not the probability.
+    `z` is the quantile of the standard normal distribution for the required probability. As in nav2_amcl, the
+    parameter `pf_z` (default 0.99) is used as the quantile itself, not as the probability.
     """
 
     error: float

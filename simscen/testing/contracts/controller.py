@@ -31,7 +31,7 @@ PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np
 SPEED_TOLERANCE = 1e-6
 """Maximum excess of a command over a limit because of rounding, in m/s and rad/s."""
 GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
-"""Maximum position error in m and yaw error in rad at the goal, and time for which the robot must stay at the goal."""
+"""Maximum position error in m and yaw error in rad at the goal, and time at the goal after which a drive ends."""
 
 
 class ControllerContract(ComponentContract):

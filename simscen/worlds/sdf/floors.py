@@ -20,7 +20,7 @@ MAX_FLOOR_HEIGHT_M = 0.3
 MAX_COVERING_HEIGHT_M = 0.05
 """Maximum height of the top of a floor covering: a thin slab that is a floor even if it lies on a ground plane."""
 MIN_FLOOR_HEIGHT_M = 0.001
-"""Height of the top of a floor up to which the floor is at z = 0."""
+"""A floor whose top is not higher counts as being at z = 0."""
 MIN_FLOOR_WIDTH_M = 1.0
 """Minimum width of a floor that carries other geometry. Narrower slabs are steps or curbs."""
 MIN_COVERING_WIDTH_M = 4.0
@@ -59,7 +59,7 @@ def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has
 
 
 def could_be_floor(solid: Solid) -> bool:
-    """Return whether a solid is low and wide enough to be a floor."""
+    """Return whether a solid is low enough to be a floor, and as wide as a floor covering."""
     left, bottom, right, top = bounding_rectangle(solid)
     return min(right - left, top - bottom) >= MIN_COVERING_WIDTH_M and top_height(solid) <= MAX_FLOOR_HEIGHT_M
 

@@ -154,10 +154,11 @@ class ObstacleCritic:
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """Return the first index in `order` (k,) of a free trajectory; None if none is free.
+        """Return the index of the best free trajectory among those in `order` (k,); None if none is free.
 
-        Trajectories with the preferred clearance take precedence. If the robot is in collision, a trajectory is free if
-        it leads out. Trajectories that meet no moving obstacle come first, then those that meet one late.
+        A trajectory is better if it keeps the preferred clearance; if that is equal, if it meets no moving obstacle or
+        meets one later; and then if it is earlier in `order`. If the robot is in collision, a trajectory is free if it
+        leads out.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
