@@ -63,9 +63,7 @@ def lateness(taken: list, kind: type) -> set[int]:
 def test_delayed_readings_keep_the_tick_of_their_measurement(tmp_path: Path) -> None:
     taken = moments(tmp_path, 60, lidar=", latency: 30 ms")
     assert lateness(taken, Scan) == {7}
-    assert lateness(taken, Odometry) == {
-        0,
-    }
+    assert lateness(taken, Odometry) == {0}
 
 
 def test_latencies_of_the_robot_apply_if_the_scenario_requests_them(tmp_path: Path) -> None:

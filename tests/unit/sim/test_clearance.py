@@ -127,7 +127,7 @@ def _corners(x, y, length, width, yaw):
 
 
 def test_wheel_spheres_do_not_touch_a_wall_beside_the_hull(simulate):
-    """A Jackal drives 3 cm with_wall a wall, less than the radius of the spheres that model its wheels."""
+    """A Jackal drives 3 cm beside a wall, less than the radius of the spheres that model its wheels."""
     without_wall = simulate("jackal", drive=(1.0, 0.0, 0.0))
     with_wall = simulate("jackal", solids=[box("wall", 0, -(0.2078 + 0.03 + 0.05), 10, 0.1)], drive=(1.0, 0.0, 0.0))
     for simulation in (without_wall, with_wall):

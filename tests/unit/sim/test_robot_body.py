@@ -10,7 +10,7 @@ from simscen.sim.body.from_spec import build_robot_body
 NAMES = ["turtlebot", "amr", "jackal", "car", "omni"]
 
 
-def robot_spec_with(name, **fields):
+def spec_with(name, **fields):
     return RobotSpec.model_validate({**robot_spec(name).model_dump(), **fields})
 
 
@@ -34,7 +34,7 @@ def test_round_robot_has_its_specified_radius():
 
 def test_specified_footprint_overrides_the_shapes():
     corners = [[0.5, -0.4], [-0.5, -0.4], [-0.5, 0.4], [0.5, 0.4]]
-    body = build_robot_body(robot_spec_with("amr", footprint=corners))
+    body = build_robot_body(spec_with("amr", footprint=corners))
     assert sorted(map(list, body.footprint)) == sorted(corners)
     assert Polygon(body.footprint).exterior.is_ccw
 
@@ -66,14 +66,12 @@ def test_the_base_frame_of_a_car_is_under_its_rear_axle():
 
 def test_hull_that_reaches_the_ground_is_refused():
     with pytest.raises(InvalidInput, match="reaches the ground"):
-        build_robot_body(robot_spec_with("amr", body=[{"box": [0.9, 0.6, 0.2]}]))
+        build_robot_body(spec_with("amr", body=[{"box": [0.9, 0.6, 0.2]}]))
 
 
 def test_robot_with_a_polygonal_body_drives(simulate):
     corners = [[-0.3, -0.2], [0.3, -0.2], [0.4, 0.0], [0.3, 0.2], [-0.3, 0.2]]
-    spec = robot_spec_with(
-        "amr", body=[{"polygon": corners, "height": 0.3, "z": 0.04}, {"box": [0.2, 0.2, 0.1], "z": 0.34}]
-    )
+    spec = spec_with("amr", body=[{"polygon": corners, "height": 0.3, "z": 0.04}, {"box": [0.2, 0.2, 0.1], "z": 0.34}])
     simulation = simulate(build_robot_body(spec), drive=(0.5, 0.0, 0.0))
     simulation.step(480)
     assert simulation.truth().twist.vx == pytest.approx(0.5, rel=0.01)

@@ -18,7 +18,7 @@ FORWARD = Twist(0.3, 0.0, 0.0)
 
 
 @pytest.fixture
-def simulate_robots():
+def fleet():
     """Return a function that creates simulations of robots by name, and close them after the test."""
     simulations = []
 
@@ -55,18 +55,18 @@ def sample_footprint(simulation, name, body):
 
 
 @pytest.mark.slow
-def test_clearance_between_two_robots_equals_brute_force(simulate_robots):
+def test_clearance_between_two_robots_equals_brute_force(fleet):
     amr, turtlebot = build_robot_body(robot_spec("amr")), build_robot_body(robot_spec("turtlebot"))
     for x, y, yaw in ((1.3, 0.4, 0.7), (0.2, 1.1, 2.0), (-1.2, -0.6, -1.0)):
-        simulation = simulate_robots(a=("amr", 0.0, 0.0, 0.3), b=("turtlebot", x, y, yaw))
+        simulation = fleet(a=("amr", 0.0, 0.0, 0.3), b=("turtlebot", x, y, yaw))
         outline_a, outline_b = sample_footprint(simulation, "a", amr), sample_footprint(simulation, "b", turtlebot)
         expected = np.hypot(*(outline_a[:, None] - outline_b[None]).transpose(2, 0, 1)).min()
         for name in "ab":
             assert simulation.robots[name].truth().clearance == pytest.approx(expected, abs=0.01)
 
 
-def test_collision_of_two_robots_names_the_other_robot_and_the_cause(simulate_robots):
-    simulation = simulate_robots(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 1.0, 0.0, 0.0))
+def test_collision_of_two_robots_names_the_other_robot_and_the_cause(fleet):
+    simulation = fleet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 1.0, 0.0, 0.0))
     drive(simulation, 720, a=FORWARD)
     hit, was_hit = (simulation.robots[name].collisions()[0] for name in "ab")
     assert (hit.name, was_hit.name) == ("b", "a")
@@ -77,8 +77,8 @@ def test_collision_of_two_robots_names_the_other_robot_and_the_cause(simulate_ro
     assert simulation.robots["b"].base_pose().x > 1.0, "it is pushed"
 
 
-def test_each_robot_is_an_object_for_the_other(simulate_robots):
-    simulation = simulate_robots(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 2.0, 0.0, 0.0))
+def test_each_robot_is_an_object_for_the_other(fleet):
+    simulation = fleet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 2.0, 0.0, 0.0))
     a = simulation.robots["a"]
     assert list(a.truth().objects) == ["b"]
     assert a.truth().objects["b"] == simulation.robots["b"].base_pose()
@@ -89,12 +89,10 @@ def test_each_robot_is_an_object_for_the_other(simulate_robots):
     assert math.isinf(back), "a robot does not see itself"
 
 
-def test_distant_robots_do_not_change_any_bit_of_the_motion(simulate_robots):
+def test_distant_robots_do_not_change_any_bit_of_the_motion(fleet):
     walls = [box("wall", 3.0, 0.0, 0.2, 4.0)]
-    single = simulate_robots(walls, a=("turtlebot", 0.0, 0.0, 0.1))
-    several = simulate_robots(
-        walls, b=("jackal", 40.0, 5.0, 1.0), a=("turtlebot", 0.0, 0.0, 0.1), aa=("amr", -30.0, 5.0, 1.0)
-    )
+    single = fleet(walls, a=("turtlebot", 0.0, 0.0, 0.1))
+    several = fleet(walls, b=("jackal", 40.0, 5.0, 1.0), a=("turtlebot", 0.0, 0.0, 0.1), aa=("amr", -30.0, 5.0, 1.0))
     turn = Twist(0.3, 0.0, 0.2)
     first = drive(single, 2400, a=turn)
     second = drive(several, 2400, a=turn, b=Twist(0.5, 0.0, 0.5), aa=FORWARD)
@@ -102,9 +100,7 @@ def test_distant_robots_do_not_change_any_bit_of_the_motion(simulate_robots):
     assert expected == [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in second]
 
 
-def test_order_of_robots_does_not_change_the_run(simulate_robots):
+def test_order_of_robots_does_not_change_the_run(fleet):
     robots = {"a": ("turtlebot", 0.0, 0.0, 0.0), "b": ("turtlebot", 0.9, 0.1, math.pi)}
-    truths = [
-        drive(simulate_robots(**order), 720, a=FORWARD, b=FORWARD) for order in (robots, dict(reversed(robots.items())))
-    ]
+    truths = [drive(fleet(**order), 720, a=FORWARD, b=FORWARD) for order in (robots, dict(reversed(robots.items())))]
     assert truths[0] == truths[1]

@@ -60,9 +60,9 @@ def static_distance():
         Solid(Extrusion(((0, 0), (2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2)), 1.0), Pose3(5, 5), "corner"),
         Solid(Box((20, 20, 0.1)), Pose3(z=-0.05), "floor"),
     ]
-    distances = StaticDistance(merge_solids(solids), build_robot_body(robot_spec("turtlebot")), 2.0)
-    yield distances
-    distances.close()
+    query = StaticDistance(merge_solids(solids), build_robot_body(robot_spec("turtlebot")), 2.0)
+    yield query
+    query.close()
 
 
 def test_nearest_solid_name_is_that_of_the_nearest_surface(static_distance):
@@ -111,9 +111,9 @@ def test_distances_along_a_path_among_many_solids_equal_those_of_shapely():
         poses.append(following if 0 < following.x < 24 and 0 < following.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
     expected = plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
     expected[expected > 1.0] = math.inf
-    distances = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
-    measured = np.array([distances.distance(pose) for pose in poses])
-    distances.close()
+    query = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
+    measured = np.array([query.distance(pose) for pose in poses])
+    query.close()
     outside = expected > 0
     assert outside.sum() > 500
     assert np.isinf(expected).sum() > 100
@@ -122,39 +122,39 @@ def test_distances_along_a_path_among_many_solids_equal_those_of_shapely():
 
 
 def test_distance_is_correct_while_the_nearest_solid_alternates():
-    distances = StaticDistance(
+    query = StaticDistance(
         merge_solids([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0
     )
     for k in range(20):
         y = 0.05 * (-1) ** (k // 2)
-        assert distances.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
-    distances.close()
+        assert query.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
+    query.close()
 
 
 def test_distance_beyond_the_range_is_infinite():
-    distances = StaticDistance(merge_solids([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
-    assert distances.distance(Pose3(0.2995)) == math.inf
-    assert distances.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
-    assert distances.distance(Pose3(0.2995)) == math.inf
-    distances.close()
+    query = StaticDistance(merge_solids([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
+    assert query.distance(Pose3(0.2995)) == math.inf
+    assert query.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
+    assert query.distance(Pose3(0.2995)) == math.inf
+    query.close()
 
 
 def test_distance_of_a_tilted_robot_is_measured_from_its_top():
-    distances = StaticDistance(
+    query = StaticDistance(
         merge_solids([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0
     )
     overhang = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
-    assert distances.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - overhang, abs=1e-3)
-    distances.close()
+    assert query.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - overhang, abs=1e-3)
+    query.close()
 
 
 def test_distant_solids_are_built_only_when_needed():
     rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
-    distances = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
+    query = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
     for k in range(200):
-        assert distances.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
-    assert 20 <= len(distances._shape_pairs) <= 44
-    distances.close()
+        assert query.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
+    assert 20 <= len(query._shape_pairs) <= 44
+    query.close()
 
 
 def wall_of_many_triangles(columns, rows):
@@ -170,12 +170,10 @@ def wall_of_many_triangles(columns, rows):
 def test_distance_to_a_solid_with_more_triangles_than_bullet_supports():
     wall = wall_of_many_triangles(400, 60)
     assert len(wall.faces) == 48_000
-    distances = StaticDistance(
-        merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0
-    )
+    query = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0)
     for y in (-9.0, -3.3, 0.0, 9.5):
-        assert distances.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    distances.close()
+        assert query.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    query.close()
 
 
 def test_every_face_is_in_one_tile():
@@ -187,25 +185,21 @@ def test_every_face_is_in_one_tile():
 
 def test_hull_of_more_points_than_bullet_supports_keeps_its_bounds():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
-    distances = StaticDistance(merge_solids([]), build_robot_body(robot_spec("turtlebot")), 2.0)
-    shape = create_hull_of_solids(
-        distances._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")]
-    )
-    low, high = pybullet.getAABB(create_static_body(distances._client, shape), physicsClientId=distances._client)
+    query = StaticDistance(merge_solids([]), build_robot_body(robot_spec("turtlebot")), 2.0)
+    shape = create_hull_of_solids(query._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
+    low, high = pybullet.getAABB(create_static_body(query._client, shape), physicsClientId=query._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
-    distances.close()
+    query.close()
 
 
 def test_only_the_part_of_a_large_solid_near_the_robot_is_built():
     wall = wall_of_many_triangles(400, 60)
-    distances = StaticDistance(
-        merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0
-    )
-    assert distances.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    assert sum(len(distances._parts.faces(part)) for part in distances._shape_pairs) < 0.5 * len(wall.faces)
-    assert distances.nearest_solid_name((5.0, 1.0, 0.5)) == "wall"
-    assert distances.enclosing_solids((4.0, 0.0, 0.5)) == []
+    query = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(robot_spec("turtlebot")), 2.0)
+    assert query.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    assert sum(len(query._parts.faces(part)) for part in query._shape_pairs) < 0.5 * len(wall.faces)
+    assert query.nearest_solid_name((5.0, 1.0, 0.5)) == "wall"
+    assert query.enclosing_solids((4.0, 0.0, 0.5)) == []
 
 
 def block_of_many_triangles():
@@ -215,16 +209,16 @@ def block_of_many_triangles():
 
 
 def test_point_inside_a_solid_of_many_tiles_is_enclosed():
-    distances = StaticDistance(
+    query = StaticDistance(
         merge_solids([Solid(block_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
         build_robot_body(robot_spec("turtlebot")),
         2.0,
     )
-    assert [distances.name(k) for k in distances.enclosing_solids((1.0, 1.0, 0.5))] == ["block"]
-    assert [distances.name(k) for k in distances.enclosing_solids((20.0, 0.0, 0.5))] == ["shelf"]
-    assert distances.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
-    assert not distances.is_convex(0)
-    assert distances.is_convex(1)
+    assert [query.name(k) for k in query.enclosing_solids((1.0, 1.0, 0.5))] == ["block"]
+    assert [query.name(k) for k in query.enclosing_solids((20.0, 0.0, 0.5))] == ["shelf"]
+    assert query.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert not query.is_convex(0)
+    assert query.is_convex(1)
 
 
 def test_enclosure_along_a_line_equals_that_of_trimesh():

@@ -74,9 +74,7 @@ def test_existing_files_with_the_same_content_are_not_copied(job: Job, tmp_path:
 
 
 @pytest.mark.parametrize("change", ["removed", "changed"])
-def test_a_machine_without_the_files_receives_them_and_writes_the_same_log(
-    job: Job, tmp_path: Path, change: str
-) -> None:
+def test_a_machine_without_the_files_gets_them_and_writes_the_same_log(job: Job, tmp_path: Path, change: str) -> None:
     packed, expected = pack(job, send), log_of(job, tmp_path / "log")
     home = tmp_path / "here"
     if change == "removed":
