@@ -82,7 +82,7 @@ def test_speed_mask_limits_the_true_speed_only_inside_the_mask(kind, tmp_path):
     gray = empty_mask() if mode == "scale" else np.zeros_like(empty_mask())
     gray[:, 40:60] = value
     write_mask(tmp_path, "slow", gray, mode=mode)
-    run = simscen.simulate(scenario(tmp_path, f"  speed_mask: {{file: write_slow_mask.yaml, {options}}}\n"))
+    run = simscen.simulate(scenario(tmp_path, f"  speed_mask: {{file: slow.yaml, {options}}}\n"))
     assert run.passed, run.result.verdicts
     assert 0.7 * limit < max_speed(run, 4.5, 5.8) < 1.05 * limit
     assert max_speed(run, 6.5, 7.5) > 1.4 * limit

@@ -164,7 +164,7 @@ def fields(form: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def test_a_form_has_the_help_and_the_choices_of_the_schema(session: MakeSession) -> None:
     one = session()
     form = one.form({"text": TEXT, "keys": ["events", 0, "do", 0, "pedestrian"]})
-    assert form["help"].startswith("Add a person who walks to goals on their own")
+    assert form["help"].startswith("Add a person who walks to goals and avoids walls")
     assert fields(form)["name"]["type"] == "text" and fields(form)["name"]["required"]
     offered = {each["key"]: each for each in form["addable"]}
     assert offered["behavior"]["value"] == "regular" and "Reaction to the robot" in offered["behavior"]["help"]
