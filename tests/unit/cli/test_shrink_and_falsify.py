@@ -129,7 +129,7 @@ def test_a_spent_budget_still_writes_a_smaller_scenario(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     done = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6)
     assert done.returncode == 1, done.stderr
-    assert "see --runs" in done.stdout
+    assert "not enough to try everything; increase --runs" in done.stdout
     assert simscen(tmp_path, "run", "a.minimal.scenario.yaml").returncode == 1
     second = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
     assert second.returncode == 1
