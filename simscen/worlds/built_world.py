@@ -82,12 +82,12 @@ def inspect_world(built: BuiltWorld) -> WorldSummary:
     bodies = []
     for body in world.bodies:
         solids = tuple(Solid(s.shape, body.pose.compose(s.pose), s.name) for s in body.solids)
-        kinds = "+".join(dict.fromkeys(_kind(solid) for solid in solids))
-        bodies.append(_item(body.name, kinds, solids, body.mass))
+        kinds = "+".join(dict.fromkeys(_shape_kind(solid) for solid in solids))
+        bodies.append(_summarize_item(body.name, kinds, solids, body.mass))
     return WorldSummary(
         name=world.name,
         bounds=world.bounds,
-        solids=tuple(_item(solid.name, _kind(solid), (solid,)) for solid in world.solids),
+        solids=tuple(_summarize_item(solid.name, _shape_kind(solid), (solid,)) for solid in world.solids),
         bodies=tuple(bodies),
         map_size=built.map.shape,
         map_resolution=built.map.resolution,
@@ -98,11 +98,11 @@ def inspect_world(built: BuiltWorld) -> WorldSummary:
     )
 
 
-def _kind(solid: Solid) -> str:
+def _shape_kind(solid: Solid) -> str:
     return type(solid.shape).__name__.lower()
 
 
-def _item(name: str, kind: str, solids: tuple[Solid, ...], mass: float | None = None) -> WorldItem:
+def _summarize_item(name: str, kind: str, solids: tuple[Solid, ...], mass: float | None = None) -> WorldItem:
     mesh = merge_solids(solids)
     return WorldItem(name, kind, len(mesh.faces), _extent(mesh), mass)
 

@@ -1,6 +1,6 @@
 """Convert imported worlds (SDF) to the obstacles and objects of a world file.
 
-World files have only upright shapes. A solid with another shape is replaced by upright prisms over its cross section.
+World files have only upright shapes. Any other solid is replaced by upright prisms whose base is its cross section.
 """
 
 import math
@@ -29,21 +29,21 @@ from simscen.worlds.geometry.cross_section import (
 from simscen.worlds.geometry.triangulation import merge_solids
 
 MIN_UPRIGHT_COSINE = 1 - 1e-8
-"""Cosine of the tilt up to which a solid is upright: 0.1 mm per meter."""
+"""Minimum cosine of the tilt of an upright solid, which leans by at most 0.14 mm per meter."""
 DECIMALS = 6
 """Number of decimals of lengths (m) and angles (rad) in the world file."""
 MAX_NAME_LENGTH = 120
-"""Number of characters to which names are cut. World files do not allow longer names."""
+"""Maximum number of characters of a name in a world file. Longer names are cut."""
 STRAIGHT_TOLERANCE_RAD = 1e-6
-"""Change of direction up to which a path is straight."""
+"""Maximum change of direction at a point where a path does not turn."""
 
 
 @dataclass(frozen=True)
 class PrismShape:
-    """Upright shape of a world file that begins `bottom` m above the ground and is `height` m tall.
+    """Upright shape of a world file. It begins `bottom` m above the ground and is `height` m tall.
 
-    Its base is either a `box` (lengths in m along x and y), a circle of `radius` m, or a `polygon` (corners in m in the
-    frame of `pose`).
+    Its base, in the frame of `pose`, is a `box` (side lengths in m along x and y), a circle of `radius` m, or a
+    `polygon` (corners in m).
     """
 
     pose: Pose2
@@ -69,13 +69,13 @@ class PrismShape:
 
 
 def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismShape]:
-    """Return the shapes that replace a solid, without any part below the ground.
+    """Return the shapes of a world file that represent a solid, without any part below the ground.
 
-    A solid without an equal shape in world files is replaced by prisms over its cross section at `height` m, or at half
-    its height if it does not reach `height`. A sentence about each difference is appended to `changes`.
+    If no such shape equals the solid, the result are prisms over its cross section at `height` m, or halfway up a solid
+    that does not reach `height`. A sentence about each difference is appended to `changes`.
     """
     exact = _exact_shape(solid)
-    shapes = [exact] if exact else list(_prisms(solid, height, changes))
+    shapes = [exact] if exact else list(_cross_section_prisms(solid, height, changes))
     above = [_above_ground(shape) for shape in shapes if shape.bottom + shape.height > 10**-DECIMALS]
     if shapes and not above:
         changes.append(f"{solid.name}: it is below the ground; it is left out")
@@ -87,12 +87,12 @@ def _is_valid(shape: PrismShape, name: str, changes: list[str]) -> bool:
     try:
         Obstacle.model_validate({"name": "shape", **shape.fields})
     except ValidationError as error:
-        changes.append(f"{name}: {_reason(error)}; it is left out")
+        changes.append(f"{name}: {_first_problem(error)}; it is left out")
         return False
     return True
 
 
-def _reason(error: ValidationError) -> str:
+def _first_problem(error: ValidationError) -> str:
     """Return the first problem of a validation, e.g. "its `box` is not valid: input should be greater than 0"."""
     problem = error.errors()[0]
     message = problem["msg"].removeprefix("Value error, ")
@@ -118,8 +118,8 @@ def _exact_shape(solid: Solid) -> PrismShape | None:
             return None
 
 
-def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismShape]:
-    """Yield prisms over the cross section of a solid, see `prism_shapes`; none if it is not closed or empty."""
+def _cross_section_prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismShape]:
+    """Yield prisms over the cross section of a solid (see `prism_shapes`); none if it is empty or not closed."""
     mesh = merge_solids([solid])
     kind = type(solid.shape).__name__.lower()
     kind = f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
@@ -135,7 +135,7 @@ def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismSh
     if not pieces:
         changes.append(f"{solid.name}: {kind} that is flat; it is left out")
         return
-    if not _is_prism(solid, sum(map(signed_area, pieces)) * (high - low)):
+    if not _equals_prisms(solid, sum(map(signed_area, pieces)) * (high - low)):
         prisms = "an upright prism" if len(pieces) == 1 else f"{len(pieces)} upright prisms"
         changes.append(f"{solid.name}: {kind}; replaced by {prisms} over its cross section at {section_height:.3g} m")
     for piece in pieces:
@@ -143,8 +143,8 @@ def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismSh
         yield PrismShape(Pose2(x, y), low, high - low, polygon=tuple((px - x, py - y) for px, py in piece))
 
 
-def _is_prism(solid: Solid, volume: float) -> bool:
-    """Return whether a solid equals prisms of this volume (m³): equal volume, and each face is level or upright."""
+def _equals_prisms(solid: Solid, volume: float) -> bool:
+    """Return whether prisms of this volume (m³) equal a solid: same volume, and all its faces are level or upright."""
     mesh = merge_solids([solid])
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     normals = np.cross(b - a, c - a)
@@ -165,7 +165,7 @@ def _rounded(values: Sequence[float]) -> list[float]:
 
 @dataclass
 class Conversion:
-    """Obstacles and objects of a world file, and a sentence in `changes` for each difference from the world."""
+    """Obstacles and objects for a world file. `changes` has a sentence for each difference from the imported world."""
 
     obstacles: list[Obstacle] = field(default_factory=list)
     objects: list[Movable] = field(default_factory=list)
@@ -189,7 +189,7 @@ class Conversion:
 def convert_world(world: World, height: float) -> Conversion:
     """Convert the solids of a world to obstacles, and its bodies to objects.
 
-    `height` is the height in m of the cross section of solids that are replaced by prisms (see `prism_shapes`). Solids
+    `height` in m is the height of the cross sections of solids that are replaced by prisms (see `prism_shapes`). Solids
     and bodies that cannot be converted are left out, with a sentence in `changes`.
     """
     conversion = Conversion()
@@ -203,10 +203,11 @@ def convert_world(world: World, height: float) -> Conversion:
 
 
 def _add_obstacle(fields: dict[str, object], conversion: Conversion) -> None:
+    """Add an obstacle with these `fields`, or a sentence in `changes` if they are not valid."""
     try:
         conversion.obstacles.append(Obstacle.model_validate(fields))
     except ValidationError as error:
-        conversion.changes.append(f"{fields['name']}: {_reason(error)}; it is left out")
+        conversion.changes.append(f"{fields['name']}: {_first_problem(error)}; it is left out")
 
 
 def _add_body(body: Body, height: float, conversion: Conversion) -> None:
@@ -228,7 +229,7 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
     try:
         conversion.objects.append(Movable.model_validate(fields))
     except ValidationError as error:
-        conversion.changes.append(f"{body.name}: {_reason(error)}; it is left out")
+        conversion.changes.append(f"{body.name}: {_first_problem(error)}; it is left out")
 
 
 def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
@@ -262,9 +263,9 @@ def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
 
 
 def _waypoints(path: MotionPath) -> list[list[float]]:
-    """Return the corners [x, y] of a path after its start, without the way back to the start of a loop.
+    """Return the corners [x, y] of a path without its first point and, for a loop, without its last point.
 
-    Empty for a path whose `ease` is not "linear" or whose duration is 0, because waypoints cannot describe it.
+    Returns [] if waypoints cannot describe the path, because its `ease` is not "linear" or its duration is 0.
     """
     points = [(round(pose.x, DECIMALS), round(pose.y, DECIMALS)) for pose in path.poses]
     turns = [b for a, b, c in zip(points, points[1:], points[2:], strict=False) if not _is_straight(a, b, c)]
@@ -281,7 +282,7 @@ def _is_straight(a: tuple[float, float], b: tuple[float, float], c: tuple[float,
 
 
 def _are_same_motion(converted: MotionPath, path: MotionPath, is_round: bool) -> bool:
-    """Return whether two paths have equal poses at all times of both. Headings of round objects are ignored."""
+    """Return whether two paths have equal durations and poses. Headings of round objects are ignored."""
     times = sorted({*converted.times, *path.times})
     pairs = [(pose_at(converted, t + path.start), pose_at(path, t + path.start)) for t in times]
     return math.isclose(converted.times[-1], path.times[-1], rel_tol=1e-6) and all(

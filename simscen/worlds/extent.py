@@ -43,14 +43,14 @@ def top_height(solid: Solid) -> float:
 
 
 def oversize_hint(world: World) -> str:
-    """Return a hint for a world whose map is too large: the model to move or remove, or else to move the goals."""
+    """Return a hint for a world whose map is too large: move the largest model, or else move start and goals."""
     if name := _largest_model(world):
         return f'"{name}" makes it large; move or remove it'
     return "move the start and the goals closer together"
 
 
 def _largest_model(world: World) -> str:
-    """Return the name of the model whose removal leaves the smallest area; "" if all models fit on a map.
+    """Return the name of the model whose removal shrinks the world most; "" if all models fit on a map.
 
     Floors do not count as models.
     """

@@ -37,7 +37,7 @@ def world_from_spec(
     """Return the world that `spec` specifies.
 
     name:   name of the world if `spec` has none
-    grid:   occupancy grid of the key `map`; it becomes walls with the height `map_height`, and is the robot's map
+    grid:   occupancy grid of the key `map`; becomes walls of the height `map_height`, and is also the robot's map
     base:   world of the key `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
     notes:  notes of the map's loader, appended to the notes of `base`
     """
@@ -48,10 +48,10 @@ def world_from_spec(
 
         solids += walls_from_map(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
-        solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.label(number))
-    solids += [_obstacle(obstacle) for obstacle in spec.obstacles]
-    solids += [_ramp(ramp) for ramp in spec.ramps]
-    bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))
+        solids += wall_solids(_wall_points(wall), wall.thickness, wall.height, wall.label(number))
+    solids += [_obstacle_solid(obstacle) for obstacle in spec.obstacles]
+    solids += [_solid_of_ramp(ramp) for ramp in spec.ramps]
+    bodies = (*base.bodies, *map(_object_body, spec.objects), *map(_door_body, spec.doors))
     places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
     regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
     return replace(
@@ -82,21 +82,21 @@ def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
     return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
 
 
-def _corners(wall: Wall) -> list[Point]:
+def _wall_points(wall: Wall) -> list[Point]:
     return [(x, y) for x, y in wall.points]
 
 
-def _obstacle(obstacle: Obstacle) -> Solid:
+def _obstacle_solid(obstacle: Obstacle) -> Solid:
     solid = obstacle.solid(obstacle.name)
     return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z), friction=obstacle.friction)
 
 
-def _ramp(ramp: Ramp) -> Solid:
+def _solid_of_ramp(ramp: Ramp) -> Solid:
     (ax, ay), (bx, by) = ramp.start, ramp.end
     return ramp_solid((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
 
 
-def _movable(thing: Movable) -> Body:
+def _object_body(thing: Movable) -> Body:
     pose, path = thing.pose.pose, None
     if thing.move is not None:
         path = thing.move.path(pose, thing.move.start)
@@ -104,7 +104,7 @@ def _movable(thing: Movable) -> Body:
     return Body(thing.name, (thing.solid(thing.name),), Pose3.planar(pose), thing.mass, path)
 
 
-def _door(door: Door) -> Body:
+def _door_body(door: Door) -> Body:
     (hinge_x, hinge_y), (post_x, post_y) = door.points
     closed, opened = _panel_poses(door)
     width = math.hypot(post_x - hinge_x, post_y - hinge_y)
@@ -170,7 +170,7 @@ def _direction(a: Point, b: Point) -> Point:
 
 
 def _runs_backward(start: Point, end: Point, direction: Point) -> bool:
-    """Return whether one side of a part of a wall runs against its direction, because its miters cross."""
+    """Return whether one side of a part of a wall points against `direction`, because its miters cross."""
     return (end[0] - start[0]) * direction[0] + (end[1] - start[1]) * direction[1] <= 0
 
 

@@ -16,7 +16,7 @@ Ring = list[Point]
 """Corners of a closed polygon; the first corner is not repeated at the end."""
 
 STRAIGHTNESS_TOLERANCE_M = 1e-6
-"""Distance from the line between its neighbors up to which a corner is removed from a ring."""
+"""A corner is removed from a ring if it is at most this far from the line between its neighbors."""
 MAX_CORNERS = 200
 """Maximum number of corners of a polygon in a world file."""
 
@@ -77,7 +77,7 @@ def horizontal_distance(
 ) -> float:
     """Return the horizontal distance in m from a point to the part of the mesh between two heights; 0 inside.
 
-    Returns inf if the mesh has no part between the heights `z_range`, and maybe for distances greater than `within` m.
+    Returns inf if the mesh has no part between the heights `z_range`. Distances above `within` m may be inf as well.
     """
     low, high = z_range
     bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
@@ -119,8 +119,8 @@ def winds_around(segments: Array, point: Point) -> bool:
 def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Clip triangles (m, 3, 3) to the slab between two heights.
 
-    Returns corners (m, 9, 2), seen from above, and the mask (m, 9) of valid corners. A clipped triangle is the convex
-    hull of its valid corners: those of the triangle in the slab, and the crossings of its edges with both heights.
+    Returns corners (m, 9, 2), seen from above, and the mask (m, 9) of valid corners. The valid corners are the corners
+    of the triangle in the slab, and the points where its edges cross the two heights. Their convex hull is the result.
     """
     z = triangles[:, :, 2]
     corners, valid = [triangles[:, :, :2]], [(z >= low) & (z <= high)]

@@ -1,7 +1,7 @@
-"""Find the obstacles of a robot that can drive on ramps and steps: the static solids without the drivable ground.
+"""Find the static solids that block a robot that can drive on ramps and over steps.
 
-Edges and steep slopes of the ground are obstacles as well. An edge is an upright face of the ground, seen from above as
-a line.
+Solids that the robot can drive on are called ground. They do not block it, but their edges and steep slopes do. An edge
+is an upright face of the ground, which is a line when seen from above.
 """
 
 import math
@@ -25,7 +25,7 @@ SAMPLE_OFFSET_M = 0.01
 WALL_THICKNESS_M = 0.01
 """Thickness of the walls and prisms that replace edges and steep slopes."""
 MAX_WALL_NORMAL_Z = 0.5
-"""Vertical component of the unit normal up to which a face is upright (steeper than 60°). Others are slopes."""
+"""Maximum vertical component of the unit normal of an upright face (steeper than 60°). Other faces are slopes."""
 _PRISM_FACES = np.array(
     [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]], dtype=np.int32
 )
@@ -37,9 +37,9 @@ def drive_obstacles(
 ) -> tuple[Solid, ...]:
     """Return the solids that block a robot. If no solid is drivable ground, returns `solids` itself.
 
-    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid is ground if it has an upward
-    face at most `wheel_radius` m above the floor or above other ground. Edges and steep slopes of the ground are
-    returned as thin solids.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid is ground if it is convex or a
+    height field, and has an upward face at most `wheel_radius` m above the floor or above other ground. Edges and steep
+    slopes of the ground are returned as thin solids.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
@@ -59,7 +59,7 @@ def _is_convex_or_height_field(mesh: TriangleMesh, owner: int) -> bool:
 
 
 def _steep_faces(mesh: TriangleMesh, ground: SolidIndices, max_slope: float) -> Iterator[Solid]:
-    """Yield a prism below each face of a slope of the ground that is steeper than `max_slope` rad."""
+    """Yield a prism below each sloping face of the ground that is steeper than `max_slope` rad."""
     normal_z = face_normals(mesh)[:, 2]
     is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
     for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():

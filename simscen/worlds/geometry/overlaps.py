@@ -36,7 +36,7 @@ def first_solid_in_disc(
 def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
     """Return the horizontal distance in m to the part of a solid between two heights; 0 inside.
 
-    Returns inf without such a part, and maybe for distances greater than `within` m.
+    Returns inf without such a part. Distances above `within` m may be inf as well.
     """
     prism = upright_prism(solid)
     if prism is not None:

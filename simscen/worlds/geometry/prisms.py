@@ -57,7 +57,7 @@ def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | No
             base: Polygon = ((-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, y / 2), (-x / 2, y / 2))
             bottom, top = -height / 2, height / 2
         case Cylinder(radius, height):
-            base, bottom, top = _circle(radius), -height / 2, height / 2
+            base, bottom, top = _circle_polygon(radius), -height / 2, height / 2
         case Extrusion(polygon, height):
             base, bottom, top = polygon, 0.0, height
         case _:
@@ -68,7 +68,7 @@ def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | No
     return UprightPrism(base, bottom, top) if base else None
 
 
-def _circle(radius: float) -> Polygon:
+def _circle_polygon(radius: float) -> Polygon:
     count = facet_count(radius)
     angles = [2 * math.pi * k / count for k in range(count)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)

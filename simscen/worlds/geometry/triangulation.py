@@ -1,4 +1,4 @@
-"""Triangulate shapes: closed surfaces with outward normals, always in the same order of vertices and faces."""
+"""Convert shapes to triangle meshes: closed surfaces with outward normals and a fixed order of vertices and faces."""
 
 import math
 from collections.abc import Iterable
@@ -29,7 +29,6 @@ Faces = npt.NDArray[np.int32]
 """Triangles (n, 3) as indices of vertices."""
 Profile = list[tuple[float, float]]
 """Points (distance from the z axis, height) in m, from the bottom up."""
-
 
 _BOX_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
 _BOX_FACES = np.array(
@@ -75,7 +74,7 @@ def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:
 
 
 def _is_convex_by_kind(shape: Shape) -> bool:
-    """Return whether a shape is convex, judged without its triangles; always False for meshes."""
+    """Return whether a shape is convex, judged by its type or base. False for all meshes, which are not examined."""
     match shape:
         case Mesh():
             return False
@@ -125,7 +124,7 @@ def _capsule(radius: float, length: float) -> Mesh:
 
 
 def _arc(angles: Array, radius: float, z: float) -> Profile:
-    """Return the points of an arc in the x-z plane. Poles lie exactly on the axis, so that `_revolve` closes there."""
+    """Return the points of an arc in the x-z plane. Poles are exactly on the z axis, so that `_revolve` closes them."""
     is_pole = np.abs(np.abs(angles) - math.pi / 2) < 1e-12
     distances = np.where(is_pole, 0.0, radius * np.cos(angles))
     return list(zip(distances.tolist(), (z + radius * np.sin(angles)).tolist(), strict=True))
