@@ -1,4 +1,4 @@
-"""Build the simulation, robots, sensors, stacks, and faults of a run."""
+"""Composition root of a run: builds the simulation, robots, sensors, stacks, and faults from the scenario."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -80,8 +80,8 @@ def _directors(
 ) -> Iterator[Director]:
     """Yield the directors of a run. A director starts events and faults.
 
-    A single robot has one director. With several robots, one director starts all events on the stage of the first
-    robot, and each robot has another director for its faults.
+    A run with a single robot has one director. With several robots, one director starts the events of the scenario,
+    and each robot has another director for its faults.
     """
     spec = prepared.spec
     first, *_ = robots.values()
@@ -106,7 +106,7 @@ def _build_robot(
 ) -> RobotUnderTest:
     """Build one robot with its sensors and its stack.
 
-    The robot's stage (its view of the world) adds itself to `stages`, the stages of all robots by name.
+    Adds its stage, the interface of triggers and actions to the robot, to `stages` under the name of the robot.
     """
     spec, robot = prepared.spec, simulation.robots[name]
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
@@ -145,7 +145,10 @@ def _build_robot(
         end_condition=EndCondition(clock, spec.time_limit, spec.linger, is_idle=bool(name) and not prepared.case.goals),
         schedule=TickSchedule(
             (truth_period, control_period, *suite.periods),
-            (*suite.arrivals, *((control_period, latency) for latency in command_latencies(prepared, clock))),
+            (
+                *suite.periods_and_latencies,
+                *((control_period, latency) for latency in command_latencies(prepared, clock)),
+            ),
         ),
         truth_period=truth_period,
     )

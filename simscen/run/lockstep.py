@@ -4,7 +4,7 @@ A tick is one physics step. A beat is a tick at which a sensor, a stack, or a sa
 of the loop processes one beat:
 
 1. observe: sample the true states, and collect new collisions
-2. direct: start the events and faults whose triggers fire
+2. direct: start and end events and faults
 3. decide: read the sensors, apply faults, and request a command from each stack
 4. record: append the beat to the logs
 5. drive: send the commands to the wheels, and simulate until the next beat
@@ -32,9 +32,9 @@ TIME_LIMIT = "time limit"
 
 
 class EndCondition:
-    """Condition under which one robot is done: `linger` seconds after its navigation task, or at the time limit.
+    """Condition under which one robot is done: `linger` seconds after its task has ended, or at the time limit.
 
-    A new goal during these `linger` seconds cancels the end. The run ends when all robots are done.
+    The robot continues if it accepts a new goal during these `linger` seconds. The run ends when all robots are done.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, is_idle: bool = False) -> None:
@@ -42,7 +42,7 @@ class EndCondition:
         self.time_limit_tick = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
         self._end_tick: int | None = 0 if is_idle else None
-        self.earliest_tick = self._earliest()
+        self.earliest_tick = self._compute_earliest_tick()
         """Earliest tick at which the robot can be done."""
 
     def update(self, decision: Decision) -> None:
@@ -52,9 +52,9 @@ class EndCondition:
                 self._end_tick = event.tick + self._linger
             elif event.kind == EventKind.GOAL_ACCEPTED:
                 self._end_tick = None
-        self.earliest_tick = self._earliest()
+        self.earliest_tick = self._compute_earliest_tick()
 
-    def _earliest(self) -> int:
+    def _compute_earliest_tick(self) -> int:
         return self.time_limit_tick if self._end_tick is None else min(self._end_tick, self.time_limit_tick)
 
     def end_event(self, tick: int) -> Event | None:
@@ -69,7 +69,7 @@ class EndCondition:
 def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
     """Return the event that ends the run at `tick`, or None if a robot is not done yet.
 
-    If any robot is done because of the time limit, returns the event of the time limit.
+    It is the event TIME_LIMIT if the time limit ended the drive of any robot.
     """
     run_end: Event | None = None
     for condition in conditions:
@@ -92,10 +92,10 @@ class RobotUnderTest:
     stack: Stack
     faults: FaultInjector
     stage: LiveStage
-    """View of the world for triggers and actions, from the point of view of this robot."""
+    """Interface of triggers and actions to the world and to this robot."""
     end_condition: EndCondition
     schedule: TickSchedule
-    """Ticks of this robot's beats."""
+    """Computes the ticks of this robot's beats."""
     truth_period: int
     """Ticks between two samples of the true state."""
     logs: tuple[MomentSink, ...] = ()
@@ -108,7 +108,7 @@ class RobotUnderTest:
     _truth: Truth | DeferredTruth | None = field(default=None, init=False)
 
     def observe(self, tick: int) -> None:
-        """Sample the true state if a sample is due, and record new collisions."""
+        """Set `is_due`, sample the true state if a sample is due, and record new collisions."""
         self.is_due = tick == self.next_tick
         if self.is_due:
             self.next_tick = tick + self.schedule.until_next(tick)
@@ -124,7 +124,7 @@ class RobotUnderTest:
             self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
-        """Deliver orders of events (such as a new goal), read sensors, apply faults, and get the stack's command."""
+        """Send the stack the new goals of events, read the sensors, apply faults, and get the stack's command."""
         stage, faults = self.stage, self.faults
         if stage.pending_orders:
             stage.deliver_orders(tick)
@@ -158,7 +158,7 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
-    """Directors that start the events and faults whose triggers fire."""
+    """Directors, which start and end events and faults."""
     truth_period: int
     """Ticks between two samples of the true state."""
 

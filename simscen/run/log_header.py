@@ -1,4 +1,4 @@
-"""Build the header of a run's log from the prepared scenario."""
+"""Build the header of a run's log: facts, map, robot description, sensors, and the scenery that viewers show."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -34,18 +34,19 @@ from simscen.sim.body.outline import convex_hull, footprint, outlines_in_z_range
 from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
-_CACHE: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
+_HEADERS: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
 
 
 def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
-    """Return the log header of a run. Builds the header once for all runs of a scenario."""
-    header = _CACHE.get(prepared)
+    """Return the log header of a run. Builds it only once for all runs of a scenario."""
+    header = _HEADERS.get(prepared)
     if header is None:
-        header = _CACHE[prepared] = _build_header(prepared)
+        header = _HEADERS[prepared] = _build_header(prepared)
     return replace(header, seed=seed, robots={name: replace(part, seed=seed) for name, part in header.robots.items()})
 
 
 def _build_header(prepared: PreparedScenario) -> LogHeader:
+    """Return the header with the scenery and, with several robots, the header of each robot."""
     robots = {name: _robot_header(part) for name, part in prepared.robots.items()}
     return replace(
         _robot_header(prepared), files={SCENERY_FILE: scenery_to_json(world_scenery(prepared))}, robots=robots
@@ -67,7 +68,7 @@ def _robot_header(prepared: PreparedScenario) -> LogHeader:
 
 
 def _run_facts(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the stack from the command line, its name, and the name of the variation, without empty values."""
+    """Return the stack from the command line, its name, and the name of the variation, if there are any."""
     loaded = prepared.loaded
     facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
     return {name: value for name, value in facts.items() if value}

@@ -1,4 +1,4 @@
-"""Prepare a scenario: build everything that its runs share, such as world, map, goals, and shortest paths."""
+"""Prepare a scenario for its runs: build what does not depend on the seed, such as world, map, and shortest paths."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,7 +45,7 @@ from simscen.worlds.routes.shortest_paths import Leg, legs_between
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Height of the map of the world for a robot without a lidar."""
+"""Height above the ground at which the map of the world is made for a robot without a lidar."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,8 @@ class PreparedScenario:
     """A scenario with its world, map, and robots: everything about a run except the seed.
 
     The stack receives `map` (None: no map), `masks`, and `estimate` (the initial pose estimate). `start` is the true
-    initial pose. With several robots, `robots` has a PreparedScenario for each robot by name, and all other fields
-    about a robot are those of the first robot.
+    initial pose. `case` has the facts that criteria need besides the log. With several robots, `robots` has a
+    PreparedScenario for each robot by name, and the other fields describe the first robot.
     """
 
     loaded: LoadedScenario
@@ -87,20 +87,20 @@ class PreparedScenario:
 
 
 BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
-"""Function that builds the world of a scenario, with the map at a lidar height in m."""
+"""Function that builds the world of a scenario, and its map as seen by a lidar at a height in m."""
 
 FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
 """Function that returns the shortest path from each pose to its goal, for a disc with a radius in m."""
 
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
-    """Build the world of a scenario, with the map at a lidar height of `height` m, without a cache."""
+    """Build the world of a scenario, and its map as seen by a lidar at `height` m, without a cache."""
     world = with_stops_in_bounds(load_world(loaded), loaded)
     return build_world_and_map(world, height, map_resolution(loaded, world))
 
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
-    """Return the resolution in m of the world's map. In a large world, it is coarser if no robot uses the map."""
+    """Return the cell size in m of the world's map. Cells are larger in a large world whose map no robot uses."""
     is_used = any(view.map is None for view in loaded.robot_views.values())
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
@@ -168,7 +168,7 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
 
 
 def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
-    """Return the case with the shortest paths to its goals, and with the narrow passages on these paths.
+    """Return the case with the lengths of the shortest paths to its goals, and the narrow passages on these paths.
 
     The path to a goal starts at the previous goal that the robot is expected to reach, or at the initial pose.
     """
@@ -206,7 +206,7 @@ def lidar_height(robot: RobotSpec) -> float:
 
 
 def effective_stack(spec: ScenarioSpec) -> AnyStack:
-    """Return the stack of a scenario. Without a map, it uses dead reckoning instead of the default localizer AMCL."""
+    """Return the stack of a scenario. Without a map, dead reckoning replaces the default localizer AMCL."""
     stack = spec.stack
     if not isinstance(stack, StackSpec):
         return stack
@@ -217,9 +217,9 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
 
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
-    """Return the case (facts that criteria need besides the log) for a criteria file. Raises InvalidInput.
+    """Return the case (facts that criteria need besides the log) of a criteria file. Raises InvalidInput.
 
-    If the file names no robot, the case has no footprint.
+    The case has no footprint if the file names no robot.
     """
     loaded_world, loaded_robot = criteria.load_world_and_robot()
     root = criteria.library.sandbox.root

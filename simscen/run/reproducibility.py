@@ -1,4 +1,7 @@
-"""Compute digests of everything on which the result of a run depends: files, software, plug-ins, and processor."""
+"""Digests of everything on which the result of a run depends: files, software, plug-ins, and processor.
+
+They show whether an earlier result can be reused, and whether two results can be compared.
+"""
 
 import hashlib
 import importlib
@@ -48,7 +51,7 @@ def cpu_flags() -> list[str]:
 def arithmetic_fingerprints() -> dict[str, str]:
     """Return digests of sample results of OpenBLAS, the C math library, and NumPy, and the CPU features of NumPy.
 
-    The digests show differences in the last bits, because these libraries choose processor instructions at run time.
+    These libraries choose processor instructions at run time, so that results can differ in the last bits.
     """
     import numpy as np
 
@@ -63,7 +66,11 @@ def arithmetic_fingerprints() -> dict[str, str]:
         np.outer(array, array) @ array,
     ]
     square = np.sin(np.arange(8100.0)).reshape(90, 90) + 90 * np.eye(90)
-    blas = [function(square[:k, :k]) for k in (3, 16, 90) for function in (_squared, np.linalg.inv, np.linalg.cholesky)]
+    blas = [
+        function(square[:k, :k])
+        for k in (3, 16, 90)
+        for function in (_times_transpose, np.linalg.inv, np.linalg.cholesky)
+    ]
     return {
         "blas": hashlib.sha256(b"".join(part.tobytes() for part in blas)).hexdigest()[:16],
         "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
@@ -72,7 +79,8 @@ def arithmetic_fingerprints() -> dict[str, str]:
     }
 
 
-def _squared(matrix: Array) -> Array:
+def _times_transpose(matrix: Array) -> Array:
+    """Return matrix · matrixᵀ."""
     product: Array = matrix @ matrix.T
     return product
 
@@ -116,14 +124,14 @@ def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
 def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
     """Return the package, its version, the class, and the digest of all files of each plug-in, by "GROUP NAME"."""
     return {
-        f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
+        f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _package_digest(entry.value)]
         for entry in plugins
     }
 
 
-def _files_digest(value: str) -> str:
-    """Return the SHA-256 of the files of the top-level package that contains the class `value` ("module:Class")."""
-    stats = ((name, file, file.stat()) for name, file in _files(value))
+def _package_digest(class_path: str) -> str:
+    """Return the SHA-256 of the files of the top-level package that contains a class ("module:Class")."""
+    stats = ((name, file, file.stat()) for name, file in _package_files(class_path))
     return _digest_of_files(tuple((name, file, stat.st_mtime_ns, stat.st_size) for name, file, stat in stats))
 
 
@@ -138,12 +146,12 @@ def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
 
 def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
     """Return the files of the top-level packages that contain the plug-ins."""
-    return [file for entry in plugins for _, file in _files(entry.value)]
+    return [file for entry in plugins for _, file in _package_files(entry.value)]
 
 
-def _files(value: str) -> Iterator[tuple[str, Path]]:
-    """Yield name and path of each file of the top-level package that contains the class `value` ("module:Class")."""
-    found = importlib.util.find_spec(value.partition(":")[0])
+def _package_files(class_path: str) -> Iterator[tuple[str, Path]]:
+    """Yield name and path of each file of the top-level package that contains a class ("module:Class")."""
+    found = importlib.util.find_spec(class_path.partition(":")[0])
     if found is None or found.origin is None:
         return
     file = Path(found.origin)
@@ -162,8 +170,8 @@ class ScenarioDigests(NamedTuple):
     """SHA-256 digests of a scenario.
 
     Attributes:
-        run: Digest of all files, options, versions, and processor features that affect a run, except the seed. An old
-            result is reused only if this digest is equal.
+        run: Digest of all files, options, versions, and processor features that affect a run, except the seed. A result
+            is reused only if this digest is equal.
         definition: Digest of the world, robots, maps, and meshes, and of the scenario without the parameters of its
             stacks. Results of two stacks are compared only if this digest is equal.
     """
@@ -194,16 +202,17 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
 
 def _definition(loaded: LoadedScenario) -> dict[str, Any]:
     """Return the scenario without the parameters of its stacks."""
-    plain = _without_stack(loaded.tree.plain)
+    plain = _without_stack_parameters(loaded.tree.plain)
     if isinstance(robots := plain.get("robots"), Mapping):
         plain["robots"] = {
-            name: _without_stack(robot) if isinstance(robot, Mapping) else robot for name, robot in robots.items()
+            name: _without_stack_parameters(robot) if isinstance(robot, Mapping) else robot
+            for name, robot in robots.items()
         }
     return plain
 
 
-def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario or robot with only the parameters of its stack that all types of stacks have."""
+def _without_stack_parameters(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario or robot without the parameters of its stack, except those that all types of stacks have."""
     stack = entry.get("stack")
     keys = StackBase.model_fields.keys() - {"controller_frequency"}
     common = {key: stack[key] for key in sorted(keys) if key in stack} if isinstance(stack, Mapping) else {}
@@ -211,7 +220,7 @@ def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 DEFINING_SUFFIXES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
-"""Suffixes of text files that are part of the digest `definition`: worlds and robots."""
+"""Suffixes of the text files (worlds and robots) that are part of the digest `definition`."""
 
 
 def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
@@ -225,16 +234,16 @@ def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
         "lenient": loaded.lenient,
         "plugins": plugin_fingerprints(plugins_of(loaded)),
         **({"scenario": loaded.tree.plain} if loaded.variation else {}),
-        **_stacks(loaded),
+        **_chosen_stacks(loaded),
     }
 
 
-def _stacks(loaded: LoadedScenario) -> dict[str, object]:
-    """Return the stack of each robot if it was chosen on the command line or in the user's configuration."""
+def _chosen_stacks(loaded: LoadedScenario) -> dict[str, object]:
+    """Return the stack of each robot whose stack was chosen on the command line or in the user's configuration."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.external_command is None else {"runs": loaded.external_command.digest}),
-        **({"robots": {name: _stacks(view) for name, view in loaded.robots.items()}} if loaded.robots else {}),
+        **({"robots": {name: _chosen_stacks(view) for name, view in loaded.robots.items()}} if loaded.robots else {}),
     }
 
 
@@ -249,7 +258,7 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
 
 
 def _portable_name(file: Path, loaded: LoadedScenario) -> str:
-    """Return the path of a file relative to the scenario's root folder, or the absolute path outside of it."""
+    """Return the path of a file relative to the scenario's root folder; the absolute path of a file outside of it."""
     return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
@@ -265,7 +274,10 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
     """
     choice = loaded.choice
     programs = [
-        part for view in loaded.robot_views.values() if view.external_command is not None for part in _program(view)
+        part
+        for view in loaded.robot_views.values()
+        if view.external_command is not None
+        for part in _files_in_command(view)
     ]
     return {
         loaded.file,
@@ -279,7 +291,7 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
     }
 
 
-def _program(loaded: LoadedScenario) -> list[Path]:
+def _files_in_command(loaded: LoadedScenario) -> list[Path]:
     """Return the files among the arguments of an external stack's command."""
     assert loaded.external_command is not None
     paths = [Path(loaded.external_command.cwd, argument) for argument in loaded.external_command.argv]

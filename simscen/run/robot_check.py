@@ -1,4 +1,4 @@
-"""Drive a robot in an empty world, and check that it follows its commands and that its odometry is correct."""
+"""Check of a robot file: drive the robot in an empty world, and compare commands, odometry, and true motion."""
 
 import math
 from collections.abc import Iterator
@@ -23,11 +23,11 @@ REST_TICKS, SETTLING_TICKS = 240, 60
 LINE_LENGTH_M, SQUARE_SIDE_M = 2.0, 1.0
 """Lengths of the straight line and of a side of the square."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.5, 1.0
-"""Largest linear and angular speeds of the trials."""
+"""Upper limits of the linear and angular speeds of the trials."""
 SPEED_FRACTION, ACCELERATION_FRACTION = 0.8, 0.5
-"""Largest speed and acceleration of the trials, divided by the robot's limits."""
+"""Largest speed and acceleration of the trials, as fractions of the robot's limits."""
 CIRCLE_RADIUS_FACTOR = 1.05
-"""Radius of the circle that an Ackermann robot drives, divided by its smallest turning radius."""
+"""Radius of the circle that an Ackermann robot drives, in multiples of its smallest turning radius."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class RestingState:
 
 
 @dataclass(frozen=True)
-class _Leg:
-    """A motion from rest to rest: forward (m), left (m), and turn (rad, counterclockwise) at the same time."""
+class _TrialLeg:
+    """Part of a trial from rest to rest: forward (m), left (m), and turn (rad, counterclockwise) at the same time."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -77,7 +77,9 @@ class _Leg:
 
 
 def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
-    """Drive a line, a turn in place (an Ackermann robot: a circle), a square, and a holonomic robot also sideways.
+    """Drive a line, a turn in place, and a square; return the resting state before, and all trials.
+
+    An Ackermann robot drives a circle instead of the turn. A holonomic robot also drives sideways.
 
     Raises RunError if the simulation becomes unstable.
     """
@@ -89,18 +91,18 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
         simulation.close()
 
 
-def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
+def _trials(body: RobotBody) -> dict[str, list[_TrialLeg]]:
     """Return the legs of each trial by its name."""
     radius = 0.0
     if isinstance(body.drive, Ackermann):
         radius = CIRCLE_RADIUS_FACTOR * body.drive.wheel_base / math.tan(body.drive.max_steering)
-    circle, corner = (_Leg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))
+    circle, corner = (_TrialLeg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))
     trials = {
-        "line": [_Leg(LINE_LENGTH_M)],
+        "line": [_TrialLeg(LINE_LENGTH_M)],
         "circle" if radius else "turn": [circle],
-        "square": [_Leg(SQUARE_SIDE_M), corner] * 4,
+        "square": [_TrialLeg(SQUARE_SIDE_M), corner] * 4,
     }
-    return trials | ({"sideways": [_Leg(0.0, LINE_LENGTH_M)]} if robot_model(body).holonomic else {})
+    return trials | ({"sideways": [_TrialLeg(0.0, LINE_LENGTH_M)]} if robot_model(body).holonomic else {})
 
 
 def _rest(simulation: SingleRobotSimulation) -> RestingState:
@@ -110,7 +112,7 @@ def _rest(simulation: SingleRobotSimulation) -> RestingState:
     return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
-def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
+def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
     simulation.place_robot(Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING_TICKS)
     motion, level = kinematics_of(body.drive), simulation.base_pose()
@@ -131,7 +133,7 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
     return Trial(name, commanded.motion, odometry.motion, truth.motion, max_tilt)
 
 
-def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
+def _commands(leg: _TrialLeg, body: RobotBody) -> Iterator[Twist]:
     """Yield a trapezoidal velocity profile for a leg, then a stop."""
     model = robot_model(body)
     linear_acceleration = min(model.linear_acceleration, model.linear_deceleration)
@@ -193,7 +195,7 @@ MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
 """Largest heading at the end of the line, and largest tilt of the base while driving."""
 NEGLIGIBLE_CORRECTION = 0.005
-"""Largest relative deviation of a dimension that needs no correction."""
+"""Relative deviation of the track width up to which no correction is advised."""
 
 
 class TurnLimits(NamedTuple):
@@ -219,7 +221,7 @@ SKID_STEER_LIMITS = TurnLimits(angle=0.10, odometry=0.03, square_end=0.04, offse
 
 @dataclass(frozen=True)
 class DriveCheck:
-    """A measured value and its upper limit, both in `unit`. `advice` is a possible correction, or ""."""
+    """A measured value and its upper limit, both in `unit`. `advice` is a possible correction of the robot, or ""."""
 
     name: str
     value: float
@@ -235,7 +237,7 @@ class DriveCheck:
 
 @dataclass(frozen=True)
 class RobotCheckResult:
-    """Results of all checks of a robot."""
+    """Results of all checks of a robot. `climb` has the steepest slope and the highest step that it can climb."""
 
     rest: RestingState
     trials: tuple[Trial, ...]

@@ -19,7 +19,7 @@ from simscen.stack.protocols import RobotModel
 
 
 def robot_model(body: RobotBody) -> RobotModel:
-    """Return the robot model that a stack receives."""
+    """Return the robot model (footprint and limits) that a stack receives."""
     limits, drive = body.limits, body.drive
     holonomic = isinstance(drive, Holonomic)
     return RobotModel(
@@ -53,7 +53,7 @@ StackT = TypeVar("StackT", bound=StackBase)
 
 
 def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
-    """Return the stack. If it has `latency: robot`, it gets the latencies in the robot's specification."""
+    """Return the stack; if it has `latency: robot`, with the latencies of the robot's specification."""
     if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(
@@ -73,7 +73,7 @@ def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, i
 
 
 def command_latencies(prepared: PreparedScenario, clock: Clock) -> Iterator[int]:
-    """Yield the delays in ticks from a control step to its commands; yields nothing for a stack without latencies."""
+    """Yield the delays in ticks from a control step to its commands, if the stack has latencies."""
     stack = with_robot_latency(prepared.stack, prepared.robot)
     if isinstance(stack, StackSpec) and isinstance(stack.latency, Latency):
         yield clock.ticks(stack.latency.controller)
@@ -102,7 +102,7 @@ class SensorSuite:
         return tuple(sensor.period for sensor in self._sensors)
 
     @property
-    def arrivals(self) -> tuple[tuple[int, int], ...]:
+    def periods_and_latencies(self) -> tuple[tuple[int, int], ...]:
         """Period and latency in ticks of each sensor that has a latency."""
         pairs = zip(self.periods, self._latencies, strict=True)
         return tuple((period, latency) for period, latency in pairs if latency)
@@ -121,10 +121,10 @@ class SensorSuite:
 
 
 class TickSchedule:
-    """Due ticks: all multiples of some periods, and ticks at a fixed delay after each multiple of some periods."""
+    """Ticks at which a robot must act: multiples of some periods, and ticks at a fixed delay after such a multiple."""
 
     def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
-        """`delayed` are pairs (period, delay after each multiple of the period). All numbers are in ticks."""
+        """`delayed` are pairs (period, delay after each multiple of this period). All numbers are in ticks."""
         offsets = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
         first, *others = sorted(
             offset for offset in offsets if not any(_is_covered_by(offset, other) for other in offsets)
@@ -132,7 +132,7 @@ class TickSchedule:
         (self._period, self._offset), self._others = first, others
 
     def until_next(self, tick: int) -> int:
-        """Return the number of ticks from `tick` to the next due tick; at least 1."""
+        """Return the number of ticks from `tick` to the next tick of the schedule; at least 1."""
         remaining = self._period - (tick - self._offset) % self._period
         if self._others:  # most robots have a single period left
             return min(remaining, *[period - (tick - ticks) % period for period, ticks in self._others])
@@ -140,6 +140,6 @@ class TickSchedule:
 
 
 def _is_covered_by(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Return whether `other` includes all ticks of `one` and differs from it; both are (period, offset) in ticks."""
+    """Return whether all ticks of `one` belong to the different `other`; both are (period, offset) in ticks."""
     (period, offset), (other_period, other_offset) = one, other
     return one != other and period % other_period == 0 and offset % other_period == other_offset

@@ -37,7 +37,7 @@ CACHE_DIR_VARIABLE, CACHE_OFF = "SIMSCEN_CACHE_DIR", "off"
 CACHE_FORMAT = "worlds-1"
 """Name of the subfolder for entries. Change it when the format of entries changes."""
 MAX_CACHE_BYTES = 256_000_000
-"""Size limit of the disk cache. The least recently used entries are deleted first."""
+"""Size limit of the disk cache. Above it, the least recently used entries are deleted."""
 MAX_ENTRY_BYTES = 32_000_000
 """Size limit of one entry; a larger entry is not stored."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
@@ -57,7 +57,7 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """Cache with one file for each entry, named like its key. Concurrent sessions can share the folder.
+    """Cache with one file for each entry, whose name is the key. Concurrent sessions can share the folder.
 
     Without a `folder`, the cache is disabled. `max_bytes` limits the total size of all entries.
     """
@@ -156,7 +156,7 @@ _LEGS = TypeAdapter(list[Leg])
 _MAP_HEADER = struct.Struct("<II4d")
 """Rows, columns, resolution (m), and origin (x, y, yaw) of a map. The cells follow."""
 _CODE_PARTS = ("core", "grid_graph.py", "worlds")
-"""Subpackages and modules of simscen that affect the cached results."""
+"""Subpackages and modules of simscen whose code affects the cached results."""
 
 
 class CachedWorldBuilder:
@@ -166,13 +166,13 @@ class CachedWorldBuilder:
         self._cache = cache
 
     def build(self, world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
-        """Return the world with its mesh and its map. `lidar_height` (height of the map) and `resolution` are in m."""
+        """Return the world with its mesh, and its map as seen by a lidar at `lidar_height` m. `resolution` is in m."""
         if not self._cache.is_enabled:
             return build_world_and_map(world, lidar_height, resolution)
         mesh = merge_solids(world.solids)
         places = [tuple(pose) for pose in world.places.values()]
         grid = world.grid and (world.grid.cells, world.grid.resolution, world.grid.origin)
-        key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, resolution)
+        key = cache_key("map", _vertices_and_faces(mesh), world.bounds, places, grid, lidar_height, resolution)
         cached = _map_from_bytes(self._cache.get(key))
         if cached is None:
             cached = draw_map(world, mesh, lidar_height, resolution)
@@ -185,7 +185,9 @@ class CachedWorldBuilder:
             return legs_between(built, ends, radius)
         goals = [(start, goal.name, goal.pose) for start, goal in ends]
         map_frame = built.world.bounds, built.map.shape, built.map.resolution, built.map.origin
-        key = cache_key("legs", _surface(built.mesh), built.mesh.owners, built.mesh.names, map_frame, goals, radius)
+        key = cache_key(
+            "legs", _vertices_and_faces(built.mesh), built.mesh.owners, built.mesh.names, map_frame, goals, radius
+        )
         cached = _legs_from_bytes(self._cache.get(key), len(ends))
         if cached is None:
             cached = legs_between(built, ends, radius)
@@ -221,7 +223,7 @@ def _update_hash(sha: "hashlib._Hash", part: object) -> None:
         sha.update(f"{part!r}\0".encode())
 
 
-def _surface(mesh: TriangleMesh) -> tuple[object, object]:
+def _vertices_and_faces(mesh: TriangleMesh) -> tuple[object, object]:
     return mesh.vertices, mesh.faces
 
 
@@ -252,7 +254,7 @@ MAX_SCENARIOS = 100
 
 
 class ScenarioCache:
-    """Prepared scenarios and built worlds in memory. Forked worker processes inherit them."""
+    """Cache of prepared scenarios and built worlds in memory, which forked worker processes inherit."""
 
     def __init__(self, builder: CachedWorldBuilder) -> None:
         self._builder = builder
@@ -267,7 +269,7 @@ class ScenarioCache:
         if cached is None or cached.loaded != loaded:
             if cached is None and len(self._scenarios) == MAX_SCENARIOS:
                 del self._scenarios[next(iter(self._scenarios))]
-            cached = self._scenarios[name] = prepare(loaded, self._world, self._builder.legs)
+            cached = self._scenarios[name] = prepare(loaded, self._build_world, self._builder.legs)
         return cached
 
     def clear(self) -> None:
@@ -276,7 +278,8 @@ class ScenarioCache:
         self._built.clear()
         self._scenarios.clear()
 
-    def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
+    def _build_world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
+        """Return the world of a scenario with the map at `height` m, from memory if possible."""
         digest = hashlib.sha256(pickle.dumps(replace(loaded.world, tree=None))).hexdigest()
         if digest not in self._worlds:
             self._worlds[digest] = load_world(loaded)

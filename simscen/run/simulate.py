@@ -1,4 +1,4 @@
-"""Simulate a prepared scenario in lockstep, record the run, judge it, and write its files."""
+"""Execute one run: simulate a prepared scenario in lockstep, record and judge the run, and write its files."""
 
 import gc
 import hashlib
@@ -29,7 +29,7 @@ from simscen.run.preparation import PreparedScenario
 from simscen.spec.registry import Entry
 
 AttachLogs = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
-"""Function that receives the setup of a run and the logs of its first robot; returns additional logs for this robot."""
+"""Function that takes the setup of a run and the logs of its first robot, and returns more logs for this robot."""
 
 
 def simulate(
@@ -95,7 +95,7 @@ def _run_and_judge(
         run = judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
             recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
-    return _with_stacks(run, {name: stack.description for name, stack in externals.items()})
+    return _with_stack_descriptions(run, {name: stack.description for name, stack in externals.items()})
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
@@ -115,8 +115,8 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
     }
 
 
-def _with_stacks(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
-    """Return the run with the descriptions of its external stacks; `descriptions` has them by robot name."""
+def _with_stack_descriptions(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
+    """Return the run with the descriptions of its external stacks, which are given by robot name."""
     robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
     return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
 
@@ -170,7 +170,7 @@ def _plugin_of_module(module: str, plugins: Sequence[Entry]) -> Entry:
 
 
 GC_THRESHOLD = 20_000
-"""First threshold of Python's garbage collection in a worker process; a larger threshold saves time."""
+"""Number of new objects after which Python collects garbage in a worker process; large, to save time."""
 
 WriteExtras = Callable[[PreparedScenario, Run, Path], None]
 """Function that writes additional files of a run to a folder, for example a picture."""
@@ -183,7 +183,7 @@ def execute_run(
 
     The files are run.mcap, result.json, scenario.yaml, and for an external stack stack.log and stack.json (with several
     robots stack.ROBOT.log and stack.ROBOT.json). `write_extras` writes more files. The moments (recorded beats) of the
-    first robot are also sent to `logs`. Returns the `outcome`, and `sha256`, the digest of run.mcap.
+    first robot are also sent to `logs`. Returns a dict with the keys `outcome` and `sha256` (of run.mcap).
     """
     if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)

@@ -1,4 +1,7 @@
-"""Names of the random streams of events and faults. A change of one entry does not affect the streams of others."""
+"""Names of the random streams (sequences of random numbers) of events and faults.
+
+A stream is named after its event or fault, so that a change of one entry does not affect the random numbers of others.
+"""
 
 import json
 from collections import Counter
@@ -15,8 +18,7 @@ from simscen.spec.choice import Choice
 def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
     """Return the name of the random stream of each entry.
 
-    The stream of an entry with a `name` has this name. Any other stream is named after the content of its entry.
-    Entries with equal names or contents are numbered.
+    It is the `name` of the entry, or else its content, with a number that distinguishes equal names or contents.
     """
     contents = [f"/{entry.name}" if entry.name is not None else f"={_content_key(entry)}" for entry in entries]
     counts: Counter[str] = Counter()
@@ -30,29 +32,29 @@ def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list
 def _content_key(entry: BaseModel) -> str:
     """Return the content of an entry as JSON, without defaults."""
     if any(isinstance(part, Choice) and part.original_class is not None for _, part in walk(entry)):
-        return json.dumps(_plain(entry), sort_keys=True)
+        return json.dumps(_to_plain_data(entry), sort_keys=True)
     _build_serializers(entry)
     return entry.model_dump_json(exclude_defaults=True)
 
 
-def _plain(value: Any) -> Any:
-    """Return the content of a specification as plain data, without defaults. Unlike pydantic, includes plug-ins."""
+def _to_plain_data(value: Any) -> Any:
+    """Return a specification as plain data without defaults, including the specifications of plug-ins."""
     if isinstance(value, RootModel):
-        return _plain(value.root)
+        return _to_plain_data(value.root)
     if isinstance(value, BaseModel):
         fields = {
             name: field.get_default(call_default_factory=True) for name, field in type(value).model_fields.items()
         }
-        return {name: _plain(current) for name, current in value if current != fields[name]}
+        return {name: _to_plain_data(current) for name, current in value if current != fields[name]}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_to_plain_data(item) for item in value]
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _to_plain_data(item) for key, item in value.items()}
     return value if isinstance(value, str | int | float | None) else str(value)
 
 
 def _build_serializers(value: object) -> None:
-    """Build the serializers of all nested models, which pydantic 2.11 does not do for unpickled models."""
+    """Build the serializers of a model and its nested models, because pydantic 2.11 omits them after unpickling."""
     if isinstance(value, BaseModel):
         type(value).model_rebuild()
         for _, inner in value:

@@ -99,5 +99,5 @@ def test_delayed_readings_keep_their_order() -> None:
             return Odometry("s", tick, None, None)
 
     senses = SensorSuite([Sensor()], {"s": 10})
-    assert senses.arrivals == ((4, 10),)
+    assert senses.periods_and_latencies == ((4, 10),)
     assert [one.tick for tick in range(30) for one in senses.read(tick)] == [0, 4, 8, 12, 16]
