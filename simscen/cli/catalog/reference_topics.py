@@ -88,11 +88,15 @@ def _error_code_text(code: ErrorCode) -> str:
 
 
 SIGNALS_TEXT = """\
-A signal has one value per sample of the truth (`physics: truth_rate`, 40 Hz by default). Its values are the same in the
-run and in its log. Data with a lower rate (belief, command, scans, plans) keeps its value until the next message; the
-first value also holds before it. An event that is shorter than a sample counts at the next sample. A signal that is not
-a number makes the verdict an error with the signal and the time; a signal that was not recorded makes it inconclusive.
-Derivatives are differences over the time between two samples. A jump by `kidnap` does not count as motion."""
+- A signal has one value per sample of the truth (`physics: truth_rate`, 40 Hz by default). Its values are the same in
+  the run and in its log.
+- Data with a lower rate (belief, command, scans, plans) keeps its value until the next message. The first value also
+  holds before it.
+- An event that is shorter than a sample counts at the next sample.
+- Derivatives are differences between two samples, divided by the time between them.
+- A jump by `kidnap` does not count as motion.
+- If a value is not a number, the verdict is an error that names the signal and the time. If the signal was not
+  recorded, the verdict is inconclusive."""
 
 
 def signal_topics() -> list[Topic]:
@@ -146,6 +150,19 @@ def _arguments_sentence(signal: Signal) -> str:
     return needed + "".join(f" Optional argument: `{key}`." for key in signal.optional_arguments)
 
 
+_SIGNALS_INTRO = """\
+A signal is a quantity of a run over time, such as the speed of the robot. This page lists all signals; `simscen explain
+signals` prints the same. Use them in [temporal criteria](../guides/temporal-criteria.md):
+
+```yaml
+pass:
+  - always: {signal: distance_to, object: cart, op: ">=", value: 0.5 m}
+```
+
+Arguments in parentheses are optional. *True* values are those of the simulator, not the estimates of the stack.
+"""
+
+
 def signals_page() -> str:
     """Return the text of docs/reference/signals.md."""
     head = "| signal | meaning | unit | arguments |\n|---|---|---|---|"
@@ -153,8 +170,8 @@ def signals_page() -> str:
         f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_arguments_text(signal)} |"
         for name, signal in SIGNALS.items()
     ]
-    intro = "# Signals\n\nThe quantities that [temporal criteria](../guides/temporal-criteria.md) can use."
-    return "\n".join([f"{intro} `simscen explain signals` prints the same.\n\n{SIGNALS_TEXT}\n\n{head}", *rows]) + "\n"
+    sampling = f"\n## Values of a signal\n\n{SIGNALS_TEXT}\n"
+    return "\n".join([f"# Signals\n\n{_SIGNALS_INTRO}\n{head}", *rows, sampling])
 
 
 def _arguments_text(signal: Signal) -> str:
@@ -163,17 +180,19 @@ def _arguments_text(signal: Signal) -> str:
 
 
 METRICS_TEXT = """\
-Every run reports these numbers in result.json, independently of its criteria. They are computed from the trace, so
-`simscen judge` returns the same numbers for its log. They refer to the truth unless noted otherwise. A number that is
-not defined (a robot that never moved has no smoothness) is null, and `undefined` contains the reason. A jump by
-`kidnap` counts neither as driving nor as turning. How safe people feel near a robot is not measured; `intrusion_*` are
-computed from distances."""
+- Metrics do not depend on the criteria. They are computed from the trace, the recorded data of the run, so
+  `simscen judge` returns the same numbers for its log.
+- Metrics refer to the true state of the robot unless noted otherwise.
+- A number that is not defined is null, for example the smoothness of a robot that never moved; `undefined` contains
+  the reason.
+- A jump by `kidnap` counts neither as driving nor as turning.
+- `intrusion_*` are computed from distances alone. They do not measure how safe people feel near a robot."""
 
 METRICS_CAVEATS = """\
-SPARC and LDLJ are reported, but affect the verdict only with a `smoothness` criterion. SPARC hardly notices a stop of
-2 s but shows a slow wobble; LDLJ shows the stop; both depend on the duration of a drive. Compare them only between
-drives on the same route. The NEES of one run is a mean over correlated errors; the bounds of the chi-square
-distribution apply to a mean over runs at a fixed time, as computed by `simscen bench nav`."""
+- SPARC and LDLJ affect the verdict only with a `smoothness` criterion. SPARC shows a slow wobble, but hardly a
+  stop of 2 s; LDLJ shows the stop. Both depend on the duration: compare them only between drives on the same route.
+- The errors within a run are correlated, so the bounds of the chi-square distribution do not apply to its NEES.
+  They apply to a mean over runs at a fixed time, as computed by `simscen bench nav`."""
 
 SESSION_METRICS_TEXT = """\
 A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints them. With several
@@ -181,22 +200,22 @@ A session reports these numbers in results.json under `suite`, and `simscen repo
 
 - `runs`: number of runs, without the second runs of `--check-determinism`.
 - `success_rate`: share of successful runs in all runs, including errors, with its 95 % Wilson interval.
-- `spl`, `soft_spl`: means over the `spl_runs`, which have these metrics.
-- `collisions_per_km`, `collisions_per_hour`: collisions over the driven `kilometers` and the simulated `hours` of the
-  `measured_runs`, which were completed.
+- `spl`, `soft_spl`: means over the runs that have these metrics. `spl_runs` is their number.
+- `collisions_per_km`, `collisions_per_hour`: collisions per driven kilometer and per simulated hour. `measured_runs` is
+  the number of completed runs, and `kilometers` and `hours` are their sums.
 
-In a run with several robots, each robot has its own distance, collisions, and SPL; the run succeeds if all robots do.
+In a run with several robots, each robot has its own distance, collisions, and SPL. The run succeeds if all robots do.
 
 With several `--stack`, `comparison` compares each stack with the first one (`baseline`):
 
-- `pairs`: number of pairs of runs with the same scenario and seed. `left_out` counts the pairs that are not used,
-  because a run was not completed (`broken_pairs`), and the `runs_without_partner`.
+- `pairs`: number of pairs of runs with the same scenario and seed. `left_out` counts the `broken_pairs`, in which a run
+  was not completed, and the `runs_without_partner`.
 - `flips`: pairs that passed with one stack and failed with the other; `flips_p` is from McNemar's exact test.
 - `differences`: for each metric, the mean `difference` over pairs, its 95 % bootstrap `interval` (from five pairs on),
   and `p` from Wilcoxon's signed-rank test.
 
 The compared metrics are time, path length, clearance, jerk, standing time, replans, recoveries, collisions (of each
-robot: `a/collisions`), and those of installed packages. See [Statistics](statistics.md)."""
+robot: `a/collisions`), and those of installed packages."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:
@@ -215,15 +234,31 @@ def metric_topics(installed: bool = False) -> list[Topic]:
 
 def metrics_page() -> str:
     """Return the text of docs/reference/metrics.md."""
-    rows = [
-        f"| `{name}` | {metric.unit} | {metric.text.replace('|', chr(92) + '|')} | {metric.source} |"
-        for name, metric in METRICS.items()
-    ]
-    head = "| metric | unit | definition | source |\n|---|---|---|---|"
-    table = "\n".join([head, *rows])
-    intro = "# Metrics\n\n`simscen explain metrics` prints the same."
-    session = f"## Metrics of a session\n\n{SESSION_METRICS_TEXT}\n"
-    return f"{intro}\n\n{METRICS_TEXT}\n\n{table}\n\n{METRICS_CAVEATS}\n\n{session}"
+    lines = []
+    for name, metric in METRICS.items():
+        if name in _METRIC_GROUPS:
+            lines += [f"\n## {_METRIC_GROUPS[name]}\n", "| metric | unit | definition | source |", "|---|---|---|---|"]
+        definition = metric.text.replace("|", chr(92) + "|")
+        lines.append(f"| `{name}` | {metric.unit} | {definition} | {metric.source} |")
+    tables = "\n".join(lines)
+    statistics = "[Statistics](statistics.md) explains the intervals and tests."
+    session = f"## Metrics of a session\n\n{SESSION_METRICS_TEXT}\n\n{statistics}\n"
+    notes = f"## Notes on single metrics\n\n{METRICS_CAVEATS}\n"
+    return f"# Metrics\n\n{_METRICS_INTRO}\n\n{METRICS_TEXT}\n{tables}\n\n{notes}\n{session}"
+
+
+_METRICS_INTRO = """\
+A metric is one number of a run, such as the length of its path. This page defines the metrics that every run reports in
+`result.json`, and the [metrics of a session](#metrics-of-a-session). `simscen explain metrics` prints the same."""
+_METRIC_GROUPS = {
+    "success": "Success and time",
+    "path_length": "Path",
+    "max_speed": "Motion",
+    "min_clearance": "Clearance, pedestrians, and collisions",
+    "replans": "Replans and recoveries",
+    "ape_trans_rmse": "Localization",
+}
+"""Headings of docs/reference/metrics.md, by the first metric below each."""
 
 
 def _metric_text(metric: Metric) -> str:

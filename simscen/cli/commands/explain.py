@@ -109,20 +109,20 @@ def _paragraphs(text: str, width: int) -> str:
 
 
 def _lines(paragraph: str, width: int) -> str:
-    """Return a wrapped paragraph, with headings such as "When it fails:" on new lines."""
+    """Return a wrapped paragraph, with list items and headings such as "When it fails:" on new lines."""
     items: list[str] = []
     for line in paragraph.splitlines():
         if line.startswith(" ") and items:
             items[-1] += " " + line.strip()
-        elif items and not _is_heading(line):
+        elif items and not _begins_item(line):
             items[-1] += " " + line
         else:
             items.append(line)
     return "\n".join(_wrapped(item, width, "  ") for item in items)
 
 
-def _is_heading(line: str) -> bool:
-    return line.startswith(("What is measured:", "When it fails:", "Why this:", "Source:"))
+def _begins_item(line: str) -> bool:
+    return line.startswith(("- ", "What is measured:", "When it fails:", "Why this:", "Source:"))
 
 
 def _wrapped(text: str, width: int, indent: str) -> str:
