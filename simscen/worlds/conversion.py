@@ -71,7 +71,7 @@ class PrismShape:
 def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismShape]:
     """Return the shapes of a world file that represent a solid, without any part below the ground.
 
-    If no such shape equals the solid, the result are prisms over its cross section at `height` m, or halfway up a solid
+    If no such shape equals the solid, the shapes are prisms over its cross section at `height` m, or halfway up a solid
     that does not reach `height`. A sentence about each difference is appended to `changes`.
     """
     exact = _exact_shape(solid)

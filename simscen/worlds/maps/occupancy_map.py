@@ -60,7 +60,7 @@ def empty_grid(bounds: Bounds, resolution: float, name: str) -> OccupancyGrid:
 
 
 def _map_bounds(world: World, segments: Array) -> Bounds:
-    """Return the bounds of the world; if they are all 0 (unknown), those of the `segments` of its cross section."""
+    """Return the bounds of the world or, if they are unknown (all 0), of the `segments` of its cross section."""
     if any(world.bounds):
         return world.bounds
     if not len(segments):
@@ -124,14 +124,14 @@ def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> lis
     occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():
         return []
-    corners = np.concatenate((_sides(occupied, name), _caps(occupied, name)))
+    corners = np.concatenate((_side_rectangles(occupied, name), _top_and_bottom_rectangles(occupied, name)))
     vertices = corners.reshape(-1, 3) * (grid.resolution, grid.resolution, height)
     first = 4 * np.arange(len(corners))[:, None]
     faces = np.concatenate((first + np.array([0, 1, 2]), first + np.array([0, 2, 3]))).astype(np.int32)
     return [Solid(Mesh(vertices, faces), Pose3.planar(grid.origin), name)]
 
 
-def _sides(occupied: CellMask, name: str) -> Array:
+def _side_rectangles(occupied: CellMask, name: str) -> Array:
     """Return the corners (n, 4, 3) of the upright rectangles of the walls, one for each straight edge of the outline.
 
     x and y are in cells; z is 0 or 1.
@@ -150,8 +150,8 @@ def _sides(occupied: CellMask, name: str) -> Array:
     return np.concatenate(sides).astype(np.float64)
 
 
-def _caps(occupied: CellMask, name: str) -> Array:
-    """Return the corners (n, 4, 3) of the rectangles of the top and the bottom; units as in `_sides`.
+def _top_and_bottom_rectangles(occupied: CellMask, name: str) -> Array:
+    """Return the corners (n, 4, 3) of the rectangles of the top and the bottom; units as in `_side_rectangles`.
 
     Each rectangle covers equal runs of occupied cells in consecutive rows.
     """

@@ -12,14 +12,16 @@ from simscen.worlds.geometry.cross_section import CrossSection
 CellMask = npt.NDArray[np.bool_]
 """Mask (rows, columns) of grid cells."""
 Flags = npt.NDArray[np.bool_]
+"""One boolean for each item (n,)."""
 Integers = npt.NDArray[np.int64]
+"""One integer for each item (n,)."""
 
 INWARD_OFFSET_CELLS = 1e-6
-"""Distance by which outlines are moved inwards, so that a solid does not touch a cell at whose edge it ends."""
+"""Distance by which outlines are moved inwards, so that a solid that ends at the edge of a cell does not touch it."""
 
 
 def touched_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
-    """Return the mask of `shape` (rows, columns) of the cells of which any part overlaps a solid."""
+    """Return the mask of `shape` (rows, columns) of the cells that overlap a solid, at least partly."""
     cells = filled_cells(section, shape)
     rows, columns = _outline_cells(section.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
@@ -57,8 +59,8 @@ def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
 def filled_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
     """Return the mask of `shape` (rows, columns) of the cells whose center is inside a solid.
 
-    A center is inside if the winding number of the outlines around it is positive. Solids with inverted faces are not
-    filled. Nor are rows in which the outline of a solid is not closed, because the mesh has holes.
+    A center is inside if the winding number of the outlines around it is positive. A solid with inverted faces is not
+    filled. A solid whose mesh has holes is not filled in rows in which its outline is not closed.
     """
     rows, columns, signs, owners = _crossings(section, shape)
     keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(section)[owners]

@@ -108,14 +108,14 @@ def draw_world(
 
 
 def _viewport(grid: OccupancyGrid) -> Viewport:
-    corners = grid.origin.apply(_corners(grid))
+    corners = grid.origin.apply(_corners_in_grid_frame(grid))
     (left, low), (right, top) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     scale = SUPERSAMPLING * MAX_SIDE_PIXELS / max(right - left, top - low)
     size = (max(SUPERSAMPLING, math.ceil((right - left) * scale)), max(SUPERSAMPLING, math.ceil((top - low) * scale)))
     return Viewport(left, top, scale, size)
 
 
-def _corners(grid: OccupancyGrid) -> Array:
+def _corners_in_grid_frame(grid: OccupancyGrid) -> Array:
     height, width = (cells * grid.resolution for cells in grid.shape)
     return np.array([[0, 0], [width, 0], [width, height], [0, height]])
 

@@ -56,7 +56,7 @@ for _name, _result, _arguments in (
 
 
 class _Query(ctypes.Structure):
-    """Embree's `RTCIntersectArguments`."""
+    """Embree's `RTCIntersectArguments`: options of a ray query."""
 
     _fields_ = (("flags", c_int), ("features", c_uint), ("callbacks", c_void_p * 3))
 
@@ -132,7 +132,7 @@ class MeshScene:
         self._scene = EmbreeScene(corners, mesh)
 
     def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
-        """Return the distances (n,) in m to the first hits of single rays, or their `ends` without a hit.
+        """Return the distances (n,) in m to the first hits of single rays; `ends` for rays without a hit.
 
         The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `ends` (n,) m long.
         """
@@ -208,7 +208,7 @@ class MovingMesh:
 
 
 def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: float) -> list[slice]:
-    """Return the ranges of packets of a fan at `pose` that contain rays that may hit a sphere."""
+    """Return the ranges of packets of a fan at `pose` in which a ray may hit a sphere."""
     (x, y, z), (px, py, pz, i, j, k, w) = center, pose
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)

@@ -35,14 +35,14 @@ NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
 """Default of `rest_poses`: all bodies are moving."""
 _MAX_RANGE_M = 1e30
 """Maximum length of a ray, because infinity would overflow in single precision."""
-_END_FACTOR = 1.001
+_INITIAL_LENGTH_RATIO = 1.001
 """Initial length of a ray relative to its range. A ray that is still longer than its range has no hit."""
 _HEIGHT_MARGIN_M, _ROUNDING_MARGIN_M = 0.1, 0.01
 """Minimum margin of a height range around the rays, and upper bound of rounding errors."""
 
 
 class RestingBodies:
-    """All resting bodies of a world, in groups with one scene each. A group is split when one of the bodies leaves."""
+    """All resting bodies of a world, in groups with one scene each. A group is split when one of its bodies moves."""
 
     def __init__(self, center: Vector) -> None:
         """Create an empty set. All scenes are relative to `center`, the center of the world."""
@@ -56,7 +56,7 @@ class RestingBodies:
     def set_bodies(self, bodies: Mapping[str, PlacedMesh]) -> None:
         """Set the bodies that are at rest now, by name."""
         previous, self._bodies = self._bodies, bodies
-        unchanged = {name for name, body in previous.items() if name in bodies and _is_same(body, bodies[name])}
+        unchanged = {name for name, body in previous.items() if name in bodies and _are_equal(body, bodies[name])}
         if len(unchanged) < len(previous):
             removed = previous.keys() - unchanged
             self._groups = [part for group in self._groups for part in group.split_without(removed)]
@@ -85,7 +85,7 @@ class RestingBodies:
             group.cast(origins, directions, heights, ends)
 
 
-def _is_same(one: PlacedMesh, other: PlacedMesh) -> bool:
+def _are_equal(one: PlacedMesh, other: PlacedMesh) -> bool:
     return one[0] is other[0] and one[1] == other[1]
 
 
@@ -202,7 +202,7 @@ class RayScene(RayCaster):
         limit = min(reach, _MAX_RANGE_M)
         if not len(origins):
             return np.empty(0)
-        distances = self._first_hits(origins, directions, reach, limit * _END_FACTOR)
+        distances = self._first_hits(origins, directions, reach, limit * _INITIAL_LENGTH_RATIO)
         result = distances.astype(np.float64)
         result[distances > limit] = np.inf
         return result
@@ -211,7 +211,7 @@ class RayScene(RayCaster):
         """Return the distances (n,) in m of a fan with its frame at `pose`. Values beyond `reach` mean no hit."""
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.set_directions(ahead, left)
-        fan.set_length(min(reach, _MAX_RANGE_M) * _END_FACTOR)
+        fan.set_length(min(reach, _MAX_RANGE_M) * _INITIAL_LENGTH_RATIO)
         self._static.sweep(fan, position)
         if self._resting:
             rise = _max_rise(math.hypot(ahead[2], left[2]), reach)
@@ -239,9 +239,9 @@ class RayScene(RayCaster):
         return ends
 
     def _height_range(self, low: float, high: float) -> HeightRange:
-        """Return a range that contains the heights of rays in m: the previous range if it contains them.
+        """Return a height range that contains all heights from `low` to `high` in m.
 
-        A new range requires new scenes.
+        The previous range is kept if possible, because a new range requires new scenes.
         """
         below, above = self._heights
         if not (below <= low - _ROUNDING_MARGIN_M and high + _ROUNDING_MARGIN_M <= above):

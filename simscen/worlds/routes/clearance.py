@@ -1,4 +1,4 @@
-"""Compute the clearance from static solids, and test footprints for overlaps with a solid."""
+"""Compute the clearance (distance to the nearest static solid), and test whether a footprint overlaps a solid."""
 
 import math
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ MIN_RESOLUTION_M = 0.05
 """Minimum size of the cells of a grid on which paths or gaps are searched."""
 MAX_CELLS = 1_000_000
 """Approximate maximum number of cells of a grid. The cells of larger worlds are larger."""
-MAX_LEVELS = 12
+MAX_SECTIONS = 12
 """Maximum number of cross sections over the height of the robot. Walls and boxes need only one."""
-SPACING_M = 0.02
-"""Distance between the points of an outline. At a clearance of 0.2 m, the error is at most 0.25 mm."""
+OUTLINE_SPACING_M = 0.02
+"""Distance between the points of an outline. The error of a clearance of 0.2 m is then at most 0.25 mm."""
 CLEARANCE_WITHOUT_SOLIDS_M = 1e6
 """Clearance in a world without solids."""
 HALF_DIAGONAL_CELLS = 0.7072
@@ -39,41 +39,41 @@ HALF_DIAGONAL_CELLS = 0.7072
 class ClearanceField:
     """Clearance (distance to the nearest solid): approximate for each cell of a grid, exact for single points.
 
-    grid:                   grid without yaw; only its size, resolution, and origin are used
-    rough (rows, columns):  distance in m between the centers of a cell and of the nearest cell that a solid touches; at
-                            most HALF_DIAGONAL_CELLS from the exact clearance
-    inside:                 mask of the cells whose center is in a solid
-    outline:                points on the outlines of all solids, SPACING_M apart; None without solids
-    owners (n,):            index in `names` of the solid that each point of `outline` belongs to
-    names:                  names of the solids
+    grid:            grid without yaw; only its size, resolution, and origin are used
+    cell_clearance:  distance (rows, columns) in m from the center of each cell to the center of the nearest cell that a
+                     solid touches; differs from the exact clearance by at most HALF_DIAGONAL_CELLS
+    is_inside:       mask of the cells whose center is in a solid
+    outline:         points on the outlines of all solids, OUTLINE_SPACING_M apart; None without solids
+    owners:          index (n,) in `names` of the solid that each point of `outline` belongs to
+    names:           names of the solids
     """
 
     grid: OccupancyGrid
-    rough: Array
-    inside: CellMask
+    cell_clearance: Array
+    is_inside: CellMask
     outline: "cKDTree | None"
     owners: npt.NDArray[np.int32]
     names: tuple[str, ...] = ()
 
-    def exact(self, points: Array) -> Array:
+    def clearance_at(self, points: Array) -> Array:
         """Return the clearance (n,) in m at points (n, 2); negative inside solids."""
         return self._nearest(points)[0]
 
     def has_clearance(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
         """Return for each of the points (n, 2) whether it is at least `distance` m away from all solids."""
-        rough = self.rough[self._cells(points)]
+        approximate = self.cell_clearance[self._cells(points)]
         # Twice, because both the point and the outline may be that far from the centers of their cells.
-        has_clearance: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
+        has_clearance: npt.NDArray[np.bool_] = approximate >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
         undecided = ~has_clearance
-        has_clearance[undecided] = self.exact(points[undecided]) >= distance
+        has_clearance[undecided] = self.clearance_at(points[undecided]) >= distance
         return has_clearance
 
     def free_cells(self, distance: float) -> CellMask:
         """Return the mask of the cells whose center is at least `distance` m away from all solids."""
         slack = HALF_DIAGONAL_CELLS * self.grid.resolution
-        free: CellMask = (self.rough >= distance + slack) & ~self.inside
-        undecided = (np.abs(self.rough - distance) < slack) & ~self.inside
-        free[undecided] = self.exact(self.grid.center_of(np.argwhere(undecided))) >= distance
+        free: CellMask = (self.cell_clearance >= distance + slack) & ~self.is_inside
+        undecided = (np.abs(self.cell_clearance - distance) < slack) & ~self.is_inside
+        free[undecided] = self.clearance_at(self.grid.center_of(np.argwhere(undecided))) >= distance
         return free
 
     def push_away(self, points: Array, distance: float) -> Array:
@@ -82,7 +82,8 @@ class ClearanceField:
         Points that are farther away are not moved.
         """
         moves = np.zeros_like(points)
-        is_near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
+        slack = 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
+        is_near = self.cell_clearance[self._cells(points)] < distance + slack
         clearance, gradients = self._nearest(points[is_near])
         moves[is_near] = np.maximum(distance - clearance, 0.0)[:, None] * gradients
         return moves
@@ -92,7 +93,7 @@ class ClearanceField:
         if self.outline is None:
             return np.full(len(points), CLEARANCE_WITHOUT_SOLIDS_M), np.zeros_like(points)
         distances, numbers = self.outline.query(points)
-        sign = np.where(self.inside[self._cells(points)], -1.0, 1.0)
+        sign = np.where(self.is_inside[self._cells(points)], -1.0, 1.0)
         offsets = points - self.outline.data[numbers]
         return sign * distances, offsets * (sign / np.where(distances > 0, distances, 1.0))[:, None]
 
@@ -103,7 +104,7 @@ class ClearanceField:
 
 
 def search_grid(bounds: Bounds, radius: float, min_resolution: float = MIN_RESOLUTION_M) -> OccupancyGrid:
-    """Return the grid for a search of paths of a disc of `radius` m, with room for a path around the world.
+    """Return an empty grid to search paths of a disc of `radius` m, with room for a path around the world.
 
     `bounds` are the bounds of the world. Cells are `min_resolution` m wide, or wider in a large world.
     """
@@ -129,34 +130,34 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
     )
     if not blocked.any():
         return ClearanceField(grid, np.full(grid.shape, CLEARANCE_WITHOUT_SOLIDS_M), inside, None, owners)
-    rough = ndimage.distance_transform_edt(~blocked) * grid.resolution
-    return ClearanceField(grid, rough, inside, spatial.cKDTree(samples), owners, mesh.names)
+    cell_clearance = ndimage.distance_transform_edt(~blocked) * grid.resolution
+    return ClearanceField(grid, cell_clearance, inside, spatial.cKDTree(samples), owners, mesh.names)
 
 
 def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[CrossSection]:
-    """Return at most MAX_LEVELS cross sections of a mesh between two heights.
+    """Return at most MAX_SECTIONS cross sections of a mesh between two heights.
 
-    There is one between any two neighboring heights of vertices. If these are too many, the heights are evenly spaced.
+    There is one between any two neighboring heights of vertices, or evenly spaced ones if these would be too many.
     """
     low, high = z_range
     z = np.unique(np.round(mesh.vertices[:, 2], 3))
     levels = np.concatenate(([low], z[(z > low) & (z < high)], [high]))
     middles = (levels[:-1] + levels[1:]) / 2
-    if len(middles) > MAX_LEVELS:
-        middles = np.linspace(low, high, MAX_LEVELS + 2)[1:-1]
+    if len(middles) > MAX_SECTIONS:
+        middles = np.linspace(low, high, MAX_SECTIONS + 2)[1:-1]
     return [cross_section(mesh, height) for height in middles.tolist()]
 
 
 def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
-    """Return points (n, 2) along segments (m, 2, 2), at most SPACING_M apart, without duplicates.
+    """Return points (n, 2) along segments (m, 2, 2), at most OUTLINE_SPACING_M apart, without duplicates.
 
     Also returns the owner (n,) of each point, from the owners (m,) of the segments.
     """
     step = segments[:, 1] - segments[:, 0]
-    piece_counts = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / SPACING_M), 1).astype(np.int64)
+    piece_counts = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / OUTLINE_SPACING_M), 1).astype(np.int64)
     which, number = expand_ranges(np.zeros_like(piece_counts), piece_counts + 1)
     points = segments[which, 0] + (number / piece_counts[which])[:, None] * step[which]
-    keys: npt.NDArray[np.int64] = np.round(points / (SPACING_M / 20)).astype(np.int64)
+    keys: npt.NDArray[np.int64] = np.round(points / (OUTLINE_SPACING_M / 20)).astype(np.int64)
     order = np.lexsort(keys.T)
     new = np.ones(len(order), dtype=np.bool_)
     new[1:] = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
@@ -185,7 +186,7 @@ def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
 
 
 def _starts_inside(segments: Array, corners: Polygon) -> bool:
-    """Return whether a segment starts inside the footprint, as all segments of a small object do."""
+    """Return whether any segment starts inside the footprint. This finds solids that the footprint contains."""
     (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
     x, y = segments[:, 0].T
     starts = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]

@@ -17,7 +17,7 @@ from simscen.worlds.routes.clearance import ClearanceField, clearance_field, sea
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall: half of the diagonal of a cell."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference below which walls count as equally thin. Of these, the wall nearest to the middle of the way is used."""
+"""Difference below which walls count as equally thin. The one nearest to the midpoint of the two ends is then used."""
 OPPOSITE_COSINE = -0.5
 """Cosine of the minimum angle (120°), seen from the gap, between points on different sides of the gap."""
 
@@ -44,7 +44,7 @@ def narrowest_gap(
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """Return the gap that blocks a disc of `radius` m between two `ends`.
+    """Return the gap that blocks a disc of `radius` m on its way between the two positions `ends`.
 
     The width of the gap is exact to about 2 cm. Only the part of `mesh` between the heights `z_range` counts. `bounds`
     are the bounds of the world.
@@ -66,9 +66,9 @@ def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: f
 
 def _clearances(field: ClearanceField, max_clearance: float) -> Array:
     """Return the clearance of each cell's center in m, negative in solids and at most `max_clearance`."""
-    clearance: Array = np.minimum(field.rough, max_clearance)
-    near = field.rough < max_clearance
-    clearance[near] = np.minimum(field.exact(field.grid.center_of(np.argwhere(near))), max_clearance)
+    clearance: Array = np.minimum(field.cell_clearance, max_clearance)
+    near = field.cell_clearance < max_clearance
+    clearance[near] = np.minimum(field.clearance_at(field.grid.center_of(np.argwhere(near))), max_clearance)
     return clearance
 
 

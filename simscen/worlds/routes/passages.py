@@ -16,15 +16,15 @@ from simscen.worlds.routes.clearance import ClearanceField
 
 MAX_WIDTH_M = 4.0
 """Maximum width of a passage."""
-SPACING_M, MAX_PROBES = 0.25, 80
+PROBE_SPACING_M, MAX_PROBES = 0.25, 80
 """Distance between the points of the path at which passages are searched, and maximum number of these points."""
 NARROW_WIDTH_M = 2.0
-"""Width up to which a passage is measured at its narrowest point. Wider ones are measured where the path crosses."""
+"""Width up to which a passage is measured at its narrowest point. A wider one is measured where the path crosses it."""
 RAY_ROTATIONS = np.array(
     [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
 )
 """Rotation matrices (n, 2, 2) of the rays that search the other side of a passage: -60° to 60°."""
-MAX_POINTS = 400
+MAX_POINTS_PER_SIDE = 400
 """Approximate maximum number of points of the outline that are compared on each side of a passage."""
 
 
@@ -35,7 +35,7 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
     """
     if field.outline is None:
         return ()
-    points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_PROBES))
+    points = resample_polyline(path, max(PROBE_SPACING_M, polyline_length(path) / MAX_PROBES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
         crossings = (
@@ -67,7 +67,7 @@ def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage
 def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
     """Yield pairs of outline points, by index, that may be the two sides of a passage at a point of the path.
 
-    The pair that is nearest to the point comes first.
+    Preferred pairs come first.
     """
     assert field.outline is not None
     distance, index = field.outline.query(point)
@@ -94,7 +94,7 @@ def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField)
     rays = point + steps[None, :, None] * (RAY_ROTATIONS @ ((point - side) / distance))[:, None]
     cells = field.grid.cell_of(rays.reshape(-1, 2))
     inside = field.grid.inside(cells)
-    solid = inside & (field.rough[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
+    solid = inside & (field.cell_clearance[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
     first = solid.reshape(len(RAY_ROTATIONS), -1).argmax(axis=1)
     numbers = np.arange(len(RAY_ROTATIONS))
     hits: Array = np.where(solid.reshape(len(RAY_ROTATIONS), -1)[numbers, first][:, None], rays[numbers, first], np.nan)
@@ -139,8 +139,8 @@ def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, i
 
 
 def _subsample(indices: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
-    """Return about MAX_POINTS of the indices, evenly spaced, and the index `required`."""
-    return np.append(indices[:: 1 + len(indices) // MAX_POINTS], required)
+    """Return about MAX_POINTS_PER_SIDE of the indices, evenly spaced, and the index `required`."""
+    return np.append(indices[:: 1 + len(indices) // MAX_POINTS_PER_SIDE], required)
 
 
 def _name_of_solid(index: int, field: ClearanceField) -> str:

@@ -27,8 +27,8 @@ from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE_M = (0.03, 0.4)
 """Heights in m between which solids block a robot. Lower solids are sills to drive over."""
-MIN_SHORTENING = 0.001
-"""Minimum decrease of the length of a path, relative to its length, for another round."""
+MIN_SHORTENING_RATIO = 0.001
+"""A path is tightened in another round if the last round shortened it by at least this fraction."""
 MAX_ROUNDS = 12
 """Maximum number of rounds in which a path is straightened and smoothed."""
 SMOOTHING_STEPS = 24
@@ -82,7 +82,7 @@ class ShortestPaths:
 
     def clearances(self, points: Array) -> Array:
         """Return the distances (n,) in m from points (n, 2) to the nearest solid; negative inside of solids."""
-        return self._field.exact(points)
+        return self._field.clearance_at(points)
 
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
         """Return the shortest path to the goal `name`, with its passages.
@@ -145,7 +145,7 @@ class ShortestPaths:
         return GridGraph(self._field.free_cells(self._radius))
 
     def _search(self, graph: GridGraph, ends: Array) -> Array | None:
-        """Return the tightened path (n, 2) between `ends` (2, 2) over a graph; None if there is no path."""
+        """Return the path (n, 2) between `ends` (2, 2) over a graph, after `tighten_path`; None if there is no path."""
         first, last = (self._free_cell(graph, end) for end in ends)
         cells = graph.shortest_path(first, last) if first and last else None
         if cells is None:
@@ -176,7 +176,7 @@ def shortest_paths_in(
     z_range: tuple[float, float] = Z_RANGE_M,
     min_resolution: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
-    """Return the search for paths in a built world, over an area that contains all `stops` (starts and goals)."""
+    """Prepare the search for paths in a built world, in an area that contains all `stops` (starts and goals)."""
     return ShortestPaths(built.mesh, _bounds_containing(built, stops), radius, z_range, min_resolution)
 
 
@@ -218,7 +218,7 @@ def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:
     for _ in range(MAX_ROUNDS):
         before = polyline_length(path)
         path = _smooth(resample_polyline(_straighten(path, field, min_clearance), field.grid.resolution), field, radius)
-        if polyline_length(path) > (1 - MIN_SHORTENING) * before:
+        if polyline_length(path) > (1 - MIN_SHORTENING_RATIO) * before:
             break
     return _straighten(path, field, min_clearance)
 

@@ -25,7 +25,7 @@ HALF_DIAGONAL_STEP_M = STEP_M * math.sqrt(0.5)
 """Half of the length of a diagonal move. Each point of a move is at most this far from one end of the move."""
 SAMPLING_MARGIN_M = 0.02
 """Additional clearance, because straight lines are checked only at single points."""
-MAX_POINTS = 4000
+MAX_GRID_POINTS = 4000
 """Maximum number of grid points that a search visits."""
 MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
 """Steps to the eight neighbors of a grid point."""
@@ -49,10 +49,10 @@ class SimplePaths:
     def length(self, start: Point, goal: Point) -> float:
         """Return the length in m of a path from start to goal, maybe not the shortest one; inf if none was found."""
         if (start, goal) not in self._lengths:
-            self._lengths[start, goal] = self._length(start, goal)
+            self._lengths[start, goal] = self._find_length(start, goal)
         return self._lengths[start, goal]
 
-    def _length(self, start: Point, goal: Point) -> float:
+    def _find_length(self, start: Point, goal: Point) -> float:
         if self._is_clear(start, goal):
             return math.dist(start, goal)
 
@@ -80,7 +80,7 @@ class SimplePaths:
         lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
         done: set[Cell] = set()
-        while queue and len(lengths) < MAX_POINTS:
+        while queue and len(lengths) < MAX_GRID_POINTS:
             _, cell = heapq.heappop(queue)
             if cell in done:
                 continue
@@ -116,7 +116,7 @@ class SimplePaths:
 
 
 def simple_paths_between(solids: Iterable[Solid], radius: float, z_range: ZRange) -> SimplePaths | None:
-    """Return the search for paths of a disc of `radius` m that avoid the solids between two heights.
+    """Prepare the search for paths of a disc of `radius` m around solids. Only their parts between two heights count.
 
     Returns None if one of the solids is not an upright prism with a convex base.
     """

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import MAX_LEVELS, clearance_field, sections_between
+from simscen.worlds.routes.clearance import MAX_SECTIONS, clearance_field, sections_between
 
 BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
 
@@ -30,10 +30,10 @@ def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
     exact = reference.distance(shapely.points(points))
     deep_inside = reference.buffer(-0.04).distance(shapely.points(points)) == 0
     outside = exact > 0.04
-    assert np.abs(field.exact(points) - exact)[outside].max() < 0.0015
-    assert (field.exact(points)[deep_inside] < 0).all()
+    assert np.abs(field.clearance_at(points) - exact)[outside].max() < 0.0015
+    assert (field.clearance_at(points)[deep_inside] < 0).all()
     for distance in (0.1, 0.25, 0.6):
-        assert np.array_equal(field.has_clearance(points, distance), field.exact(points) >= distance)
+        assert np.array_equal(field.has_clearance(points, distance), field.clearance_at(points) >= distance)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -42,7 +42,7 @@ def test_free_cells_are_those_whose_center_has_the_clearance(seed, distance):
     mesh, _ = random_boxes(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
     centers = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
-    expected = (field.exact(centers) >= distance).reshape(field.grid.shape)
+    expected = (field.clearance_at(centers) >= distance).reshape(field.grid.shape)
     assert np.array_equal(field.free_cells(distance), expected)
 
 
@@ -63,10 +63,10 @@ def test_clearance_is_large_everywhere_in_an_empty_world():
 def test_upright_solids_need_one_cross_section():
     upright = merge_solids([Solid(Box((1, 1, 1)), Pose3(z=0.5)), Solid(Cylinder(0.3, 2.0), Pose3(3, 0, 1.0))])
     assert len(sections_between(upright, BODY)) == 1
-    assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_LEVELS
+    assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_SECTIONS
 
 
 def test_thin_shelf_within_the_height_of_the_robot_is_an_obstacle():
     shelf = merge_solids([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
     field = clearance_field(shelf, empty_grid(BOUNDS, 0.05, "w"), BODY)
-    assert field.exact(np.array([[0.0, 0.0]]))[0] < 0
+    assert field.clearance_at(np.array([[0.0, 0.0]]))[0] < 0
