@@ -124,10 +124,10 @@ class ClearancePlan(FollowedPlan):
 
     def has_lost_clearance(self) -> bool:
         """Return whether the plan has lost LOST_CLEARANCE_M of clearance within the next CLEARANCE_HORIZON_M."""
-        track = self._track
+        tracker = self._updated_tracker
         if not self._has_lost.any():
             return False
-        along, index = track.along, track.index
+        along, index = tracker.along, tracker.index
         end = int(np.searchsorted(along, along[index] + CLEARANCE_HORIZON_M, side="right"))
         return bool(self._has_lost[index:end].any())
 

@@ -1,1 +1,4 @@
-"""Navigation stack under test. It does not import the simulator, so that it cannot use the true state."""
+"""Reference navigation stack, and the protocols of stacks and their components.
+
+This package does not import the simulator, so that it cannot use the true state.
+"""

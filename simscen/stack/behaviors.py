@@ -133,8 +133,7 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 MIN_PROGRESS_M = 1.0
-"""With `retries_since_progress`, a recovery restores all retries if it starts nearer to the goal by this distance than
-all earlier recoveries."""
+"""Progress toward the goal since all earlier recoveries that restores the retries, with `retries_since_progress`."""
 
 
 class BehaviorSequence:

@@ -26,7 +26,7 @@ from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline, VelocitySmoother
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import TRAIL_S, OdometryHistory
-from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
+from simscen.stack.navigator import ClearingPolicy, FullClearing, Navigator
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
 from simscen.stack.reference import ReferenceStack
@@ -75,8 +75,8 @@ def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
 class StackBuilder:
     """Builder of the reference stack. Subclasses override the methods `make_…` to replace components.
 
-    The stack gets the map with cells no larger than those of the costmap. Each component has its own random stream, for
-    example "localizer". Each plan has one, too: "planner#1", "planner#2", ….
+    If the cells of the map are larger than those of the costmap, the map is refined. Each component has its own random
+    stream, for example "localizer". Each plan has one, too: "planner#1", "planner#2", ….
     """
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
@@ -172,7 +172,7 @@ class StackBuilder:
 
     def make_clearing_policy(self) -> ClearingPolicy:
         """Make the policy that decides how much of the global costmap is cleared when planning has failed."""
-        return ClearEntirely()
+        return FullClearing()
 
     def make_stack(self, *arguments: Any) -> ReferenceStack:
         """Call the constructor of the stack with these arguments."""

@@ -1,4 +1,4 @@
-"""Wrappers of planners, controllers, and other stack components of installed packages, which check return values."""
+"""Wrappers that check the return values of planners, controllers, and other stack components of other packages."""
 
 import math
 import traceback
@@ -45,7 +45,7 @@ def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Settin
 class CheckedPlugin:
     """Base class of the wrappers. An invalid return value or an unexpected exception raises RunError.
 
-    `prefix` is the start of an error message, such as "returned".
+    Parameters `prefix` are the start of an error message, such as "returned".
     """
 
     may_fail: ClassVar[bool] = True
@@ -66,7 +66,7 @@ class CheckedPlugin:
         return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
 
     def call(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a method of the component. Exceptions are converted by `raise_as_run_error`."""
+        """Call a method of the component, and return its result. Exceptions go through `raise_as_run_error`."""
         try:
             return method(*args, **kwargs)
         except Exception as error:  # code of other packages can raise anything

@@ -25,7 +25,7 @@ MAX_STEPS = 1000
 """Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_BENEFIT_M = 0.005
-"""The robot brakes for a moving obstacle only if this increases their distance by more than this value."""
+"""Minimum increase of the distance to a moving obstacle by braking; without it, the robot does not brake."""
 ROUNDING_M = 1e-6
 """Rounding error allowed for distances to moving obstacles."""
 
@@ -93,7 +93,7 @@ class CollisionMonitor:
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence_reason(self, tick: int) -> str:
-        """Return which lidar is silent, and whether its scans are missing, empty, or too late, as a message."""
+        """Return a message that states which lidar is silent, and whether its scans are missing, empty, or late."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
         limit = f"source_timeout is {self._spec.source_timeout:g} s"
         elapsed = (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
@@ -136,16 +136,17 @@ class CollisionMonitor:
         if not len(points):
             return horizon
         times = self._times
-        gap = self._gaps(points[None], poses_along(ORIGIN, command, times))
+        gap = self._footprint_gaps(points[None], poses_along(ORIGIN, command, times))
         current, margin = gap[0], self._spec.stop_margin
         collides = (gap[1:] < margin) & (gap[1:] < current - 1e-4)
         is_contact = collides.sum(axis=1) >= self._spec.min_points
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _may_meet_moving(self, command: Twist, horizon: float) -> bool:
-        """Return False if no moving obstacle can come within the stop margin of the footprint within `horizon` s.
+        """Return whether a moving obstacle may come within the stop margin of the footprint within `horizon` s.
 
-        Quick check with the closest approach of straight motions, and an upper bound for the effect of the turn rate.
+        Quick check that may return True too often. It uses the closest approach of straight motions, and an upper bound
+        for the effect of the turn rate.
         """
         own_velocity = complex(command.vx, command.vy)
         deviation = abs(own_velocity) * abs(command.wz) * horizon * horizon / 2
@@ -162,31 +163,31 @@ class CollisionMonitor:
     def _time_to_moving(self, command: Twist, horizon: float) -> float:
         """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        Obstacles that would come equally close to a stationary robot do not count, because braking would not help.
+        Obstacles that come equally close to a stationary robot do not count, because braking would not help.
         """
         times = self._times
         centers = self._moving.at(times)
-        gaps = self._gaps_to(centers, command)
+        gaps = self._moving_gaps(centers, command)
         collides = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
         if not collides.any():
             return horizon
-        gaps_standing = self._gaps_to(centers, STOP)
+        gaps_standing = self._moving_gaps(centers, STOP)
         unavoidable = (gaps_standing[1:] < 0.0) & (gaps_standing[1:] < gaps_standing[0] - 1e-4)
         first = (collides | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
         worse = (gaps < gaps_standing - MIN_BENEFIT_M)[1 + first, np.arange(len(first))]
         is_contact = (collides & worse).any(axis=1)
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
-    def _gaps_to(self, centers: Array, twist: Twist) -> Array:
+    def _moving_gaps(self, centers: Array, twist: Twist) -> Array:
         """Return distances (times, obstacles) in m from the stop margin to moving obstacles, for a constant `twist`.
 
         `centers` (times, obstacles, 2) are the predicted positions of the obstacles.
         """
-        return self._gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
+        return self._footprint_gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 
-    def _gaps(self, points: Array, poses: Array) -> Array:
+    def _footprint_gaps(self, points: Array, poses: Array) -> Array:
         """Return distances (m, n) in m from the footprint at poses (m, 3) to points (m or 1, n, 2); negative inside.
 
         For a polygon, the result is a lower bound: the largest signed distance from its edge lines.

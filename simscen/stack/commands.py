@@ -10,7 +10,7 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import RobotModel
 
 STOPPED_SPEED_M_S, STOPPED_YAW_RATE_RAD_S = 0.02, 0.1
-"""The robot counts as stopped by the collision monitor if its command is below these speeds."""
+"""The collision monitor counts as stopping the robot if the command that it returns is below these speeds."""
 
 
 class VelocitySmoother:

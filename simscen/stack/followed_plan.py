@@ -1,4 +1,4 @@
-"""Plan that the robot follows: its occupied points, and its transformation to the odom frame for the controller."""
+"""Plan that the robot follows: check for new obstacles, progress, and transformation to the odom frame."""
 
 import math
 
@@ -14,19 +14,19 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Costmap changes within this distance of the plan cause a new check. A larger inscribed radius replaces it."""
+"""Minimum distance from the plan within which costmap changes cause a new check for obstacles."""
 WATCH_EVERY_POINTS = 4
-"""Every n-th point of the plan is checked for changes nearby."""
+"""Only every n-th point of the plan is compared with the positions of costmap changes."""
 MAX_DEFERRED_MOTION_M = 0.5
 """Motion of the robot after which its position on the plan is updated at the latest."""
 MAX_CROSS_TRACK_M, MIN_REMAINING_M = 0.2, 0.03
-"""A car has missed its plan if it is farther than 0.2 m from it, or if less than 0.03 m of it remain."""
+"""A car has missed its plan if it is farther than 0.2 m from the plan, or if less than 0.03 m of the plan remain."""
 COMPARISON_DISTANCE_M = 1.0
 """Distance from the robot at which a shift between map and odom frame is measured."""
 MIN_SHIFT_M = 0.01
 """Shift of the map frame in the odom frame above which the controller gets the path again."""
 ROUNDING_M = 1e-9
-"""Smaller shifts are ignored, because rounding alone can cause them."""
+"""Shift of the map frame in the odom frame that rounding alone can cause."""
 
 
 class FollowedPlan:
@@ -45,7 +45,7 @@ class FollowedPlan:
 
     def update_occupied_if_changed(self, costmap: LayeredCostmap) -> None:
         """Update the occupied points if the costmap has changed near the points ahead of the robot."""
-        ahead = self._complex_points[self._track.index :: WATCH_EVERY_POINTS]
+        ahead = self._complex_points[self._updated_tracker.index :: WATCH_EVERY_POINTS]
         if costmap.changed_near(self._revision, ahead, self._watch_distance):
             self.update_occupied(costmap.view)
         self._revision = costmap.revision
@@ -61,11 +61,12 @@ class FollowedPlan:
             self._update_tracker(pose)
 
     def _update_tracker(self, pose: Pose2) -> None:
+        """Compute the position on the plan for this pose."""
         self._tracker.locate(pose)
         self._located_pose, self._pose = pose, None
 
     @property
-    def _track(self) -> PathTracker:
+    def _updated_tracker(self) -> PathTracker:
         """The tracker, updated to the last pose."""
         if self._pose is not None:
             self._update_tracker(self._pose)
@@ -74,38 +75,40 @@ class FollowedPlan:
     @property
     def ahead(self) -> Array:
         """The points (n, 3) ahead of the robot."""
-        points: Array = self._track.points[self._track.index :]
+        tracker = self._updated_tracker
+        points: Array = tracker.points[tracker.index :]
         return points
 
     def sampled_points(self, every: int) -> list[complex]:
         """Return every n-th point ahead of the robot as x + iy."""
-        return self._track.sampled_points(every)
+        return self._updated_tracker.sampled_points(every)
 
     def is_missed(self, pose: Pose2) -> bool:
         """Return whether a car is too far from the plan, or too near its end, to reach the goal on this plan."""
-        x, y, _ = self._track.points[self._track.index].tolist()
+        tracker = self._updated_tracker
+        x, y, _ = tracker.points[tracker.index].tolist()
         return math.hypot(pose.x - x, pose.y - y) > MAX_CROSS_TRACK_M or self.remaining() < MIN_REMAINING_M
 
     def remaining(self) -> float:
         """Return the length of the plan ahead in m."""
-        return self._track.remaining()
+        return self._updated_tracker.remaining()
 
     def is_blocked(self) -> bool:
         """Return whether any point ahead of the robot is occupied.
 
         Occupied points before the first free point are ignored, so that a robot in collision can leave.
         """
-        occupied = self._occupied[self._track.index :: 2]
+        occupied = self._occupied[self._updated_tracker.index :: 2]
         if not occupied.any():
             return False
         first_free = int((~occupied).argmax())
         return bool(occupied[first_free:].any() or occupied.all())
 
 
-class LocalPath:
-    """Passes the plan to the controller in the odom frame.
+class LocalPathSender:
+    """Passes each plan to the controller, in the odom frame.
 
-    The controller gets a plan once, and its part ahead again after the transform from map to odom frame has changed.
+    When the transform from map to odom frame has changed, the controller gets the rest of the plan again.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -132,5 +135,6 @@ class LocalPath:
         return local
 
     def _send(self, plan: FollowedPlan, points: Array) -> None:
+        """Pass `points` (n, 3) of the plan to the controller."""
         self._plan, self._sent_odom_from_map = plan, self._odom_from_map
         self._controller.set_path(Path(transform_poses(self._sent_odom_from_map, points), plan.path.tick))

@@ -48,15 +48,15 @@ def lethal_near(costmap: CostmapView, x: float, y: float, half_side: float) -> A
 class Footprint:
     """Collision checker for many poses at once. A footprint is in collision if it contains the center of a lethal cell.
 
-    `inscribed` and `circumscribed` are radii in m. `reach` is the largest distance in m that a point of the footprint
-    moves per rad of rotation; 0 if round. `discs` cover the footprint, for faster checks.
+    `inscribed` and `circumscribed` are radii in m. `rotation_radius` is the largest distance in m by which a point of
+    the footprint moves per rad of rotation; 0 if round. `discs` cover the footprint, for faster checks.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
         """Prepare checks of a robot on costmaps with this `resolution`, the cell size in m."""
         self.inscribed = robot.inscribed_radius
         self._is_round = robot.radius is not None
-        self.reach = 0.0 if self._is_round else robot.circumscribed_radius
+        self.rotation_radius = 0.0 if self._is_round else robot.circumscribed_radius
         self.circumscribed = robot.circumscribed_radius
         corners = np.array(robot.footprint, dtype=np.float64)
         inner = _inner_points(corners, resolution, self.inscribed)

@@ -60,7 +60,7 @@ def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
 HISTORY_S = 10
 """Time for which past poses can be looked up: the default of tf2's buffer."""
 TRAIL_S = 60
-"""Default time covered by the trail of the robot, which recovery behaviors use."""
+"""Time covered by the trail of the robot in the reference stack. Recovery behaviors use the trail."""
 # Larger values, as from a broken encoder, are rejected: their squares could overflow.
 _MAX_VALUE = 1e6
 
@@ -145,6 +145,6 @@ class OdometryHistory:
         return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
     def past_pose(self, latest: Pose2, tick: int) -> Pose2:
-        """Return the pose at `tick`, not interpolated, in another frame; `latest` is the latest pose in that frame."""
+        """Return the pose at `tick`, not interpolated, in another frame. `latest` is the latest pose in that frame."""
         past = self.latest_until(tick)
         return latest if past is self.now else latest.compose(self.now.between(past))

@@ -17,7 +17,7 @@ from simscen.stack.protocols import RobotModel
 MIN_YAW_RATE_RAD_S = 1e-6
 """Yaw rate below which an arc is taken for a straight line."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
-"""Times of the poses in a logged local plan."""
+"""Times of the poses in a local plan that is logged as an arc."""
 
 
 def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
@@ -82,7 +82,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 @dataclass(frozen=True)
 class VelocityLimits:
-    """Limits of vx and vy (m, s) and the turn rate (rad, s): velocity, acceleration, and (negative) deceleration.
+    """Limits of velocity, acceleration, and (negative) deceleration for vx, vy, and the turn rate, in SI units and rad.
 
     `turning_radius` is the minimum turning radius in m; 0 for a base that turns in place.
     """
@@ -94,7 +94,7 @@ class VelocityLimits:
     turning_radius: float
 
     def scaled(self: Limits, ratio: float) -> Limits:
-        """Return limits with velocities multiplied by `ratio`; the same object if that is at least 1."""
+        """Return limits with velocities multiplied by `ratio`; the same object if `ratio` is at least 1."""
         if ratio >= 1.0:
             return self
         (a, b, c), (d, e, f) = self.low, self.high

@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 MAX_INFLATION_M = 0.8
 """Largest distance by which an obstacle is inflated: for its uncertainty, and in `nearness` also for the margin."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Limits of the time steps of `is_surely_clear`. Only steps far away from the obstacle are longer."""
+"""Limits of the time steps of `is_surely_clear`. Far away from the obstacle, steps are longer."""
 CONTACT_DISTANCE_M = 0.03
 """Distance below which obstacles count as touching."""
 
@@ -63,7 +63,7 @@ class MovingObstacle(NamedTuple):
 class MovingObstacles:
     """Moving obstacles in one frame at one time. The parameter `times` of the methods is in s after this time.
 
-    `acceleration` is the standard deviation of their acceleration in m/s², by which the uncertainty grows.
+    `acceleration` is the standard deviation of their acceleration in m/s². It makes the uncertainty grow with time.
     """
 
     __slots__ = ("acceleration", "obstacles")
@@ -85,7 +85,7 @@ class MovingObstacles:
 
     @classmethod
     def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """Create a set of single obstacles."""
+        """Create an object with these obstacles."""
         moving = object.__new__(cls)
         moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
         return moving

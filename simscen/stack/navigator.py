@@ -15,7 +15,7 @@ from simscen.core.records.events import Event, EventKind, Value
 from simscen.stack.behaviors import BehaviorSequence
 from simscen.stack.checkers import ProgressChecker
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.followed_plan import LocalPath
+from simscen.stack.followed_plan import LocalPathSender
 from simscen.stack.frames import Frames
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
@@ -36,7 +36,7 @@ class ClearingPolicy(Protocol):
         ...
 
 
-class ClearEntirely:
+class FullClearing:
     """Clears the entire costmap each time, as Nav2's default tree does."""
 
     def reset(self) -> None:
@@ -79,7 +79,7 @@ class Navigator:
         """The manager of the plan that is being followed."""
         self._controller, self._recovery = controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
-        self._path, self._clearing = LocalPath(controller), clearing
+        self._local_path, self._clearing = LocalPathSender(controller), clearing
         self._period, self._failure_tolerance = period, failure_tolerance
         self._clock = 0.0
         self.goal: Goal | None = None
@@ -138,7 +138,7 @@ class Navigator:
             return STOP
         self._planning_retried = False
         following = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
-        local = self._path.update(plan, following, frames)
+        local = self._local_path.update(plan, following, frames)
         command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local)
         if is_held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
@@ -218,4 +218,5 @@ class Navigator:
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:
+    """Return the error code, its name, and the message, as data of an event."""
     return {"error_code": int(failure.code), "error_name": failure.code.name, "message": str(failure)}

@@ -14,7 +14,7 @@ from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 MISSED_AFTER_S = 1.0
-"""Minimum time for which a car follows a plan before the plan can count as missed."""
+"""Minimum age of a plan that a car can miss (see FollowedPlan.is_missed)."""
 CHECK_EVERY_STEPS = 2
 """Number of steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
@@ -40,7 +40,7 @@ class PlanResult:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request to the planner, answered at tick `due`. If `is_optional`, a failure has no consequence."""
+    """A request to the planner, whose answer is available at tick `due`. `is_optional`: ignore a failure."""
 
     due: int
     reason: str
@@ -167,6 +167,7 @@ class PlanManager:
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
+        """Return whether an obstacle in the current costmap blocks the plan."""
         plan.update_occupied_if_changed(self._costmap)
         return plan.is_blocked()
 
@@ -175,7 +176,7 @@ class PlanManager:
         return True
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> PlanResult:
-        """Compute one path through all intermediate goals to the goal."""
+        """Return one path through all intermediate goals to the goal. `tick` is the stamp of the path."""
         legs, start, is_partial = list[Array](), pose, False
         view = self._planning_view(pose)
         for target in (*self._via, goal):

@@ -28,7 +28,7 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 
 
 class NavigationFailure(Exception):
-    """A component failed; `code` is one of Nav2's error codes."""
+    """Failure of a component. `code` is one of Nav2's error codes."""
 
     def __init__(self, code: ErrorCode, message: str) -> None:
         """Take the error code and a message for logs and reports."""
@@ -81,7 +81,7 @@ class Localizer(Protocol):
     """
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart at an initial pose estimate. The next odometry reading is the new reference."""
+        """Restart at an initial pose estimate. Motion is measured from the next odometry reading on."""
         ...
 
     def on_odometry(self, odometry: Odometry) -> None:
@@ -103,9 +103,9 @@ class Localizer(Protocol):
 
 
 class SupportsPose(Protocol):
-    """Optional extension of a localizer: the pose without covariance and particles, which costs less.
+    """Optional extension of a localizer: the estimated pose alone, which is faster to compute than the belief.
 
-    The controller needs the pose at each step; the complete belief is published less often.
+    The stack needs the pose in each control period. It publishes the complete belief less often.
     """
 
     @property
@@ -137,8 +137,8 @@ class CostmapView:
     origin:            corner (x, y) of cell (0, 0), which has the lowest x and y
     revision:          number that increases with each change
     inflation_radius:  distance in m up to which obstacles increase costs
-    moving:            predicted moving obstacles (see `Footprint.gap`), empty without motion prediction. They increase
-                       only the costs for a planner: in cells where the robot would meet an obstacle.
+    moving:            moving obstacles with predicted positions (see `Footprint.gap`); empty without motion prediction.
+                       `costs` contain them only in the costmap for a planner: where the robot would meet them.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -173,13 +173,13 @@ class Controller(Protocol):
     """Follows a path. All inputs are in the odom frame, because this frame is continuous.
 
     *Given* velocity limits of the robot and a speed limit *then* no command exceeds them.
-    *Given* an obstacle on the arc of the command *then* it fails with NO_VALID_CONTROL.
+    *Given* an obstacle *then* its command is free of collisions, or it fails with NO_VALID_CONTROL.
     """
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on.
 
-        The path can be the rest of the current path, again, after the transform from map to odom frame has changed.
+        When the transform from map to odom frame has changed, the stack passes the rest of the current path again.
         """
         ...
 
@@ -204,7 +204,7 @@ class Controller(Protocol):
 
 @runtime_checkable
 class SupportsArc(Protocol):
-    """Optional extension of a controller whose local plan is an arc: logging the arc is faster."""
+    """Optional extension of a controller that drives along arcs: logging an arc is faster than logging a path."""
 
     @property
     def arc(self) -> tuple[Pose2, Twist] | None:
@@ -254,10 +254,10 @@ class SupportsZones(Protocol):
 
 
 class Stack(Protocol):
-    """A complete navigation stack: takes readings and returns one command per beat (tick at which anything is due).
+    """A complete navigation stack: takes the readings of each beat, and returns a velocity command.
 
-    *Given* no goal or an ended task *then* it commands zero. Unless its task was canceled, it may avoid a moving
-    obstacle that would hit the robot, and return afterward.
+    *Given* no goal or an ended task *then* it commands zero. Exception: if the task was not canceled, the robot may
+    move out of the way of an obstacle and return.
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -265,7 +265,7 @@ class Stack(Protocol):
         ...
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal, as a new action goal does. Called before `decide` of the same tick."""
+        """Replace the current goal, as Nav2 does for a new action goal. Called before `decide` of the same tick."""
         ...
 
     def cancel(self, tick: int) -> None:
@@ -291,12 +291,14 @@ class Stack(Protocol):
 class Surroundings:
     """Robot and environment of a stack.
 
+    robot:        footprint and limits of the robot
     map:          map for localization and planning; None for mapless navigation
     tick_rate:    number of physics steps per second
     keepout:      polygons in the map frame that the robot must not enter
     speed_zones:  polygons in the map frame, each with a speed limit in m/s
     masks:        keepout and speed zones as grids of cells (filter masks of Nav2)
     lidars:       names of the lidars that the localizer uses
+    has_imu:      whether the stack gets readings of an IMU
     """
 
     robot: RobotModel

@@ -1,4 +1,4 @@
-"""Selection of the plans, local plans, beliefs, and costmaps to publish, and events for a robot that stands still."""
+"""What a stack publishes: plans, local plans, beliefs, costmaps, and events if a component keeps the robot waiting."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, Localizer, SupportsArc
 
 BELIEF_RATE_HZ, LOCAL_PLAN_RATE_HZ = 10.0, 5.0
-"""Rate at which the belief is published while no scan arrives, and maximum rate of local plans."""
+"""Rate at which the belief is published if no scans arrive, and maximum rate of local plans."""
 MAX_CELLS_PER_SECOND = 125_000
 """Maximum number of cells published per second for each costmap. It limits the rate of large costmaps."""
 _OCCUPANCY_TABLE = np.array(
@@ -117,7 +117,7 @@ REPORT_AFTER_S = 1.0
 
 
 class StandstillReporter:
-    """Creates an event when a component has kept the robot from driving for REPORT_AFTER_S, and another at the end."""
+    """Creates an event when a component has held the robot (kept it from driving) for REPORT_AFTER_S, and one after."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""

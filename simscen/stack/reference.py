@@ -54,7 +54,7 @@ class ReferenceStack:
     ) -> None:
         """Take the components. `control_period` and `localizer_latency` are in ticks.
 
-        `fuses_odometry`: the pose in the odom frame is that of the localizer (an EKF), not that of the wheel odometry.
+        `fuses_odometry`: the localizer (an EKF), not the wheel odometry, provides the pose in the odom frame.
         `odometry_filter`: filter of the wheel odometry; None to use unfiltered odometry.
         """
         self._speed_filter = SpeedFilter(surroundings)
@@ -152,7 +152,7 @@ class ReferenceStack:
         """Process a plausible odometry or IMU reading."""
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
-        """Process the pose `wheels` by wheel odometry and the pose `fused` after the odometry filter, if any."""
+        """Process an odometry reading: its unfiltered pose `wheels`, and `fused`, the pose in the odom frame."""
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
         """Process a scan. Return the scan to pass to costmaps and collision monitor."""
@@ -162,14 +162,14 @@ class ReferenceStack:
         """Run after the costmap update of a controller period."""
 
     def _on_drive(self) -> None:
-        """Run in each controller period with a goal, before the navigator."""
+        """Run before the navigator in each controller period with a goal."""
 
     def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
-        """Return the command for the velocity smoother; `command` is that of the navigator."""
+        """Return the command to pass to the velocity smoother. `command` comes from the navigator."""
         return command
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
-        """Return the command for the base; `command` is that of the collision monitor."""
+        """Return the command to send to the base. `command` comes from the collision monitor."""
         return command
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
@@ -356,10 +356,12 @@ class ReferenceStack:
         return goal
 
     def _fail_goal(self, tick: int, failure: NavigationFailure) -> None:
+        """Record that the current goal has failed, and stop the robot."""
         self._events += self._task.record_failed(tick, failure.code, str(failure))
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:
+        """Stop the robot, and remove the goal from the navigator."""
         self._events += self._standstill.report_release(tick)
         self._navigator.stop()
         self._commands.stop(tick)

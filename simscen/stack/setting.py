@@ -1,4 +1,4 @@
-"""Argument of the constructors of stack components: robot, map, random generator, and functions of the stack."""
+"""What a stack component gets besides its specification: robot, map, random generator, and functions of the stack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -32,11 +32,11 @@ class Setting:
     estimate:         initial pose estimate; `reset` or `start` passes it again
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
-    clear_costmap:    clears all obstacles from the costmaps that current readings do not show (for a behavior)
-    clear_around:     like `clear_costmap`, but only within the range of the local costmap (for a behavior)
+    clear_costmap:    clears both costmaps, except for obstacles in the newest readings (for a behavior)
+    clear_around:     like `clear_costmap`, but only the area of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
     limit_command:    returns the command after the collision monitor, given command and pose in the odom frame
-    wrap_localizer:   wraps the localizer for all other components (for the reference stack)
+    wrap_localizer:   returns the localizer that the other components use instead (for the reference stack)
     """
 
     surroundings: Surroundings

@@ -1,4 +1,4 @@
-"""List of the goals of a navigation task, with the events that the client of a Nav2 action would see."""
+"""Goals of a navigation task and their progress, with the events that the client of a Nav2 action would see."""
 
 from simscen.core.clock import Clock
 from simscen.core.messages.navigation import ErrorCode, Goal, Mode, TaskResult
@@ -83,7 +83,7 @@ class Task:
     def record_failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
         """Record that the current goal has failed, and end the task if it stops on failures.
 
-        `code` is a plain number if a stack of another package uses a code that has no name here.
+        `code` is an int if a stack of another package uses an error code that ErrorCode does not contain.
         """
         details: dict[str, Value] = {"error_code": int(code), "error_name": _error_name(code), "message": message}
         dropped = self._end_action(tick, EventKind.GOAL_FAILED, **details)
@@ -103,7 +103,7 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:
-        """Replace the goals of the current action, or a wait, by `goal`. The goals of later actions stay."""
+        """Cancel the current action (or wait), and insert `goal` before the goals of later actions."""
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
         self.goal, self._wait_until = None, None
         self._waiting.insert(0, goal)

@@ -86,10 +86,10 @@ class RotationClearance:
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
         """Return whether a rotation by `angle` rad keeps the required clearance, or a smaller current clearance."""
-        reach = self._footprint.reach
-        if reach == 0.0 or distance_at(costmap, pose.x, pose.y) > reach + 2.0 * costmap.resolution:
+        radius = self._footprint.rotation_radius
+        if radius == 0.0 or distance_at(costmap, pose.x, pose.y) > radius + 2.0 * costmap.resolution:
             return True
-        steps = max(2, math.ceil(abs(angle) * reach / costmap.resolution) + 1)
+        steps = max(2, math.ceil(abs(angle) * radius / costmap.resolution) + 1)
         poses = poses_along(pose, Twist(0.0, 0.0, angle), np.linspace(0.0, 1.0, steps))
         clearance = self._footprint.clearance(costmap, poses)
         required = min(ROTATION_CLEARANCE_CELLS * costmap.resolution, float(clearance[0]))
@@ -116,7 +116,7 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
     """
     if _is_surely_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
-    speed = math.hypot(twist.vx, twist.vy) + abs(twist.wz) * footprint.reach
+    speed = math.hypot(twist.vx, twist.vy) + abs(twist.wz) * footprint.rotation_radius
     steps = max(2, math.ceil(horizon * speed / costmap.resolution) + 1)
     times = np.linspace(0.0, horizon, steps)
     poses = poses_along(pose, twist, times)
