@@ -15,7 +15,7 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
-"""Default minimum size of the local costmap, which is the size in Nav2."""
+"""Smallest default size of the local costmap: the size in Nav2."""
 ZONE_TOLERANCE_M = 0.02
 """Shift of the map frame in the odom frame above which keepout zones are moved in the local costmap."""
 
@@ -57,7 +57,7 @@ class Costmaps:
             schedule.readings[reading.sensor] = reading
 
     def is_global_due(self, tick: int) -> bool:
-        """Return whether it is time for an update of the global costmap."""
+        """Return whether an update of the global costmap may start at this tick."""
         return self._global_schedule.is_due(tick)
 
     def set_zones(self, zones: Zones) -> None:
@@ -82,7 +82,7 @@ class Costmaps:
         self.clear_local()
 
     def clear_around(self) -> None:
-        """Clear both costmaps within the range of the local costmap (Nav2's ClearCostmapAroundRobot)."""
+        """Clear both costmaps in the area of the local costmap (Nav2's ClearCostmapAroundRobot)."""
         self.global_costmap.clear(self._local_range)
         self.clear_local()
 
@@ -91,7 +91,7 @@ class Costmaps:
         self.local_costmap.clear(unseen_margin=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
-        """Clear the global costmap: entirely, or only within the range of the local costmap."""
+        """Clear the global costmap: entirely, or only in the area of the local costmap."""
         self.global_costmap.clear(math.inf if entirely else self._local_range)
 
     def _update_local_zones(self, frames: Frames) -> None:
@@ -109,7 +109,11 @@ class Costmaps:
 
 
 class _Update(NamedTuple):
-    """A reading, the pose `base` of the robot at the time of the reading, and its poses at the start of the update."""
+    """Update of a costmap with one reading.
+
+    `base` is the pose of the robot at the time of the reading, in the frame of the costmap. `frames` are its poses when
+    the update started.
+    """
 
     base: Pose2
     reading: Scan | Image
@@ -128,6 +132,7 @@ class _UpdateSchedule:
         self.readings: dict[str, Scan | Image] = {}
 
     def is_due(self, tick: int) -> bool:
+        """Return whether an update may start at this tick."""
         return tick - self._updated_at >= self._period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:

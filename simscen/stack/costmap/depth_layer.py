@@ -24,7 +24,7 @@ Heights = npt.NDArray[np.float32]
 
 
 class DepthObservation(NamedTuple):
-    """Content of a depth image: obstacle cells (n, 2), their heights (n,), and ground cells."""
+    """Content of a depth image: obstacle cells (n, 2), their heights (n,) in m, and ground cells (m, 2)."""
 
     cells: Cells
     heights: Heights
@@ -42,27 +42,32 @@ def project_depth_image(
     depth = image.depth.astype(np.float64)
     depth[~((depth <= spec.obstacle_max_range) & (depth > 0.0))] = np.nan
     points = image.mount.apply(np.stack((depth, depth * across, depth * up), axis=-1))
-    away, heights = np.hypot(points[..., 0] - image.mount.x, points[..., 1] - image.mount.y), points[..., 2]
+    distances, heights = np.hypot(points[..., 0] - image.mount.x, points[..., 1] - image.mount.y), points[..., 2]
     cells = frame.cells(base.apply(np.nan_to_num(points[..., :2].reshape(-1, 2))))
     inside = frame.inside(cells) & np.isfinite(heights).reshape(-1)
     cells[~inside] = 0
     if spec.max_ground_slope > 0.0:
         was_ground = (known_ground[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
-        above, level = above_ground(away, heights, spec.max_ground_slope, spec.min_obstacle_height, was_ground)
+        above, level = heights_above_ground(
+            distances, heights, spec.max_ground_slope, spec.min_obstacle_height, was_ground
+        )
     else:
         above, level = heights, np.zeros(heights.shape, dtype=bool)
     is_obstacle = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
-    is_obstacle &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
+    is_obstacle &= (distances >= spec.obstacle_min_range) & (distances <= spec.obstacle_max_range)
     marked = is_obstacle.reshape(-1) & inside
     return DepthObservation(
         cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside]
     )
 
 
-def seen_through(
+def is_seen_through(
     cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
 ) -> Mask:
-    """Return through which of the cells (n, 2), at their heights (n,) in m, the camera sees points farther away."""
+    """Return which of the obstacle cells (n, 2) the camera sees through: it measures a point farther away.
+
+    `heights` (n,) in m are those of the obstacles.
+    """
     in_base = base.inverse().apply(frame.centers(cells))
     points = image.mount.inverse().apply(np.column_stack((in_base, heights.astype(np.float64))))
     is_ahead = points[:, 0] > 0.0
@@ -100,24 +105,25 @@ SLOPE_ROWS_DIVISOR = 8
 """The slope at the lowest point of a column is measured over one eighth of the image rows."""
 
 
-def above_ground(
-    away: Array, heights: Array, max_slope: float, max_step: float, known_ground: Mask
+def heights_above_ground(
+    distances: Array, heights: Array, max_slope: float, max_step: float, known_ground: Mask
 ) -> tuple[Array, Mask]:
     """Return the heights in m above the ground of the points of an image (rows, columns), and which points are ground.
 
-    away:          horizontal distances of the points from the camera in m, top row first
+    distances:     horizontal distances of the points from the camera in m, top row first
     heights:       heights in m above the plane on which the robot stands; nan for pixels without a point
     max_slope:     maximum slope angle of the ground in rad
-    max_step:      height in m up to which the lowest point of a column is not on a step
-    known_ground:  points on cells that earlier images showed as ground
+    max_step:      height in m up to which the lowest point of a column counts as ground
+    known_ground:  which points are on cells that earlier images showed as ground
     """
-    max_rise, upright = math.tan(max_slope), _upright(away, heights)
+    max_rise, upright = math.tan(max_slope), _is_upright(distances, heights)
     rows, columns = heights.shape
     ground_distance, ground_height = np.zeros(columns), np.zeros(columns)
-    has_ground = ~_on_a_step(away, heights, upright, max_step) | known_ground[_lowest(heights), np.arange(columns)]
+    is_step = _starts_on_step(distances, heights, upright, max_step)
+    has_ground = ~is_step | known_ground[_lowest_rows(heights), np.arange(columns)]
     above, level = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
     for row in range(rows - 1, -1, -1):
-        r, z = away[row], heights[row]
+        r, z = distances[row], heights[row]
         is_ground = has_ground & (z - ground_height <= max_rise * (r - ground_distance)) & ~upright[row]
         height = z - ground_height * np.minimum(1.0, r / np.maximum(ground_distance, GROUND_STEP_M))
         above[row], level[row] = np.where(is_ground, np.minimum(height, 0.0), height), is_ground
@@ -127,31 +133,31 @@ def above_ground(
     return above, level
 
 
-def _upright(away: Array, heights: Array) -> Mask:
-    """Return which points are steeply above or below the point in an adjacent row."""
-    steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
+def _is_upright(distances: Array, heights: Array) -> Mask:
+    """Return which points are on an upright face: steeply above or below the point in an adjacent row."""
+    steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-distances, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
     upright[:-1] |= steep
     return upright
 
 
-def _on_a_step(away: Array, heights: Array, upright: Mask, max_step: float) -> Mask:
+def _starts_on_step(distances: Array, heights: Array, upright: Mask, max_step: float) -> Mask:
     """Return in which columns the lowest point is on a step (or an obstacle) whose edge is below the image.
 
-    This point is higher than `max_step`. Besides, it is on an upright face, or the slope there, extended to the robot,
-    ends higher than `max_step`.
+    Such a point is higher than `max_step`, and one of two conditions holds: it is on an upright face, or the slope
+    there, extended to the robot, ends higher than `max_step`.
     """
     rows, columns = heights.shape
-    all_columns, lowest = np.arange(columns), _lowest(heights)
+    all_columns, lowest = np.arange(columns), _lowest_rows(heights)
     upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)
-    r, z = away[lowest, all_columns], heights[lowest, all_columns]
-    rise = (heights[upper, all_columns] - z) / np.maximum(away[upper, all_columns] - r, GROUND_STEP_M)
+    r, z = distances[lowest, all_columns], heights[lowest, all_columns]
+    rise = (heights[upper, all_columns] - z) / np.maximum(distances[upper, all_columns] - r, GROUND_STEP_M)
     step: Mask = (z > max_step) & (upright[lowest, all_columns] | ~(z - rise * r <= max_step))
     return step
 
 
-def _lowest(heights: Array) -> npt.NDArray[np.intp]:
+def _lowest_rows(heights: Array) -> npt.NDArray[np.intp]:
     """Return the lowest row with a point for each column; the last row for columns without a point."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

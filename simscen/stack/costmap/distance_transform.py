@@ -16,11 +16,11 @@ MAX_INT32_EDGE_CELLS = 30_000
 MAX_REACH_CELLS = 180
 """Largest supported `reach`, the maximum distance: the sum of two squares must fit into 16 bits."""
 OUT_OF_REACH = 65535
-"""Largest value in 16 bits, for cells farther away than any maximum distance."""
+"""Largest value in 16 bits: squared distance of cells that are farther away than the maximum distance."""
 MAX_COMPARED_CELLS = 60
-"""Maximum distance up to which comparing neighbors is faster than scipy's transform."""
+"""Largest `reach` for which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
-"""Number of values that are compared at once: they fit into a processor cache."""
+"""Number of values that are compared at once, so that they fit into a processor cache."""
 
 Squares = npt.NDArray[np.uint16]
 _SQUARED_OFFSETS: Squares = (np.arange(1, MAX_REACH_CELLS + 1) ** 2).astype(np.uint16)[:, None, None]
@@ -35,9 +35,9 @@ def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squar
 
 
 class SquaredDistanceTransform:
-    """The transform of `squared_distances_within` for several grids of the same shape, with buffers allocated once.
+    """Computes the same as `squared_distances_within` for several grids of one shape, with buffers allocated once.
 
-    It is separable: one pass along the rows, then one along the columns.
+    The transform is separable: one pass along the rows, then one along the columns.
     """
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:

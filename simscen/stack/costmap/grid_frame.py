@@ -18,7 +18,7 @@ CellIndices = npt.NDArray[np.int64]
 _minimum, _maximum = np.minimum.reduce, np.maximum.reduce
 
 MAX_CACHED_CELLS = 10_000
-"""Number of cells of the largest grid whose cell centers are cached."""
+"""Maximum number of cells of a grid for which cell centers are cached."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class GridFrame:
     def indices_of(self, points: Plane, center: complex, reach: float) -> CellIndices:
         """Return the flat indices of the cells at points x + iy (n,). Points outside the grid are left out.
 
-        All points must be within `reach` m of `center`, so that a check of this circle can replace checks of points.
+        All points must be within `reach` m of `center`. If this circle lies on the grid, points need not be checked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
@@ -88,7 +88,7 @@ class GridFrame:
         return points
 
     def extent(self, indices: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Return the bounding box of at least one cell: lowest (row, column) and highest (row, column)."""
+        """Return the bounding box of cells (at least one): lowest (row, column) and highest (row, column)."""
         width = self.shape[1]
         first, last, columns = int(_minimum(indices)), int(_maximum(indices)), indices % width
         return (first // width, int(_minimum(columns))), (last // width, int(_maximum(columns)))
@@ -133,9 +133,9 @@ ValueType = TypeVar("ValueType", bound=np.generic)
 GOAL_EDGE_MARGIN_M = 0.6
 """Distance from the edge of the window at which a plan ends if the goal is outside."""
 ROLL_RATIO = 1 / 8
-"""Distance of the robot from the center, as a fraction of the window's size, above which the window is moved."""
+"""The window is moved when the robot is farther from its center than this fraction of the window's size."""
 MAX_ROLL_OFFSET_M = 0.25
-"""Distance of the robot from the center above which the window of a local costmap is moved."""
+"""The window of a local costmap is also moved when the robot is farther than this from its center."""
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:

@@ -1,4 +1,4 @@
-"""Layered costmap: inflated obstacles of the static map and live obstacles, which sensors see."""
+"""Layered costmap: inflates the obstacles of the static map and live obstacles, which sensors see."""
 
 import math
 from collections import deque
@@ -48,7 +48,7 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 DISTANCE_MARGIN_M = 0.5
-"""Distances to obstacles are computed up to the circumscribed radius plus this margin, or to the inflation radius."""
+"""Distances are computed up to the circumscribed radius plus this margin, or to the inflation radius if larger."""
 SCANS_PER_UNKNOWN_UPDATE = 5
 """Unknown cells are updated with every n-th scan: once per second at the default rate."""
 MAX_REVISIONS = 16
@@ -92,7 +92,7 @@ class LayeredCostmap:
         self._set_static_layer(layer)
         self._unknown = layer.unknown.copy()
         grid = None if self._has_keepout else surroundings.map
-        self._recompute(
+        self._reset_to_static_layer(
             None
             if grid is None
             else _map_costs(
@@ -172,19 +172,20 @@ class LayeredCostmap:
             self._live.reset(self._frame)
         if out_of_view is not None:
             self._live.mark(out_of_view)
-        self._recompute()
+        self._reset_to_static_layer()
         for base, reading in latest:
             self.update(base, reading)
 
     def set_zones(self, zones: Zones) -> None:
         """Replace all keepout zones and masks."""
-        before = self._keepout_count()
+        before = self._static_lethal_count()
         self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
         self._set_static_layer(self._static_layer_in(self._frame))
-        self._keepout_change += self._keepout_count() - before
-        self._recompute()
+        self._keepout_change += self._static_lethal_count() - before
+        self._reset_to_static_layer()
 
-    def _keepout_count(self) -> int:
+    def _static_lethal_count(self) -> int:
+        """Return the number of lethal cells of the static layer."""
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
@@ -228,6 +229,7 @@ class LayeredCostmap:
         return bool(self._surroundings.keepout) or self._surroundings.masks.keepout is not None
 
     def _set_static_layer(self, layer: StaticLayer) -> None:
+        """Use this static layer, and compute its distances to obstacles."""
         self._frame = layer.frame
         rows, columns = layer.frame.shape
         self._whole = (0, 0), (rows - 1, columns - 1)
@@ -240,7 +242,7 @@ class LayeredCostmap:
             self._static_squared = static_distances(grid, self._spec.lethal_cost_threshold, self._margin_cells)
         self._has_walls = bool(layer.lethal.any())
 
-    def _recompute(self, costs: Costs | None = None) -> None:
+    def _reset_to_static_layer(self, costs: Costs | None = None) -> None:
         """Reset costs and distances to the static layer. The next `view` adds live obstacles.
 
         `costs` are the costs of the static layer; None to compute them.
@@ -334,7 +336,7 @@ class LayeredCostmap:
 
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
-    """Return the distance in m at which distances from obstacles are cut off."""
+    """Return the distance in m up to which distances to obstacles are computed."""
     return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
 
 

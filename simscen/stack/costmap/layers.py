@@ -1,7 +1,7 @@
 """Static layer (map and keepout zones) and inflation of a costmap, and the speed filter.
 
-Distances are stored as squared numbers of cells (uint16), with which lookup tables give the distance in m and the cost.
-The largest value, OUT_OF_REACH, stands for 256 cells and more.
+Distances are stored as squares, in cells (uint16). Lookup tables convert the squares to distances in m and to costs.
+Cells beyond the maximum distance have a square that is larger than the square of this distance.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ Costs = npt.NDArray[np.uint8]
 
 
 def squared_distances(lethal: npt.NDArray[np.bool_], reach_cells: int) -> Squared:
-    """Return the squared distance of each cell to the nearest lethal cell, exact up to `reach_cells` cells."""
+    """Return the squared distance in cells of each cell to the nearest lethal cell, exact up to `reach_cells`."""
     if not lethal.any():
         return np.full(lethal.shape, OUT_OF_REACH, dtype=np.uint16)
     if reach_cells <= MAX_REACH_CELLS:
@@ -53,7 +53,7 @@ def shared_inflation(resolution: float, inscribed: float, radius: float, scaling
 
 
 class Inflation:
-    """Lookup tables by squared distance in cells: `meters` for the distance in m, `cost` for Nav2's inflated cost.
+    """Lookup tables by squared distance in cells: `meters` contains the distance in m, `cost` Nav2's inflated cost.
 
     cost = 252 · exp(-scaling · (distance - inscribed)) between the inscribed and the inflation radius (computeCost in
     nav2_costmap_2d/inflation_layer.hpp). `meters` is at most `reach_m`.
@@ -132,6 +132,7 @@ def empty_layer(
 
 
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
+    """Return the cells (rows, columns) that keepout polygons or the keepout mask cover."""
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
         lethal |= points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
@@ -143,11 +144,13 @@ def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: Occupan
 
 
 def _all_centers(frame: GridFrame) -> Array:
+    """Return the centers (n, 2) of all cells, row by row."""
     rows, columns = np.indices(frame.shape)
     return frame.centers(np.column_stack((rows.ravel(), columns.ravel())))
 
 
 def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
+    """Return the smallest unrotated frame that contains a rotated map."""
     height, width = grid.shape
     corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * grid.resolution
     corners = grid.origin.apply(corners)

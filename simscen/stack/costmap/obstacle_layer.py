@@ -15,7 +15,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.costmaps import DenoiseLayer
-from simscen.stack.costmap.depth_layer import Heights, project_depth_image, seen_through
+from simscen.stack.costmap.depth_layer import Heights, is_seen_through, project_depth_image
 from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, ValueType, shift_layer
 from simscen.stack.costmap.layers import Mask, Squared
 from simscen.stack.localizers.beams import Plane, directions
@@ -32,9 +32,9 @@ class ScanWithMovingHits(Scan):
 
 
 def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
-    """Return the hits x + iy (n,) on static obstacles between `nearest` and `farthest` m, and the lidar's position.
+    """Return the hits x + iy (n,) of beams between `nearest` and `farthest` m, and the position of the lidar.
 
-    `base` is the pose of the robot.
+    `base` is the pose of the robot. Hits on moving obstacles are left out.
     """
     lidar = _lidar_position(scan, base)
     points: Plane = _hit_offsets(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
@@ -82,10 +82,10 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 def crossed_cells(
     points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[CellIndices, float]:
-    """Return the indices of the cells, with centers `points` x + iy (n,), that beams cross before their hits.
+    """Return which cells beams cross before their hits, and the distance in m from the lidar to the nearest center.
 
-    Also return the distance in m from the lidar to the nearest center. `points` must not be empty. Each cell is tested
-    only against the beam nearest to its center.
+    `points` x + iy (n,) are the centers of the cells, at least one. The result contains indices into `points`. Each
+    cell is tested only against the beam nearest to its center.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
     relative = points - _lidar_position(scan, base)
@@ -134,7 +134,7 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
 
 
 MAX_WALL_SQUARED_CELLS = 2
-"""Squared distance from a mapped wall up to which a hit is on the wall itself and is not marked."""
+"""Squared distance from a mapped wall up to which a hit counts as a hit on the wall and is not marked."""
 NO_CELLS: CellIndices = np.zeros(0, dtype=np.int64)
 EMPTY_MASK: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
@@ -169,9 +169,9 @@ class ObstacleLayer:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
-        """Return cells (n, 2) within `meters` along x and y that a lidar has marked, outside the view of all `scans`.
+        """Return the cells (n, 2) that a lidar has marked but that are outside the field of view of all `scans`.
 
-        `scans` contains pairs (pose of the robot, scan).
+        Only cells within `meters` of the robot along x and y are returned. `scans` are pairs (pose of the robot, scan).
         """
         center = self._frame.cell(base.x, base.y)
         window = self._frame.window(center, center, math.ceil(meters / self._frame.resolution))
@@ -231,7 +231,7 @@ class ObstacleLayer:
         return np.concatenate((cleared, new)) if len(cleared) else new
 
     def _without_walls(self, walls: Squared | None, cells: CellIndices) -> CellIndices:
-        """Return the cells that are not on or next to a wall."""
+        """Return the `cells` that are neither on nor next to a wall."""
         if walls is None:
             return cells
         if walls is not self._walls:
@@ -266,7 +266,7 @@ class ObstacleLayer:
             self._ground = np.zeros(self._frame.shape, dtype=bool)
         marked = np.argwhere(~np.isnan(self._heights))
         heights = self._heights[marked[:, 0], marked[:, 1]]
-        is_cleared = seen_through(marked, heights, self._frame, image, base, self._spec)
+        is_cleared = is_seen_through(marked, heights, self._frame, image, base, self._spec)
         is_cleared |= self._under_robot(self._frame.centers(marked), base)
         _set_values(self._heights, marked[is_cleared], np.nan)
         cells, heights, ground = project_depth_image(image, base, self._frame, self._spec, self._ground)

@@ -62,6 +62,6 @@ def test_incremental_updates_equal_a_full_computation() -> None:
         pose = Pose2(0.1 * k, 0.0)
         map_.update(pose, scan_of(world, pose, noise=0.03))
         costs, distance = map_.view.costs.copy(), map_.view.distance.copy()
-        map_._recompute()
+        map_._reset_to_static_layer()
         assert np.array_equal(map_.view.costs, costs)
         assert np.array_equal(map_.view.distance, distance)
