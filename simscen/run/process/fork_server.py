@@ -33,14 +33,17 @@ from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 MAX_MESSAGE_BYTES = 1 << 20
 """Maximum size of a message from a worker."""
 DUMP_TIME_S = 0.5
-"""Time for a worker that exceeded its wall limit to dump its stack, before SIGTERM."""
+"""Time for a worker that exceeded its wall-time limit to write its Python traceback, before SIGTERM."""
 TERM_GRACE_S = 2.0
-"""Time between SIGTERM and SIGKILL for a worker that exceeded its wall limit."""
+"""Time between SIGTERM and SIGKILL for a worker that exceeded its wall-time limit."""
 
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
 _TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
-"""Signals that end a worker at its wall limit, each with the time in s until the next: dump, terminate, kill."""
+"""Signals that end a worker at its wall-time limit, each with the time in s until the next one.
+
+SIGUSR1 makes the worker write its Python traceback.
+"""
 
 SendMessage = Callable[[dict[str, Any]], None]
 """Function that sends a message to the supervisor."""
@@ -83,7 +86,7 @@ class WorkerHandle:
         return bool(data)
 
     def _process_message(self, text: bytes) -> None:
-        """Process a message; ignores invalid messages."""
+        """Process a message of the worker. Ignores invalid messages."""
         try:
             message = json.loads(text)
         except (ValueError, RecursionError):
@@ -95,7 +98,7 @@ class WorkerHandle:
                 self._send_message({"job": self.job.number, "seconds": seconds})
 
     def escalate(self) -> None:
-        """Send the next signal to a worker that exceeded its deadline: dump the stack, SIGTERM, or SIGKILL."""
+        """Send the next signal of _TERMINATION_STEPS to a worker that exceeded its deadline."""
         signal_number, timeout = next(self._steps, _TERMINATION_STEPS[-1])
         self._killed_for, self.deadline = "timeout", time.monotonic() + timeout
         if signal_number is signal.SIGUSR1:
@@ -117,10 +120,10 @@ class WorkerHandle:
             os.close(descriptor)
 
     def exit_message(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Close the pipes, and return the message about the end of the worker. Call it after the worker was reaped.
+        """Close the pipes of a reaped worker, and return the message about its end.
 
         `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory. The
-        message has the fields of jobs.ProcessEnd, with `exit` instead of `number`.
+        message has the fields of jobs.ProcessEnd, but the number of the job has the key `exit`.
         """
         for read in (self.read_messages, self.read_output):
             try:
@@ -200,6 +203,7 @@ class ForkServer:
         return True
 
     def _fork(self, job: Job, log: CappedLog) -> None:
+        """Fork the worker of a job, and watch its pipes and its exit."""
         parent = os.getpid()
         report_reader, report_writer = os.pipe()
         output_reader, output_writer = os.pipe()
@@ -227,13 +231,13 @@ class ForkServer:
         os.close(self._replies)
 
     def _read(self, pipe: int, read: Callable[[], bool]) -> bool:
-        """Read from a pipe, and stop watching it at its end; return True."""
+        """Read from a pipe, and stop watching it at its end. Return True, so that `serve` continues."""
         if not read():
             self._selector.unregister(pipe)
         return True
 
     def _reap(self, child: WorkerHandle) -> bool:
-        """Kill the process group of a worker that has exited, reap the worker, and report its end; return True."""
+        """Reap an exited worker, kill its descendants, and report its end. Return True, so that `serve` continues."""
         for descriptor in (child.pidfd, child.report, child.output):
             if descriptor in self._selector.get_map():
                 self._selector.unregister(descriptor)
@@ -245,6 +249,7 @@ class ForkServer:
         return True
 
     def _select_timeout(self) -> float:
+        """Return the time in s until the next deadline of a worker, at most HEARTBEAT_S."""
         deadlines = [child.deadline - time.monotonic() for child in self._children.values()]
         return max(0.0, min([HEARTBEAT_S, *deadlines]))
 
@@ -265,7 +270,7 @@ class ForkServer:
 
 
 def _take_own_output() -> bytes:
-    """Return the output of this process since the last call, and truncate the file to which it is redirected."""
+    """Return the output of the fork server since the last call, and truncate the file to which it is redirected."""
     size = os.fstat(2).st_size
     data = os.pread(2, size, 0)
     os.ftruncate(2, 0)

@@ -21,7 +21,7 @@ MAX_TAIL_BYTES = 1 << 18
 READ_BYTES = 1 << 20
 """Largest number of bytes that are read from a pipe at once."""
 TAIL_BYTES = 16_384
-"""Number of bytes of output that a message about the end of a process contains."""
+"""Largest number of bytes of output in a message about the end of a process."""
 
 
 class CappedLog:
@@ -86,14 +86,14 @@ _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<nam
 
 
 def innermost_frame(output: str) -> str:
-    """Return the innermost frame of a stack dump in the output, such as "step (simulation.py:88)", or ""."""
+    """Return the innermost frame of a Python traceback in the output, such as "step (simulation.py:88)", or ""."""
     heads = list(_DUMP_HEADER.finditer(output))
     frame = _DUMP_FRAME.search(output, heads[-1].end()) if heads else None
     return f"{frame['name']} ({PurePath(frame['file']).name}:{frame['line']})" if frame else ""
 
 
 def output_tail(output: str) -> str:
-    """Return the last TAIL_LINES lines of the output, or the first lines of a stack dump if there is one."""
+    """Return TAIL_LINES lines of the output: the start of a crash's Python traceback if there is one, else the end."""
     heads = list(_DUMP_HEADER.finditer(output))
     if heads:
         before = output[: heads[-1].start()].splitlines()[-3:]
@@ -146,7 +146,7 @@ def limit_resources() -> None:
 
 
 def clean_environment() -> dict[str, str]:
-    """Return the environment variables of worker processes: fixed CPU kernels and hash seed, and one BLAS thread.
+    """Return the environment variables of worker processes: fixed BLAS kernels and hash seed, and one BLAS thread.
 
     Only a few variables of this process are inherited, so that workers see no secrets.
     """
@@ -189,7 +189,7 @@ def kill_children_except(kept: Iterable[int]) -> None:
 
 
 def _children_except(excluded: Collection[int]) -> list[int]:
-    """Return the ids of the children of this process that are not `excluded`, including zombies."""
+    """Return the ids of the children of this process, including zombies, that are not `excluded`."""
     own = os.getpid()
     with suppress(FileNotFoundError):  # a kernel without CONFIG_PROC_CHILDREN
         listed = map(int, Path(f"/proc/{own}/task/{own}/children").read_text().split())
@@ -224,7 +224,7 @@ def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
 def apply_plugin_path(argument: str) -> None:
     """Extend sys.path in a fork server, so that it finds the plug-ins of its parent process.
 
-    New folders come last. A folder comes first only if another version of a used package would be found otherwise.
+    New folders are appended. A folder comes first only if another version of a plug-in's package would be found else.
     """
     configuration = json.loads(argument)
     for folder in configuration["path"]:

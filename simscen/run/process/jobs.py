@@ -1,4 +1,4 @@
-"""Jobs (runs to execute), the interface of backends that execute jobs, and the updates that backends report."""
+"""Jobs (runs to execute), the interface of the backends that execute jobs, and the updates that backends report."""
 
 import json
 import os
@@ -15,6 +15,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.spec.registry import Entry
 
 _LENGTH = struct.Struct("<I")
+"""Length in bytes of a pickled job, which precedes the job in a pipe."""
 
 
 class KeptLogs(str, Enum):
@@ -45,6 +46,7 @@ class Job:
         key: Scenario name, seed, variation, and stack, which identify the run.
         folder: Output folder of the run.
         wall_limit: Limit of the wall time in s.
+        replay: Outcomes for which the run gets a replay page.
     """
 
     number: int
@@ -63,7 +65,7 @@ class ProcessEnd:
         number: Number of the job.
         code: Exit code; None if a signal ended the process.
         signal: Number of the signal that ended the process, or None.
-        killed_for: "timeout" if the process was killed at its wall limit, else None.
+        killed_for: "timeout" if the process was killed at its limit of wall time, else None.
         final_message: End record that the worker sent (see worker.ExecuteJob), or None.
         wall: Wall time in s.
         cpu: Processor time in s.
@@ -142,7 +144,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Progressed:
-    """A job has reached a simulated time in seconds."""
+    """A job has simulated `seconds` of its run."""
 
     job: Job
     seconds: float
@@ -159,8 +161,8 @@ class Ended:
 JobUpdate = Started | Progressed | Ended
 
 
-def always() -> bool:
-    """Return True."""
+def always_true() -> bool:
+    """Return True. Default of `should_continue`, with which all jobs are executed."""
     return True
 
 
@@ -172,7 +174,7 @@ class Backend(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
     ) -> Iterator[JobUpdate]:
         """Execute jobs, several at a time, and yield their updates: exactly one Ended for each started job.
 

@@ -18,7 +18,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from simscen.core.errors import UsageError
 from simscen.core.version import __version__
-from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always_true
 from simscen.run.process.ray_node import (
     PACKAGE_FOLDER,
     FileChunk,
@@ -40,7 +40,7 @@ MAX_ATTEMPTS = 2
 QUEUED_JOBS_PER_WORKER = 2
 """Number of jobs in the queue for each worker."""
 NODE_SEARCH_PERIOD_S = 5.0
-"""Time between two searches for nodes that have joined the cluster."""
+"""Time between two searches for new nodes of the cluster."""
 CONNECT_TIMEOUT_S = 5.0
 START_TIMEOUT_S = 120.0
 """Time to wait until the first runner has started."""
@@ -51,9 +51,9 @@ MAX_UNREAD_UPDATES = 64
 
 @dataclass
 class _Runner:
-    """A Ray actor of the class NodeRunner with `workers` workers.
+    """Handle of the Ray actor of the class NodeRunner on one node.
 
-    `call` is its pending remote call: `software` until `is_ready`, afterwards `run`. It is None without jobs.
+    `call` is its pending remote call: first `software`, and `run` when `is_ready`. It is None if there are no jobs.
     """
 
     name: str
@@ -99,7 +99,7 @@ class RayBackend:
         ray.shutdown()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Raises UsageError for an unusable cluster."""
         batch, start_time = _Batch(jobs, should_continue), time.monotonic()
@@ -139,7 +139,7 @@ class RayBackend:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
 
     def _require_free_cpus(self, start_time: float) -> None:
-        """Raise UsageError if no runner has started within START_TIMEOUT_S after `start_time`."""
+        """Raise UsageError if no runner has started within START_TIMEOUT_S after `start_time` (monotonic clock, s)."""
         if time.monotonic() > start_time + START_TIMEOUT_S and not any(runner.is_ready for runner in self._runners):
             raise UsageError(
                 f"no node of the Ray cluster at {self._address} has become free in {START_TIMEOUT_S:g} s: other "
@@ -154,6 +154,7 @@ class RayBackend:
         return _Runner(f"runner-{self._next_name}", node, address, actor, workers, actor.software.remote())
 
     def _start(self, runner: _Runner, plugins: Sequence[Entry]) -> None:
+        """Let a runner take jobs from the queue."""
         call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=MAX_UNREAD_UPDATES)
         runner.call = call.remote(self._queue, runner.name, list(plugins))
 
@@ -210,7 +211,7 @@ class RayBackend:
             yield from batch.retry_or_fail(number, runner.address)
 
     def _finish_calls(self) -> None:
-        """Wait for the ends of all remote calls. The queue must be empty."""
+        """Wait until all remote calls have ended. The queue must be empty."""
         for runner in [runner for runner in self._runners if runner.is_ready and runner.call is not None]:
             try:
                 ray.get(list(runner.call))

@@ -1,6 +1,6 @@
-"""Transfer jobs to the nodes of a Ray cluster, and run them there.
+"""Parts of RayBackend that run on the nodes of a Ray cluster, and the transfer of jobs and files to and from a node.
 
-RayBackend makes Ray actors of the classes NodeRunner and JobQueue. A job is sent with its input files.
+RayBackend makes Ray actors of the classes NodeRunner and JobQueue.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ class SentFile:
 
 @dataclass(frozen=True)
 class PackedJob:
-    """A job for another machine: `data` is the pickled job, and `files` has its input files by absolute path."""
+    """A job to send to another machine: `data` is the pickled job, and `files` has its input files by absolute path."""
 
     number: int
     data: bytes
@@ -46,7 +46,7 @@ class PackedJob:
 
 
 def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
-    """Return a job for another machine, without its output folder. `send` puts an input file into the cluster."""
+    """Pack a job, without its output folder, for another machine. `send` puts an input file into the cluster."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(replace(job, folder=Path()))
@@ -151,7 +151,7 @@ class JobStarted:
 
 @dataclass(frozen=True)
 class JobProgressed:
-    """A job has reached a simulated time in seconds."""
+    """A job has simulated `seconds` of its run."""
 
     number: int
     seconds: float
@@ -175,6 +175,7 @@ class JobEnded:
 
 
 NodeUpdate = JobStarted | JobProgressed | FileChunk | JobEnded
+"""Update that a node sends. RayBackend converts it to a JobUpdate. `number` is the number of the job."""
 
 
 class JobQueue:
@@ -189,7 +190,7 @@ class JobQueue:
         self._waiting.append(job)
 
     def take(self, runner: str) -> PackedJob | None:
-        """Remove and return the next job, for the runner with the name `runner`; return None if the queue is empty."""
+        """Remove the next job, and return it to the runner named `runner`; return None if the queue is empty."""
         if not self._waiting:
             return None
         job = self._waiting.popleft()
@@ -235,7 +236,7 @@ class NodeRunner:
                 case Progressed(seconds=seconds):
                     yield JobProgressed(job.number, seconds)
                 case Ended(end=end):
-                    yield from _files(job)
+                    yield from _file_chunks(job)
                     shutil.rmtree(job.folder, ignore_errors=True)
                     yield JobEnded(job.number, end)
 
@@ -244,7 +245,7 @@ class NodeRunner:
 
 
 class _JobsOfQueue:
-    """Iterator over the jobs of the queue. It continues after its end if jobs were added to the queue."""
+    """Iterator over the jobs of the queue. After its end, it yields jobs again if jobs were added to the queue."""
 
     def __init__(self, take: Callable[[], PackedJob | None], unpack: Callable[[PackedJob], Job]) -> None:
         self._take, self._unpack = take, unpack
@@ -259,8 +260,8 @@ class _JobsOfQueue:
         return self._unpack(packed)
 
 
-def _files(job: Job) -> Iterator[FileChunk]:
-    """Yield the content of all files in the output folder of a job."""
+def _file_chunks(job: Job) -> Iterator[FileChunk]:
+    """Yield all files in the output folder of a job, in chunks."""
     for path in sorted(job.folder.rglob("*")):
         if path.is_file():
             name = path.relative_to(job.folder).as_posix()

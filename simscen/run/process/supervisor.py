@@ -24,7 +24,7 @@ from simscen.run.process.jobs import (
     ProcessEnd,
     Progressed,
     Started,
-    always,
+    always_true,
     pack_job,
 )
 from simscen.spec.registry import Entry
@@ -34,7 +34,7 @@ PIPE_BYTES = 1 << 16
 
 
 class Unresponsive(Exception):
-    """Error: the fork server has sent no message for too long."""
+    """Exception: the fork server has sent no message for too long."""
 
 
 class ProcessDeath(NamedTuple):
@@ -117,7 +117,7 @@ class ForkServerProcess:
         self._output.close()
 
     def abort(self) -> None:
-        """Make the fork server dump its Python stack and exit."""
+        """Make the fork server write its Python traceback and exit."""
         self._process.send_signal(signal.SIGABRT)
 
     def collect_death(self) -> ProcessDeath:
@@ -153,7 +153,7 @@ class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
     If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. After any
-    other death, each running job is a suspect: it is repeated alone, and fails if the fork server dies again.
+    other death, each running job may be the cause: it is repeated alone, and fails if the fork server dies again.
     """
 
     def __init__(self, workers: int, entry: Sequence[str]) -> None:
@@ -162,7 +162,7 @@ class Supervisor:
         self._plugins: frozenset[Entry] = frozenset()
         self._server: ForkServerProcess | None = None
         self._jobs: Iterator[Job] = iter(())
-        self._should_continue: Callable[[], bool] = always
+        self._should_continue: Callable[[], bool] = always_true
         self._retries, self._suspects = deque[Job](), deque[Job]()
         self._running: dict[int, Job] = {}
         self._preparing: Job | None = None
@@ -177,7 +177,7 @@ class Supervisor:
         self.close()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Takes a job from `jobs` only when it can start."""
         if not self._plugins.issuperset(plugins):
@@ -186,7 +186,7 @@ class Supervisor:
         self._jobs, self._should_continue = iter(jobs), should_continue
         self._reported, self._suspect_numbers = set(), set()
         try:
-            while (job := self._next()) is not None:
+            while (job := self._next_job()) is not None:
                 yield from self._run_jobs(self._ensure_server(), job)
         finally:
             if self._running:
@@ -208,20 +208,20 @@ class Supervisor:
         return self._server
 
     def _run_jobs(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
-        """Run the job `first` and all following jobs, or until the fork server dies."""
+        """Run the job `first` and all following jobs, until the fork server dies."""
         job: Job | None = first
         try:
             while True:
                 while job is not None:
                     self._running[job.number] = job
                     server.send(pack_job(job))
-                    job = self._next()
+                    job = self._next_job()
                 if not self._running:
                     return
                 update = self._process_message(server.receive_line(self._message_timeout()))
                 if update is not None:
                     yield update
-                job = self._next()
+                job = self._next_job()
         except (EOFError, Unresponsive) as error:
             unresponsive = isinstance(error, Unresponsive)
             if unresponsive:
@@ -231,8 +231,8 @@ class Supervisor:
             server.close()
         yield from self._after_death(death, unresponsive)
 
-    def _next(self) -> Job | None:
-        """Return the job to start now, or None if no job can start now."""
+    def _next_job(self) -> Job | None:
+        """Return the next job, or None if no job can start now."""
         if not self._should_continue():
             return None
         running_suspects = self._suspect_numbers & self._running.keys()

@@ -1,4 +1,4 @@
-"""Execute one run in a worker process, and send its progress and its end record (a summary) to the fork server."""
+"""Execute one run in a worker process, and send its progress and its end record to the fork server."""
 
 import errno
 import faulthandler
@@ -27,7 +27,7 @@ PROGRESS_INTERVAL_S = 5.0
 ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
 """Function that runs a job, passes the simulated time in s to a callback, and returns the end record.
 
-The end record has the keys `outcome` and `sha256` (of the log).
+The end record is a summary of the run with the keys `outcome` and `sha256` (of the log).
 """
 
 _DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
@@ -119,7 +119,7 @@ def _redirect_output(output: int) -> None:
 
 
 class ProgressReporter:
-    """MomentSink (log of a run) that passes the simulated time in s to `send` every PROGRESS_INTERVAL_S."""
+    """MomentSink (receiver of the recorded beats) that passes the simulated time in s to `send`."""
 
     def __init__(self, tick_rate: int, send: Callable[[float], None]) -> None:
         self._rate, self._send = tick_rate, send

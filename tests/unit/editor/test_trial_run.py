@@ -10,7 +10,7 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.document import EditedFile
 from simscen.editor.trial_run import Trial, TrialRuns
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always
+from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always_true
 from simscen.spec.registry import Entry
 
 TEXT = """\
@@ -33,7 +33,7 @@ class EndlessBackend:
         pass
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always_true
     ) -> Iterator[JobUpdate]:
         (job,) = jobs
         job.folder.mkdir(parents=True)
