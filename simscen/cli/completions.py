@@ -1,4 +1,7 @@
-"""Shell completion of arguments. The functions return the values that start with an incomplete argument."""
+"""Completion of command-line arguments in the shell.
+
+Each completion function takes the text typed so far, and returns the values that start with it.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,13 +21,13 @@ def logs(incomplete: str) -> list[str]:
     return list(_files(incomplete, (".mcap",)))
 
 
-def files(incomplete: str) -> list[str]:
+def yaml_files(incomplete: str) -> list[str]:
     """Return paths of YAML files and folders."""
     return list(_files(incomplete, (".yaml", ".yml")))
 
 
 def topics(incomplete: str) -> list[str]:
-    """Return names that `simscen explain` knows; for an argument with a dot, paths of keys such as `goals.pose`."""
+    """Return names that `simscen explain` knows; if the text has a dot, paths of keys such as `goals.pose`."""
     from simscen.cli.catalog.topic_lookup import known_names
 
     names = known_names(keys="." in incomplete)
@@ -32,12 +35,12 @@ def topics(incomplete: str) -> list[str]:
 
 
 def scenarios_to_copy(incomplete: str) -> list[str]:
-    """Return ids of shipped scenarios, and paths of scenario files and folders."""
+    """Return IDs of shipped scenarios, and paths of scenario files and folders, for `simscen new --like`."""
     return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *scenarios(incomplete)]
 
 
 def stacks(incomplete: str) -> list[str]:
-    """Return names of stacks: of simscen, of installed packages, and of the user's configuration."""
+    """Return the names of stacks that simscen, installed packages, and the user's configuration define."""
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
@@ -52,7 +55,7 @@ def stacks(incomplete: str) -> list[str]:
 
 
 def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
-    """Yield folders, with a slash appended, and files with one of the suffixes."""
+    """Yield the matching folders, with a slash appended, and the matching files with one of the suffixes."""
     parent, slash, start = incomplete.rpartition("/")
     folder = Path(parent + slash or ".").expanduser()
     try:
@@ -73,7 +76,7 @@ _SUFFIX = ".scenario.yaml"
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """Return the files of the shipped scenarios by id, such as "navigation/goal"; empty without shipped scenarios."""
+    """Return the files of the shipped scenarios by ID, such as "navigation/goal"; {} if none are shipped."""
     folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
     if folder is None:
         return {}

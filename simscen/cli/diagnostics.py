@@ -30,6 +30,7 @@ _WORD = r"(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+"
 _TOKEN = re.compile(rf"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|-(?=\s)|{_WORD}(?: +{_WORD})*""")
 """A YAML scalar: quoted, or words up to the next YAML indicator."""
 _WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
+"""Start of a GitHub workflow command, such as `::error`."""
 
 
 def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[Problem]:
@@ -41,24 +42,24 @@ def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[
 
 
 def as_text(problems: Sequence[Problem]) -> str:
-    """Return each problem as lines: place and message, source line, carets, and hint.
+    """Return the problems as text. Each has lines with place and message, source line, carets, and hint.
 
     The problems of one file must be adjacent. Only the first MAX_PROBLEMS_PER_FILE of a file are included.
     """
     blocks = []
     for path, group in groupby(problems, key=lambda problem: problem.path):
         found = list(group)
-        blocks += [_block(problem) for problem in found[:MAX_PROBLEMS_PER_FILE]]
+        blocks += [_problem_text(problem) for problem in found[:MAX_PROBLEMS_PER_FILE]]
         if len(found) > MAX_PROBLEMS_PER_FILE:
             blocks.append(f"{escaped(path)}: … and {len(found) - MAX_PROBLEMS_PER_FILE} more")
     return "\n".join(blocks)
 
 
-def as_json(problems: Iterable[Problem], **more: Any) -> str:
-    """Return a JSON object with the key `problems`. The keyword arguments are further keys."""
+def as_json(problems: Iterable[Problem], **further_keys: Any) -> str:
+    """Return a JSON object with the problems under the key `problems`, and with `further_keys`."""
     keys = ("path", "line", "col", "code", "severity", "message", "hint")
     listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
-    return escape_ci_markers_in_json(json.dumps({**more, "problems": listed}, indent=2))
+    return escape_ci_markers_in_json(json.dumps({**further_keys, "problems": listed}, indent=2))
 
 
 def as_github(problems: Iterable[Problem]) -> str:
@@ -67,12 +68,12 @@ def as_github(problems: Iterable[Problem]) -> str:
 
 
 def escaped(text: str) -> str:
-    """Return untrusted text as one line without control sequences of terminals and commands of CI systems."""
+    """Return untrusted text as one line, with terminal control sequences and commands of CI systems escaped."""
     return escape_ci_markers(_WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)))
 
 
 def print_text(text: str, stream: TextIO | None = None) -> None:
-    """Print to a stream, by default stdout. If its encoding cannot represent the text, print ASCII characters only."""
+    """Print a text to a stream, by default stdout; in ASCII if the stream's encoding lacks one of its characters."""
     out = sys.stdout if stream is None else stream
     try:
         text.encode(out.encoding or "ascii")
@@ -81,7 +82,8 @@ def print_text(text: str, stream: TextIO | None = None) -> None:
     print(text, file=out)
 
 
-def _block(problem: Problem) -> str:
+def _problem_text(problem: Problem) -> str:
+    """Return the lines of one problem."""
     head = f"{escaped(problem.place)}: {problem.severity}[{problem.code}] {escaped(problem.message)}"
     lines = [head, *(_excerpt(problem) if problem.source.strip() and problem.line else [])]
     if problem.hint:
@@ -113,6 +115,7 @@ def _excerpt(problem: Problem) -> list[str]:
 
 
 def _annotation(problem: Problem) -> str:
+    """Return the GitHub workflow command for one problem."""
     level = "error" if problem.severity == "error" else "warning"
     where = f"file={_escape_property(relative_to_checkout(problem.path))}"
     if problem.line:
@@ -130,6 +133,6 @@ def _escape_property(text: str) -> str:
 
 
 def _relative_path(path: str, root: Path) -> str:
-    """Return the relative or the absolute path, whichever is shorter. A missing path is returned unchanged."""
+    """Return the shorter one of the relative and the absolute path; the path itself if the file does not exist."""
     absolute = str(root.absolute() / path)
     return min(os.path.relpath(absolute), absolute, key=len) if os.path.lexists(absolute) else path

@@ -39,7 +39,7 @@ def check_python() -> str:
 
 
 def check_packages() -> str:
-    """Check that all required packages have supported versions, and return the versions of PACKAGES."""
+    """Check that all required packages have supported versions. Return the versions of those that affect results."""
     if problems := unmet_requirements():
         raise CheckFailed("; ".join(problems))
     return ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
@@ -53,7 +53,7 @@ def _version(name: str) -> str:
 
 
 def describe_processor() -> str:
-    """Return architecture, number of cores, and CPU flags of this machine."""
+    """Return the architecture, the number of cores, and the CPU flags of this machine."""
     return f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {' '.join(cpu_flags()) or 'flags unknown'}"
 
 
@@ -104,13 +104,13 @@ def check_resource_limits() -> str:
     files, length = _soft_limit(resource.RLIMIT_NOFILE), _soft_limit(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:
         hint = "raise `ulimit -v` or the container's limit to 1 GiB for each job"
-        raise CheckFailed(f"a run gets only {_mib(memory)} of memory; {hint}")
+        raise CheckFailed(f"a run gets only {_size(memory)} of memory; {hint}")
     if files < MIN_OPEN_FILES:
         raise CheckFailed(f"a process may open only {files} files; raise `ulimit -n` to {MAX_OPEN_FILES}")
     if length < MIN_DISK_BYTES:
-        raise CheckFailed(f"a file may have only {_mib(length)}; raise `ulimit -f`, otherwise logs are truncated")
-    size = _mib(min(length, MAX_FILE_BYTES))
-    return f"a run may use {_mib(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {size}"
+        raise CheckFailed(f"a file may have only {_size(length)}; raise `ulimit -f`, otherwise logs are truncated")
+    size = _size(min(length, MAX_FILE_BYTES))
+    return f"a run may use {_size(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {size}"
 
 
 def check_shared_memory() -> str:
@@ -120,8 +120,8 @@ def check_shared_memory() -> str:
     except OSError as error:
         raise CheckFailed(f"/dev/shm: {error.strerror}; mount it, e.g. docker run --shm-size 64m") from None
     if free < MIN_SHARED_MEMORY_BYTES:
-        raise CheckFailed(f"/dev/shm has only {_mib(free)} free; empty it, or start the container with --shm-size 64m")
-    return f"/dev/shm has {_mib(free)} free"
+        raise CheckFailed(f"/dev/shm has only {_size(free)} free; empty it, or start the container with --shm-size 64m")
+    return f"/dev/shm has {_size(free)} free"
 
 
 def _soft_limit(limit: int) -> int:
@@ -141,5 +141,6 @@ def _cgroup_memory() -> int:
     return sys.maxsize
 
 
-def _mib(size: int) -> str:
+def _size(size: int) -> str:
+    """Return a size in bytes as text in MiB, or in GiB from 10 GiB."""
     return f"{size / 2**20:.0f} MiB" if size < 10 << 30 else f"{size / 2**30:.0f} GiB"

@@ -38,9 +38,9 @@ class _LazyModule(ModuleType):
 
 
 def import_lazily(name: str, *functions: str) -> None:
-    """Defer the import of a module until one of its attributes is accessed, as by `from name import attribute`.
+    """Put a placeholder into `sys.modules`, which imports the module when one of its attributes is first accessed.
 
-    The attributes in `functions` can be imported without this effect. They import the module when they are called.
+    The module's functions named in `functions` are an exception: they import the module when they are called.
     """
     if name in sys.modules:
         return
@@ -57,7 +57,7 @@ def import_lazily(name: str, *functions: str) -> None:
 
 
 def _lazy_function(module: str, function: str) -> Any:
-    """Return a function that imports the module, and calls the module's function with the same arguments."""
+    """Return a function that imports the module, and then calls the function of this name in the module."""
 
     def call(*arguments: Any, **keywords: Any) -> Any:
         if isinstance(sys.modules[module], _LazyModule):
@@ -96,15 +96,15 @@ COMMANDS = {
 }
 """Help text of each command by name.
 
-The command is the function `command` in the module `simscen.cli.commands.<name>`, or the typer application `app`.
+The module `simscen.cli.commands.<name>` has a function `command`, or a typer application `app` with subcommands.
 """
 
 LIGHT_COMMANDS = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
 """Commands that must start fast, and therefore import NumPy only when they use it."""
 
 
-def is_light(arguments: Sequence[str]) -> bool:
-    """Return whether command-line arguments call one of LIGHT_COMMANDS, or request only the help or the version."""
+def calls_light_command(arguments: Sequence[str]) -> bool:
+    """Return whether the arguments of `simscen` call one of LIGHT_COMMANDS, or only request the help or the version."""
     return not arguments or arguments[0] in LIGHT_COMMANDS or arguments[0].startswith("-")
 
 
@@ -113,15 +113,15 @@ class CommandGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the available commands in the order of COMMANDS."""
-        return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
+        return [name for name in COMMANDS if importlib.util.find_spec(_module_name(name))]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Import the module of a command, and return the command; None for an unknown command."""
-        if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
+        if cmd_name not in COMMANDS or not importlib.util.find_spec(_module_name(cmd_name)):
             return None
         if cmd_name in LIGHT_COMMANDS or cmd_name == "run":
             import_lazily("numpy")
-        module = importlib.import_module(_module(cmd_name))
+        module = importlib.import_module(_module_name(cmd_name))
         gc.freeze()  # imported modules live until the end, so the garbage collector need not scan them
         gc.enable()
         app = getattr(module, "app", None)
@@ -167,7 +167,7 @@ def _simscen(
 
 
 def main() -> None:
-    """Run the command line and exit. Print a SimscenError without a traceback, and exit with its code."""
+    """Run the command and exit. A SimscenError is printed without a traceback, and determines the exit code."""
     reopen_closed_streams()
     # Pydantic plug-ins of other packages could change which files are valid, and searching for them takes time.
     os.environ[PYDANTIC_PLUGINS_VARIABLE] = "__all__"
@@ -180,7 +180,7 @@ def main() -> None:
 
 
 def _run_command() -> int:
-    """Run the command, print its error, if any, and return the exit code."""
+    """Run the command, print its error if it fails, and return the exit code."""
     try:
         try:
             if sys.argv[1:2] and not sys.argv[1].startswith("-"):
@@ -228,7 +228,7 @@ def _print_internal_error() -> Exit:
     return Exit.INTERNAL
 
 
-def _module(command: str) -> str:
+def _module_name(command: str) -> str:
     return f"simscen.cli.commands.{command}"
 
 

@@ -1,4 +1,4 @@
-"""Process of a command: standard streams, working directory, environment variables, and configuration file."""
+"""Environment of a command: standard streams, working directory, environment variables, and configuration file."""
 
 import errno
 import os
@@ -11,20 +11,20 @@ from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
-"""Error numbers of writing to a stream: disk full, quota exceeded, terminal closed."""
+"""Error numbers that writing to stdout or stderr can have: disk full, quota exceeded, terminal closed."""
 
 PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
 """Environment variable that disables plug-ins of pydantic."""
 COMPLETION_VARIABLE = "_SIMSCEN_COMPLETE"
 """Environment variable with which a shell requests completions from click."""
 _PYDANTIC_PLUGINS_AT_START = os.environ.get(PYDANTIC_PLUGINS_VARIABLE)
-"""Value of this variable at the start; None if it was not set. `main` changes the variable."""
+"""Value of PYDANTIC_PLUGINS_VARIABLE before `main` changes the variable; None if it was not set."""
 
 
 def reopen_closed_streams() -> None:
     """Redirect closed standard streams, as in `simscen run . >&-`, to /dev/null.
 
-    Otherwise, the next opened file would get the file descriptor of the stream, and all printed text.
+    Otherwise, the next opened file would get the file descriptor of the stream, and receive all printed text.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -44,7 +44,7 @@ def require_working_directory() -> None:
 
 
 def report_lost_output(error: OSError) -> Exit:
-    """Print the error of writing to stdout to stderr, discard all further output, and return INCOMPLETE."""
+    """Report on stderr that stdout cannot be written, discard all further output, and return INCOMPLETE."""
     discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
@@ -56,7 +56,7 @@ def report_lost_output(error: OSError) -> Exit:
 def flush_output(code: Exit | int) -> Exit | int:
     """Flush stdout and stderr, and return the final exit code of the process.
 
-    It is `code`, or INCOMPLETE if output was lost and `code` does not report an error already.
+    If output was lost, the exit code is at least INCOMPLETE. A closed pipe changes only a `code` of 0.
     """
     try:
         sys.stdout.flush()
@@ -79,7 +79,7 @@ def discard_output(descriptor: int) -> None:
 
 @contextmanager
 def engine_output_on_stderr() -> Iterator[None]:
-    """Redirect file descriptor 1 to stderr within the context, because Bullet prints warnings to stdout."""
+    """Redirect file descriptor 1 to stderr within the context, so that warnings of Bullet do not go to stdout."""
     sys.stdout.flush()
     saved = os.dup(1)
     os.dup2(2, 1)
@@ -92,7 +92,7 @@ def engine_output_on_stderr() -> Iterator[None]:
 
 
 def caller_environment() -> dict[str, str]:
-    """Return the environment variables of this process at its start, for programs that simscen starts."""
+    """Return the environment variables with which simscen was started, for the programs that simscen starts."""
     changed = {PYDANTIC_PLUGINS_VARIABLE, *pinned_variables()}
     variables = {name: value for name, value in os.environ.items() if name not in changed}
     if _PYDANTIC_PLUGINS_AT_START is not None:

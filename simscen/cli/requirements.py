@@ -1,4 +1,4 @@
-"""Comparison of the versions of installed packages with the requirements of simscen."""
+"""Checks that the installed packages have the versions that simscen requires."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Command-line options of several commands: for runs, and for reading logs."""
+"""Command-line options that several commands share: options of runs, and options for reading logs."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -30,7 +30,7 @@ LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported
 
 
 class TimeStamps(str, Enum):
-    """Time stamp of a message: the stamp in its header, or the time at which it was logged."""
+    """Source of the time stamp of a message: its header, or the time at which it was logged."""
 
     HEADER = "header"
     LOG = "log"
@@ -58,7 +58,7 @@ SameFrameOption = Annotated[
 def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
-    """Return the options for reading the log of a real robot, from the values of the options of the same names.
+    """Return the options for reading a log of a real robot. The parameters are the options of the same names.
 
     Raises UsageError if --truth or --topic is invalid.
     """
@@ -69,7 +69,7 @@ def foreign_log_options(
 
 
 def _check_truth(options: ForeignLogOptions) -> None:
-    """Raise UsageError if --truth has the wrong form, or is the topic of the robot's pose estimate."""
+    """Raise UsageError if --truth is malformed, or is the topic of the robot's own pose estimate."""
     if options.truth is None:
         return
     if not options.truth.startswith("/") and not (options.frames and all(options.frames)):
@@ -82,7 +82,7 @@ def _check_truth(options: ForeignLogOptions) -> None:
 def parse_topics(arguments: list[str], names: Collection[str]) -> dict[str, str]:
     """Return topics by name from arguments such as "odom=/my/odom".
 
-    Raises UsageError for an argument of another form, or with a name that is not in `names`.
+    Raises UsageError for a malformed argument, and for a name that is not in `names`.
     """
     topics = {}
     for argument in arguments:

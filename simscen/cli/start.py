@@ -1,4 +1,4 @@
-"""Entry point of the command `simscen`."""
+"""Entry point of the command `simscen`, which checks the installed packages before it imports the commands."""
 
 import gc
 import os
@@ -12,10 +12,10 @@ INCOMPLETE = 3
 
 
 def start() -> None:
-    """Run the command line, and exit."""
+    """Run the command of this process, and exit."""
     gc.disable()  # until the command is imported, to start fast (docs/design/startup.md)
     try:
-        from simscen.cli.main import is_light, main
+        from simscen.cli.main import calls_light_command, main
         from simscen.core.cpu_kernels import pin_kernels
     except ModuleNotFoundError as error:
         _exit_unusable([f"{error.name} is not installed; install simscen again with its dependencies"])
@@ -23,12 +23,12 @@ def start() -> None:
     if signal.getsignal(signal.SIGINT) is _exit_on_interrupt:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     pin_kernels()
-    light = is_light(sys.argv[1:])
-    _check_requirements(all_packages=not light and sys.argv[1:2] != ["doctor"])
+    is_light = calls_light_command(sys.argv[1:])
+    _check_requirements(all_packages=not is_light and sys.argv[1:2] != ["doctor"])
     try:
         main()
     except SystemExit as end:
-        if light and isinstance(end.code, int):
+        if is_light and isinstance(end.code, int):
             os._exit(end.code)  # skips the teardown of the interpreter; all output is flushed
         raise
 
@@ -36,7 +36,7 @@ def start() -> None:
 def _check_requirements(all_packages: bool) -> None:
     """Exit with a message if a package is missing or has an unsupported version.
 
-    Unless `all_packages`, only typer is checked.
+    If `all_packages` is false, check typer only.
     """
     from simscen.cli.requirements import unmet_requirements, unmet_typer
 

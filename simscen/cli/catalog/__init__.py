@@ -1,1 +1,1 @@
-"""Generated documentation: `simscen explain`, reference pages, JSON Schemas."""
+"""Documentation that is generated from the models: `simscen explain`, reference pages, and JSON Schemas."""

@@ -48,7 +48,7 @@ class Parameter:
 
 
 def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the name, such as "world export", and the function of a command and of each of its subcommands."""
+    """Yield name and function of a command and of each of its subcommands. A name is, for example, "world export"."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)
     if app is None:
@@ -63,19 +63,19 @@ def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
-    """Return the arguments and options of a command, given its function."""
+    """Return the arguments and options of a command from its function."""
     return [_parameter(*annotated) for annotated in _annotated_parameters(function)]
 
 
 def command_section(command: str, function: Callable[..., Any]) -> str:
-    """Return the Markdown section of a command, given its name, such as "world export", and its function."""
+    """Return the Markdown section of a command from its name, such as "world export", and its function."""
     rows = [
-        f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help.strip())} |"
+        f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_escape_markdown(p.help.strip())} |"
         for p in parameters_of(function)
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
     table = "\n".join([*head, *rows]) if rows else "No arguments or options."
-    return f"## `simscen {command}`\n\n{_plain(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
+    return f"## `simscen {command}`\n\n{_escape_markdown(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
 
 
 def exit_code_section() -> str:
@@ -88,6 +88,7 @@ def exit_code_section() -> str:
 def _annotated_parameters(
     function: Callable[..., Any],
 ) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
+    """Return each argument and option of a command with its type and its description for typer."""
     found = []
     # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
     for parameter in inspect.signature(function, eval_str=True).parameters.values():
@@ -115,7 +116,7 @@ def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | Opt
 
 
 def _item_type(kind: Any) -> tuple[bool, Any]:
-    """Return whether a type is a list, and the type of its items or itself. None as an alternative is ignored."""
+    """Return whether a type is a list, and the type of a single value. The alternative None is ignored."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(member for member in get_args(kind) if member is not type(None))
     repeated = get_origin(kind) is list
@@ -123,6 +124,7 @@ def _item_type(kind: Any) -> tuple[bool, Any]:
 
 
 def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
+    """Return the kind of a value with its range, such as "integer, 1 to 256"."""
     if isinstance(kind, type) and issubclass(kind, Enum):
         return " or ".join(f"`{member.value}`" for member in kind)
     text = _TYPE_NAMES[kind]
@@ -131,7 +133,7 @@ def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
     return f"{text}, at least {info.min:g}" if info.min is not None else text
 
 
-def _plain(text: str) -> str:
+def _escape_markdown(text: str) -> str:
     """Escape text for a cell of a Markdown table. In code between backticks, escape only `|`."""
     parts = text.replace("|", "\\|").split("`")
     return "`".join(part if index % 2 else _ESCAPED.sub(r"\\\g<0>", part) for index, part in enumerate(parts))

@@ -1,4 +1,7 @@
-"""Generator of JSON Schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
+"""Generator of the JSON Schemas and of the reference pages in docs/reference, which are made from docstrings.
+
+Usage: `python -m simscen.cli.catalog.generate [--check]`.
+"""
 
 import sys
 from itertools import groupby
@@ -19,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def generated_files() -> dict[str, str]:
-    """Return the text of each generated file, by its path in the repository."""
+    """Return the texts of all generated files by path in the repository."""
     schemas = {f"simscen/data/schemas/{name}.schema.json": as_text(schema_of(name)) for name in MODELS}
     return {
         **schemas,
@@ -87,6 +90,7 @@ _GROUPS = {
     "metric": ("Metrics", "Entries of `metrics`, in addition to the metrics that [every run reports](metrics.md)."),
     "sensor": ("Sensors", "Entries of `sensors` of a robot: a name of your choice with exactly one of these keys."),
 }
+"""Title and introduction of the section of each group of topics."""
 _LANGUAGE_INTRO = """\
 Look up a key of a scenario, world, robot, or stack file here: its meaning, its values, and its default. To find the
 key for a task, see [All keys by task](../guides/words.md). In a terminal, `simscen explain NAME` prints one section.
@@ -119,12 +123,13 @@ _PROBLEM_GROUPS = {
 """Headings of docs/reference/problems.md, by the first code below each."""
 _SIGNAL_NAMES = " | ".join(f"`{name}`" for name in SIGNALS)
 _HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
+"""Headings in the docstring of a criterion."""
 
 
 def language_page(installed: bool = False) -> str:
     """Return the text of docs/reference/language.md. With `installed`, include the types of installed packages."""
     all_topics = [*topics(installed), *added_topics(AnyMeasure, installed)]
-    parts = [f"{_GENERATED_NOTE}# Language reference\n", _LANGUAGE_INTRO, _index(all_topics), _units()]
+    parts = [f"{_GENERATED_NOTE}# Language reference\n", _LANGUAGE_INTRO, _index(all_topics), _units_section()]
     for group, members in groupby(all_topics, key=lambda topic: topic.group):
         title, text = _GROUPS[group]
         parts += [f"## {title}\n\n{text}\n", *(_section(topic) for topic in members)]
@@ -162,7 +167,7 @@ def _index(all_topics: list[Topic]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _units() -> str:
+def _units_section() -> str:
     rows = "\n".join(f"| {name} | {', '.join(f'`{unit}`' for unit in units)} |" for name, units in UNITS.items())
     return (
         "## Quantities\n\nWrite a quantity with its unit: `90 deg`, `30 cm`, `0.5 m/s`. A number without a unit is in "
@@ -171,6 +176,7 @@ def _units() -> str:
 
 
 def _section(topic: Topic) -> str:
+    """Return the Markdown section of a topic."""
     parts = [f"### `{topic.name}`\n", *([f"Added by {topic.origin}.\n"] if topic.origin else []), _markdown(topic.text)]
     if topic.value:
         parts.append(f"\nValue: {topic.value}.")
@@ -192,6 +198,7 @@ def _markdown(text: str) -> str:
 
 
 def _row(field: Field) -> str:
+    """Return the row of a key in the table of a topic."""
     default = (
         "**required**" if not field.default else field.default if field.default == OPTIONAL else f"`{field.default}`"
     )

@@ -1,4 +1,7 @@
-"""JSON Schemas of simscen's YAML files, which editors use for completion, hover texts, and errors."""
+"""JSON Schemas of simscen's YAML files, which editors use for completion, hover texts, and errors.
+
+A Choice is a model of a mapping with exactly one main key, such as the kind of a trigger, and optional modifiers.
+"""
 
 import json
 from typing import Any
@@ -29,7 +32,7 @@ MODELS: dict[str, type[BaseModel]] = {
 }
 """Pydantic model of each kind of file. A base file is an incomplete scenario that scenarios extend."""
 DRAFT = "http://json-schema.org/draft-07/schema#"
-"""Version of JSON Schema."""
+"""Identifier of the version of JSON Schema."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
@@ -52,14 +55,14 @@ def schema_of(name: str, installed: bool = False) -> Schema:
 
 
 def _remove_scenario_keys(generated: Schema) -> None:
-    """Remove SCENARIO_KEYS, which a stack file must not set."""
+    """Remove SCENARIO_KEYS, the keys that only a scenario may set, from the schema of a stack file."""
     for definition in generated["$defs"].values():
         for key in SCENARIO_KEYS:
             definition.get("properties", {}).pop(key, None)
 
 
 def _append_keys(generated: Schema) -> Schema:
-    """Return the schemas of keys such as `pass+`, which append to a list of the extended file."""
+    """Return the schemas of the keys that append to a list of the extended file, such as `pass+`."""
     lists = {name: value for name, value in generated["properties"].items() if value.get("type") == "array"}
     return {
         f"{name}{APPEND_SUFFIX}": {
@@ -79,7 +82,7 @@ def _make_extensible_keys_optional(generated: Schema) -> None:
 
 
 def _referenced_definitions(schema: Schema, definitions: Schema, *, in_lists: bool) -> set[str]:
-    """Return the names of definitions to which a schema refers: only within lists, or only outside of lists."""
+    """Return the names of the definitions to which a schema refers within lists (`in_lists`) or outside of lists."""
     found: set[str] = set()
     seen: set[tuple[str, bool]] = set()
 
@@ -115,7 +118,7 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Schema generator that also requires exactly one key of a Choice, and adds descriptions of plain values."""
+    """Schema generator that also requires exactly one main key of a Choice, and describes models of single values."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -144,14 +147,14 @@ class _InstalledTypesGenerator(_Generator):
         result, metadata = super().function_wrap_schema(schema), schema.get("metadata", {})
         models = installed_specs(metadata[GROUP_KEY]) if GROUP_KEY in metadata else {}
         more: list[Schema] = [
-            self._named(name, model) for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY]
+            self._typed_mapping(name, model) for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY]
         ]
         if models and metadata[NAMES_ALLOWED_KEY]:
             more.append({"enum": list(models)})
         return {"anyOf": [result, *more]} if more else result
 
-    def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
-        """Return the schema of a mapping with this `type`, the name of an entry point, and the keys of the model."""
+    def _typed_mapping(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
+        """Return the schema of a mapping with the keys of the model, and with `name` as its `type`."""
         typed: Schema = {"properties": {"type": {"const": name}}, "required": ["type"]}
         model.model_rebuild()
         return {"allOf": [self.generate_inner(model.__pydantic_core_schema__), typed]}
@@ -160,7 +163,7 @@ class _InstalledTypesGenerator(_Generator):
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     """Return a schema that requires exactly one of `keys`.
 
-    If only modifiers of the model are present, editors show "expected one of: …".
+    For a mapping with only modifiers of the model, editors show "expected one of: …".
     """
     # With `maxProperties`, yaml-language-server would count the key that is being typed, and offer no completions.
     present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
@@ -174,7 +177,7 @@ def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
 
 
 def _simplify(node: Any, definitions: Schema) -> Any:
-    """Return an equivalent schema without titles, nulls, and defaults that are mappings, and with unions as if/then."""
+    """Return an equivalent schema for editors: unions as if/then, no nulls, titles, and defaults that are mappings."""
     if isinstance(node, list):
         return [_simplify(item, definitions) for item in node]
     if not isinstance(node, dict):
@@ -215,7 +218,7 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
 def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
     """Return a union as if/then. Members without `type` are selected by their only required key.
 
-    `keys` are these required keys by the reference of the member.
+    `keys` maps the reference of each such member to this key.
     """
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     others = [option for option in node["oneOf"] if option.get("$ref") not in keys]
@@ -226,7 +229,7 @@ def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
 
 
 def _by_json_type(node: Schema) -> Schema:
-    """Return a union of two JSON types as if/then, such as text and mapping, so that errors refer to the used one."""
+    """Return a union of two JSON types, such as text and mapping, as if/then, so that errors refer to the type used."""
     options = node.get("oneOf", [])
     plain = [option for option in options if option.get("type") in ("string", "array")]
     if len(options) != 2 or not plain or options[0].get("type") == options[1].get("type"):

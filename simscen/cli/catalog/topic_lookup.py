@@ -18,7 +18,7 @@ def all_topics() -> list[Topic]:
 
 
 def known_names(keys: bool = False) -> list[str]:
-    """Return the names of all topics and problem codes; with `keys`, the paths of all keys instead."""
+    """Return the names of all topics and problem codes; if `keys` is true, the paths of all keys instead."""
     found = all_topics()
     return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
 
@@ -26,7 +26,7 @@ def known_names(keys: bool = False) -> list[str]:
 def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
     """Return a topic for each key with a path such as `goals.pose` or `stack.localizer.alpha1`.
 
-    A path starts at one of the topics `known`, or at the top of a file. A single key is searched in all of `known`.
+    A path starts at one of the topics `known`, or at the top of a file. A path of one key is searched in all topics.
     """
     parts = path.split(".")
     if len(parts) == 1:
@@ -61,7 +61,7 @@ def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[typ
 
 
 def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
-    """Yield a topic for the last of the nested `keys` of a model. It lists the keys of a value that is a mapping."""
+    """Yield a topic for the value at the nested `keys` of a model. If the value is a mapping, list its keys."""
     *parents, key = keys
     for parent in models_at(model, _with_indices(model, parents)):
         for field in fields_of(parent):
@@ -72,7 +72,7 @@ def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[
 
 
 def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
-    """Return the keys as a location in a file, with the index 0 after each key whose value is a list."""
+    """Return the keys as a path in a file, with the index 0 after each key whose value is a list."""
     path: list[str | int] = []
     for key in keys:
         path.append(key)

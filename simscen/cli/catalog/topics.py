@@ -1,6 +1,7 @@
 """Topics of the scenario language for `simscen explain` and the language reference.
 
-A topic is a part of the language, such as a criterion or a fault. Its text is the docstring of its pydantic model.
+A topic is a part of the language, such as a criterion or a fault. Its text is the docstring of its pydantic model. A
+Choice is a model of a mapping with exactly one main key, such as the kind of a trigger, and optional modifiers.
 """
 
 import inspect
@@ -208,7 +209,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
-    """Return the keys of a model in order; for a Choice (mapping with exactly one main key), only its modifiers."""
+    """Return the keys of a model in order; for a Choice, only its modifiers."""
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
@@ -219,7 +220,7 @@ def fields_of(model: type[BaseModel]) -> list[Field]:
 
 
 def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """Return the description of a type or pydantic field, such as "length in m, ≥ 0".
+    """Return a description of the values of a type or pydantic field, such as "length in m, ≥ 0".
 
     `metadata` are the further arguments of `Annotated`.
     """
@@ -250,7 +251,7 @@ _WITHOUT_PLURAL = frozenset({"text", "names", "true", "false"})
 
 
 def _plural(kind: str) -> str:
-    """Return the description of several values of a type, such as "lengths in m, each ≥ 0"."""
+    """Return the plural of a description, such as "lengths in m, each ≥ 0"."""
     return " or ".join(map(_plural_of_member, kind.split(" or ")))
 
 
@@ -265,7 +266,7 @@ def _plural_of_member(kind: str) -> str:
 
 
 def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the value of `type` and the model of each shipped member of a union with the discriminator `type`."""
+    """Yield the `type` and the model of each shipped member of a union that `type` discriminates."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.shipped_union)[0])
     for member in members:
@@ -275,6 +276,7 @@ def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
 
 
 def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
+    """Return the description of a quantity, number, text, Boolean, or mapping, with its bounds."""
     names = {int: "integer", float: "number", str: "text", bool: "true or false"}
     quantity = next((mark for mark in _all_marks(metadata) if isinstance(mark, Quantity)), None)
     if quantity is not None:
@@ -295,12 +297,13 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
 
 
 def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
-    """Yield all annotations, including those in pydantic's Field."""
+    """Yield all annotations, including the ones in pydantic's Field."""
     for mark in metadata:
         yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
 
 
 def _default(field: FieldInfo) -> str:
+    """Return the default value of a key as in the attribute `default` of Field."""
     if field.is_required():
         return ""
     value = field.get_default(call_default_factory=True)
@@ -312,6 +315,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
+    """Yield a topic for each main key of a Choice."""
     docs = field_docs(choice)
     for key, name in choice.choices().items():
         kind = annotation_of(choice.model_fields[name])
@@ -321,12 +325,12 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
 
 
 def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
-    """Return the topics of the keys that installed packages add to a choice; none if not `installed`."""
+    """Return the topics of the main keys that installed packages add to a Choice; none if `installed` is false."""
     return _installed_types(choice.group, installed)
 
 
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
-    """Yield the topics of the types that installed packages add to a group; nothing if not `installed`."""
+    """Yield the topics of the types that installed packages add to a group; nothing if `installed` is false."""
     if installed:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
         for name, model in registry.installed_specs(group).items():

@@ -25,7 +25,7 @@ SUFFIX = SCENARIO_SUFFIXES[0]
 
 def command(
     file: Annotated[
-        Path | None, typer.Argument(help="A scenario or a *.world.yaml.", autocompletion=completions.files)
+        Path | None, typer.Argument(help="A scenario or a *.world.yaml.", autocompletion=completions.yaml_files)
     ] = None,
     new: Annotated[bool, typer.Option("--new", help="Start a new scenario; needs --map.")] = False,
     map_: Annotated[

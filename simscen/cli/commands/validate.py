@@ -28,7 +28,9 @@ class Format(str, Enum):
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.", autocompletion=completions.files)],
+    paths: Annotated[
+        list[Path], typer.Argument(help="Files, or folders to search.", autocompletion=completions.yaml_files)
+    ],
     format_: Annotated[Format, typer.Option("--format", help="Output format of problems.")] = Format.TEXT,
     stack: Annotated[
         list[str] | None,

@@ -104,7 +104,7 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
 
 
 def backend_of(options: SessionOptions) -> Backend:
-    """Return the backend that the options select, before its processes are started."""
+    """Return the backend that the options select. It starts its processes when its context is entered."""
     if not options.cluster:
         return Supervisor(options.workers, FORK_SERVER)
     from simscen.run.process.ray_backend import RayBackend

@@ -1,4 +1,4 @@
-"""Implementation of `simscen falsify`, which searches the ranges of a scenario for values with which it fails."""
+"""Implementation of `simscen falsify`, which searches for values in given ranges with which a scenario fails."""
 
 import math
 import time
@@ -39,11 +39,11 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 
 BATCH_SIZE = 8
-"""Number of runs between two updates of the search."""
+"""Number of runs between two updates of the search method."""
 MAX_EMPTY_BATCHES = 50
-"""Maximum number of consecutive batches without valid values."""
+"""Number of consecutive batches without valid values after which the search ends."""
 SQUARE_SIZE_M = 1.0
-"""Side of the squares into which the floor is divided to distinguish failures by their place."""
+"""Side of the grid squares by which failures at different places are distinguished."""
 CONFIDENCE = 0.95
 """Confidence of the upper bound of the failure rate."""
 
@@ -84,14 +84,14 @@ class FoundFailure:
 
 
 Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
-"""Failed criteria, names of the disturbances that took place, and (x, y) index of the square of the first failure.
+"""Failed criteria, names of the disturbances that took place, and index (x, y) of the grid square of the failure.
 
 Failures with equal signatures count as the same failure. The square is None for a failure without a place.
 """
 
 
 def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
-    """Run a search, write its reports and failures, and return the exit code and the search.
+    """Run a search, write its reports and the failing scenarios, and return the exit code and the search.
 
     Raises InvalidInput and UsageError.
     """
@@ -105,7 +105,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
 
 
 class Falsification:
-    """Search that runs a scenario with proposed values, and saves a scenario for each different failure."""
+    """Search that runs a scenario with proposed values, and saves a scenario for each distinct failure."""
 
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
@@ -172,7 +172,7 @@ class Falsification:
         return self._request.method is SearchMethod.RANDOM
 
     def max_failure_rate(self) -> float | None:
-        """Return the upper bound of the failure rate, with CONFIDENCE; None without random runs."""
+        """Return the upper confidence bound of the failure rate; None if no random run has been completed."""
         counted = [finished for finished in self.finished_runs if is_counted(finished.result)]
         if not self.is_random or not counted:
             return None
@@ -180,6 +180,7 @@ class Falsification:
         return 1.0 - clopper_pearson_limits(passed, len(counted), CONFIDENCE)[0]
 
     def _is_done(self) -> bool:
+        """Return whether one of the limits in the request is reached: failures, runs, or probability."""
         request, bound = self._request, self._request.probability
         if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
@@ -201,6 +202,7 @@ class Falsification:
         return jobs
 
     def _load(self, name: str, point: Point) -> LoadedScenario | None:
+        """Return the scenario with the values of a point, as variation `name`; None if it is invalid."""
         try:
             variation = self._space.variation(name, point)
         except ConditionError as error:
@@ -220,6 +222,7 @@ class Falsification:
         return checked
 
     def _plan(self, journal: Journal, jobs: Sequence[Job]) -> None:
+        """Write the planned runs of a batch to the journal."""
         planned = plan_runs(jobs)
         is_first = not self._planned
         self._planned += planned
@@ -271,7 +274,7 @@ def new_failure_file(scenario: Path) -> Path:
 
 
 def summary_lines(falsification: Falsification) -> list[str]:
-    """Return the lines that the command prints at its end: the failures, or that there was no failure."""
+    """Return the last lines of the output: the failures, or a statement that there was no failure."""
     runs = len(falsification.finished_runs)
     lines = []
     for failure in falsification.found:

@@ -1,4 +1,4 @@
-"""Validation of scenario, world, and robot files."""
+"""Validation of scenario, world, and robot files for `simscen validate` and before runs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -21,7 +21,7 @@ from simscen.loading.world_cache import WorldCache
 
 @dataclass(frozen=True)
 class FileChecker:
-    """Loads and validates files.
+    """Loads and validates files, and caches built worlds.
 
     root:               folder that must contain all files
     world_path:         further folders with worlds and models

@@ -1,7 +1,7 @@
 """Main module of the fork server, which prepares scenarios and forks a worker for each run.
 
 The supervisor starts it as `python -I -m simscen.cli.session.fork_server_main [PLUGIN_PATH] FD`, where FD is the file
-descriptor for replies.
+descriptor for replies. PLUGIN_PATH extends sys.path, so that plug-ins are found.
 """
 
 import os
@@ -52,7 +52,7 @@ def import_components(prepared: PreparedScenario) -> None:
 
 
 def precompute(prepared: PreparedScenario) -> None:
-    """Compute the data structures of world and map that all workers share."""
+    """Compute the data structures of world and map, such as ray trees and costmaps, so that all workers share them."""
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import layered_costmap
 
@@ -74,7 +74,7 @@ def precompute_localizer(spec: LocalizerSpec, grid: OccupancyGrid) -> None:
 
 
 def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
-    """Yield the modules of those components that are part of simscen."""
+    """Yield the module of each component that is part of simscen."""
     for component in components:
         module = component.component.partition(":")[0]
         if module.startswith("simscen."):
@@ -82,7 +82,7 @@ def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
 
 
 def _components(value: object) -> Iterator[Component]:
-    """Yield all specifications of components that a specification contains."""
+    """Yield the specifications of all components in a specification, including nested ones."""
     if isinstance(value, Component):
         yield value
     inner: Iterable[object] = ()
@@ -112,7 +112,7 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario of a job, and everything that its workers share.
+    """Prepare the scenario of a job, and the data that its workers share.
 
     Clear the caches first if this process uses more than half of the allowed memory.
     """
@@ -138,7 +138,7 @@ def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, An
 
 
 def _write_outputs(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
-    """Write the picture of a run, and its replay page if the mode includes the outcome."""
+    """Write the picture of a run, and its replay page if `replay` includes the outcome of the run."""
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(scene_with_robots(scene, robots), folder / "map.png")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FromLogOptions:
-    """Options of `simscen new --from-log`.
+    """Options of `simscen new --from-log`. A standard topic is the default topic of a kind of message, such as /scan.
 
     log:     recorded drive: an MCAP file or a rosbag2 folder
     out:     scenario file to write
@@ -27,7 +27,7 @@ class FromLogOptions:
     world:   world file; None for a world made from the log
     robot:   robot model or file; "" for the robot in the log
     truth:   topic of the true pose, or "none"; None to find the topic
-    topics:  entries NAME=TOPIC for standard topics with another name in the log
+    topics:  entries NAME=TOPIC for standard topics that have another name in the log
     root:    root folder of the recorded scenario; None if unknown
     """
 

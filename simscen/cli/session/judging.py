@@ -1,4 +1,4 @@
-"""Evaluation of recorded logs with the criteria in the log, or with the criteria of a criteria file."""
+"""Evaluation of recorded logs for `simscen judge`, with the criteria in the log or in a separate criteria file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,17 +31,17 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 class LogJudge:
-    """Evaluates logs. `notes` are messages about the logs, `foreign_count` is the number of foreign logs so far.
+    """Evaluates logs of simscen, and foreign logs, which simscen did not write.
 
-    A foreign log is a log that simscen did not write.
+    `notes` are messages about the logs, `foreign_count` is the number of foreign logs so far.
     """
 
     def __init__(
         self, options: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
     ) -> None:
-        """Take the criteria file `scenario`, or None to use the criteria in each log.
+        """Read the criteria file `scenario`; None to use the criteria in each log. Raises InvalidInput.
 
-        `options` are for reading foreign logs. `root` and `world_path` are for the criteria file. Raises InvalidInput.
+        `options` are for reading foreign logs. `root` and `world_path` are for the criteria file.
         """
         self.notes: list[str] = []
         self.foreign_count = 0
@@ -59,7 +59,7 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        If the log is unusable, raise InvalidInput if it is the only log, otherwise return an error as its result.
+        The result of an unusable log is an error. If it is the only log, raise InvalidInput instead.
         """
         try:
             return (
@@ -135,7 +135,7 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
     def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
-        """Return a foreign log, and its result by the criteria file."""
+        """Return a foreign log, and its result according to the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot("")
@@ -180,12 +180,14 @@ class LogJudge:
 
 
 def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
+    """Return an error as the result of a log."""
     return RunFinished(
         error_result(RunKey(log.stem, 0), str(log), failure), artifacts=Artifacts(mcap=str(log)), file=str(log)
     )
 
 
 def _may_be_simscen_log(log: Path) -> bool:
+    """Return whether a log has a file type that simscen writes."""
     return not log.is_dir() and log.suffix not in (".db3", ".bag")
 
 
@@ -203,7 +205,7 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the folder and the result of each run without a log. `folders` are output folders of sessions.
+    """Return the folder and the result of each run without a log in the output folders of sessions.
 
     The result is an error, except for skipped runs.
     """

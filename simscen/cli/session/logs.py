@@ -1,4 +1,4 @@
-"""Search for logs in files and folders, and recorded results of logs."""
+"""Search for the logs in files and folders, and reading of the result that is recorded in a log."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 BAG_METADATA = "metadata.yaml"
 """Name of a file in every rosbag2 folder."""
 LOG_SUFFIXES = (".mcap", ".db3", ".bag")
+"""Suffixes of log files of ROS 2 and ROS 1."""
 
 
 def find_logs(paths: Sequence[Path]) -> list[Path]:
@@ -72,7 +73,7 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result in a log. If the log is incomplete, evaluate its criteria on the recorded part instead."""
+    """Return the result in a log. If the log has none because it is incomplete, evaluate its criteria instead."""
     if log.result:
         return from_json(log.result)
     results = {name: _evaluate(robot_log, file, name) for name, robot_log in (log.robots or {"": log}).items()}

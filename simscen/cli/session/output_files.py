@@ -58,7 +58,7 @@ class Reports:
     junit:       further file for the JUnit report; None for no further file
     family:      dialect of JUnit XML
     junit_only:  whether to write only the file `junit`
-    used:        further entries of run.json, such as the installed packages that the runs use
+    used:        further entries of run.json: plug-ins and external stacks that the runs use
     """
 
     def __init__(
@@ -153,13 +153,13 @@ CLAIM_EXIT_CODES = {
     ClaimStatus.UNDECIDED: Exit.UNDECIDED,
     ClaimStatus.BLOCKED: Exit.INCOMPLETE,
 }
-"""Exit code of a study by the status of its claim (the pass rate to be tested)."""
+"""Exit code of a study by the status of its claim, the pass rate that the study tests."""
 
 
 def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) -> Exit:
     """Return the exit code of a session that was not interrupted.
 
-    It depends on the status of the claim in a study with a claim, otherwise on the outcomes of the runs.
+    If a study has a claim, the exit code depends on its status, otherwise on the outcomes of the runs.
     """
     if study is not None and study.claim is not None:
         return CLAIM_EXIT_CODES[study.claim.status]
@@ -175,7 +175,7 @@ def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) 
 def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
     """Raise UsageError if the file `junit` of --junit cannot be written. Do nothing if `junit` is None.
 
-    The file must not be one of the `inputs`, and not have one of RESERVED_NAMES in the output `folder`.
+    The file must not be one of the `inputs`, and must not have one of RESERVED_NAMES in the output `folder`.
     """
     if junit is None:
         return

@@ -1,4 +1,4 @@
-"""Division of planned runs into runs that a session must execute, and runs with reusable results."""
+"""Division of the planned runs of a session into runs to execute, and runs with reusable earlier results."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -22,16 +22,16 @@ from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
-"""Keys of a result with equal values in journal and log, unless the log is from another run."""
+"""Keys of a result that are compared between journal and log, to detect a log of another run."""
 
 
 @dataclass(frozen=True)
 class PendingRuns:
-    """Runs of a session before their execution.
+    """Planned runs of a session: runs to execute, and runs with reused results.
 
     journal:  journal of the session, a file that lists planned and finished runs
     jobs:     runs to execute
-    reused:   results of other runs, from an earlier session in the same folder
+    reused:   results of the other runs, from an earlier session in the same folder
     workers:  number of parallel runs
     stacks:   names of the stacks of --stack
     """
@@ -51,8 +51,8 @@ class PendingRuns:
 def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
     """Write the planned runs to the journal, and return the pending runs. Raises UsageError if that fails.
 
-    A result of an earlier session is reused if it is not an error and its scenario has not changed. `shard` is the
-    number of this shard (from 1) and the count of shards.
+    A result of an earlier session in the folder is reused if it is not an error and its scenario has not changed.
+    `shard` is the number of this shard (from 1) and the count of shards.
     """
     planned = plan_runs(jobs)
     remaining, reused = divide_runs(jobs, planned, previous_results(journal))
@@ -64,7 +64,7 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
 
 
 def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
-    """Return the runs of these jobs in the form of the journal."""
+    """Return the runs of these jobs as entries of the journal."""
     scenarios = {_job_identity(job): job.scenario for job in jobs}
     digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
     return [_planned_run(job, digests[_job_identity(job)]) for job in jobs]
@@ -73,7 +73,7 @@ def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
 def divide_runs(
     jobs: Sequence[Job], planned: Sequence[PlannedRun], earlier: Mapping[PlannedRun, RunFinished]
 ) -> tuple[list[Job], list[RunFinished]]:
-    """Return the jobs to execute, and the earlier results of all other jobs.
+    """Return the jobs to execute, and the `earlier` results of all other jobs.
 
     `planned` are the runs of the jobs in the same order. The two runs that --check-determinism compares are either both
     executed or both reused.
@@ -136,7 +136,7 @@ def _has_matching_log(finished: RunFinished) -> bool:
 
 
 def _compared_index(jobs: Sequence[Job], number: int) -> int:
-    """Return the index of the run with which --check-determinism compares run `number`; without one, `number`."""
+    """Return the index of the run with which --check-determinism compares run `number`; `number` if there is none."""
     twin = number ^ 1
     if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.original == jobs[number].key.original:
         return twin
@@ -149,7 +149,7 @@ def _job_identity(job: Job) -> tuple[str, str, str]:
 
 
 RUN_ALL = "all selected scenarios run"
-"""End of the messages if --last-failed selects all runs."""
+"""Last words of a message of --last-failed if all selected scenarios run."""
 
 
 def failed_runs(
@@ -157,8 +157,8 @@ def failed_runs(
 ) -> tuple[frozenset[RunKey] | None, str]:
     """Return the runs of these scenarios that failed in the last session, and a message for the user.
 
-    The runs are None if there is no last session or no such run. The last session is searched in the parent of the
-    output folder `out`; None for simscen-out. If the options set seeds, only runs with these seeds are returned.
+    The runs are None if there is no last session, or no such run. The last session is searched in the parent folder of
+    `out`, the output folder, or in simscen-out if `out` is None. If the options set seeds, other seeds do not count.
     """
     sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(sessions_folder)
@@ -176,6 +176,7 @@ def failed_runs(
 
 
 def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
+    """Return whether the scenario of a run is selected (not None), and the options include the seed of the run."""
     if scenario is None:
         return False
     return (options.seed is None and options.repeat == 1) or key.seed in scenario_seeds(scenario, options)

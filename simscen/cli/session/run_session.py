@@ -29,7 +29,7 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_sess
 
 
 class Observer(Protocol):
-    """Object that receives the scenarios and the events of a session."""
+    """Object that receives the scenarios and the events of a session, such as the reporter of the watch mode."""
 
     def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
         """Receive the selected scenarios, before the first event."""
@@ -94,7 +94,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
 
 
 def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:
-    """Return the runs that --last-failed selects, None for all runs, and print a message about the selection."""
+    """Print a message about --last-failed, and return the runs that the option selects; None for all runs."""
     if request.resume is not None:
         raise UsageError("--last-failed and --resume exclude each other")
     only, message = failed_runs(scenarios, request.options, request.out)
@@ -150,8 +150,8 @@ def _check_journal(journal: Journal) -> bool:
 def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
     """Return the output folder and its journal. The journal locks the folder against other processes.
 
-    The folder is that of --out or --resume, or a new folder in simscen-out. Raises InvalidInput and UsageError before
-    the folder is changed.
+    The folder is the one of --out or --resume, or a new folder in simscen-out. Raises InvalidInput and UsageError
+    before the folder is changed.
     """
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")

@@ -74,9 +74,9 @@ def scenarios_of_shard(
 ) -> list[LoadedScenario]:
     """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected without scenarios.
 
-    `times` are durations of scenarios in s by title. From the longest to the shortest, each scenario is assigned to the
-    shard with the least total time. A missing duration counts as the median. If `times` is empty, each shard has every
-    `count`-th scenario.
+    `times` are durations of scenarios in s by title. The scenarios are assigned from the longest to the shortest, each
+    to the shard with the least total time so far. A missing duration counts as the median. If `times` is empty, a shard
+    has every `count`-th scenario.
     """
     if times and count > 1:
         default = median(times.values())
@@ -114,7 +114,7 @@ class Selection:
     """Filter of scenarios.
 
     keyword:     expression about ids, as with `pytest -k`; "" selects all scenarios
-    tags:        tags of which a scenario has at least one; () selects all scenarios
+    tags:        tags; selects the scenarios with at least one of them; () selects all scenarios
     shard:       number of this shard (from 1), and count of shards
     variations:  names of variations; () selects all variations
     times:       durations of scenarios in s by title, to balance shards
@@ -143,8 +143,8 @@ def load_selection(
 ) -> tuple[list[LoadedScenario], list[Problem]]:
     """Return the selected scenarios below `paths`, each with each of `stacks`, and warnings about these scenarios.
 
-    `stacks` are values of --stack; () keeps the stack of each scenario. A scenario that a stack cannot run is skipped
-    if it was found in a folder, and invalid if it is one of `paths`. Raises InvalidInput if any file below `paths` is
+    `stacks` are values of --stack; () keeps the stack of each scenario. If a stack cannot run a scenario, the scenario
+    is skipped; if `paths` contains its file, it is invalid instead. Raises InvalidInput if a file below `paths` is
     invalid, and NothingSelected if no scenario is selected.
     """
     root_folder = root if root is not None else default_root(paths)
@@ -156,7 +156,7 @@ def load_selection(
     named = {path.absolute() for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, root_folder), choices):
         variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
-        if choice is not None and file not in named and (reason := impossible_with(choice, found)):
+        if choice is not None and file not in named and (reason := stack_limitation(choice, found)):
             variations, found = checker.check_scenario(file, None, selection.variation_numbers)
             variations = [one.as_skipped(choice, reason) for one in variations]
         for scenario in variations:
@@ -173,8 +173,8 @@ def load_selection(
     )
 
 
-def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
-    """Return the reason why a stack cannot run a scenario with these problems; "" if other problems are the reason."""
+def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
+    """Return why a stack cannot run a scenario with these problems; "" if the scenario has any other error."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != STACK_CANNOT for problem in errors):
         return ""
@@ -183,7 +183,7 @@ def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
 
 
 def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
-    """Return the scenarios with one of these variation names; all for (). Raises NothingSelected for unknown names."""
+    """Return the variations with one of these names; all if there are no names. Raises NothingSelected."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
         if number_of(missing[0]) is not None:

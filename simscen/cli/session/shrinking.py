@@ -32,6 +32,7 @@ from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 Part = TypeVar("Part")
+"""Part of a scenario that can be removed or simplified independently, such as the path of a YAML key."""
 FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 """Function that takes several lists of parts, and returns the index of the first list that fails; None if none does."""
 
@@ -39,8 +40,8 @@ FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
     """Return a minimal list of parts that fails, by delta debugging (Zeller and Hildebrandt 2002).
 
-    All parts together must fail. If any single part of the result is removed, the rest passes. Candidates keep the
-    order of the parts.
+    All parts together must fail. The result is minimal: it passes without any single one of its parts. All tested lists
+    keep the order of the parts.
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:
@@ -61,7 +62,7 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
 
 
 BATCH_SIZE = 8
-"""Number of candidates that run together, independent of the number of workers."""
+"""Number of candidates that run together. It does not depend on the number of workers, so that the result does not."""
 
 
 class Stopped(Exception):
@@ -80,8 +81,8 @@ class BudgetSpent(Exception):
 class CandidateRuns:
     """Runs of candidates, which are changed versions of a scenario in the form of YAML trees.
 
-    All candidates run with the same seed, and equal candidates only once. `report` is called after each batch. `runs`
-    is the number of runs so far, and `max_runs` its maximum.
+    All candidates run with the same seed, and equal candidates run only once. `report` is called after each batch.
+    `runs` is the number of runs so far, and `max_runs` is its maximum.
     """
 
     scenario: ChangedScenario
@@ -95,7 +96,7 @@ class CandidateRuns:
     _results: dict[str, RunResult | None] = field(default_factory=dict)
 
     def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
-        """Return the index of the first candidate with a result that `accepts` accepts; None without any.
+        """Return the index of the first candidate for whose result `accepts` returns true; None if there is none.
 
         Invalid candidates are not accepted. Raises BudgetSpent and Stopped.
         """
@@ -142,11 +143,12 @@ class CandidateRuns:
 
 
 def _content_key(tree: MappingNode) -> str:
+    """Return a hash of the data in a YAML tree."""
     return hashlib.sha256(json.dumps(tree.plain, sort_keys=True).encode()).hexdigest()
 
 
 MAX_ROUNDS = 3
-"""Maximum number of rounds, in each of which parts are removed and numbers are rounded."""
+"""Maximum number of rounds. Each round removes parts, and then rounds numbers."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ class Failure:
 
     criterion:   kind of the failed criterion, such as "collisions"; "" for an error of the stack
     verdict_id:  id of the criterion's verdict
-    max_margin:  largest margin (distance to the limit, below 0) of the same failure; None without margins
+    max_margin:  margin (distance to the limit, below 0) that must not be exceeded; None for any margin
     """
 
     criterion: str
@@ -181,7 +183,7 @@ class Failure:
 
 @dataclass
 class Shrinker:
-    """Reduces a scenario while its runs reproduce a failure.
+    """Reduces a scenario as long as its runs reproduce a failure.
 
     `tree` is the smallest scenario so far. `is_complete` is false if the maximum number of runs ended the search.
     """
@@ -241,7 +243,7 @@ class Shrinker:
             self.tree = build(self._minimize([change.keys for change in changes], build))
 
     def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
-        """Return the parts that the failure needs. `build` returns the scenario with only the given parts."""
+        """Return the parts that the failure needs. `build` returns the scenario with the other parts simplified."""
         if not parts:
             return []
         return minimize(
@@ -251,7 +253,7 @@ class Shrinker:
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
-    """Return the failure of a run in a criterion. `criterion` is an id or kind; "" for the first failed criterion.
+    """Return the failure of a run in a criterion, named by ID or kind; "" for the first failed criterion.
 
     `share` (0 to 1) is the fraction of the violation that a smaller scenario must still have. Raises UsageError if the
     run did not fail in this criterion.

@@ -77,7 +77,7 @@ class Stacks:
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
-        """Return the command of an external stack from --stack or the configuration; None without a command."""
+        """Return the command of the external stack `name` from --stack or the configuration; None without a command."""
         if name not in self._commands:
             given = next(
                 (choice.external_command for choice in self.chosen if choice.name == name and choice.external_command),
@@ -103,7 +103,7 @@ def external_commands(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str
 def load_with_stack(
     stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
 ) -> LoadedScenario:
-    """Load a scenario or one of its variations with another stack.
+    """Load a scenario, or one of its variations, and replace its stack if `stack` is given.
 
     `stack` is a value of --stack; None keeps the stack of the scenario. Raises InvalidInput, and UsageError for a
     missing or unknown `variation`.
@@ -155,7 +155,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
 
 
 def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> ExternalCommand:
-    """Return the command with the name `value` in the configuration, or parse `value` as a command.
+    """Return the command that the configuration defines as `value`, or parse `value` as a command.
 
     `text` is the value of --stack for messages. Raises UsageError.
     """

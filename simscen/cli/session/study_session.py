@@ -1,4 +1,7 @@
-"""Implementation of `simscen study`: simulates runs of one scenario until its claim (a pass rate) is decided."""
+"""Implementation of `simscen study`, which runs one scenario many times to measure or test its pass rate.
+
+A claim is a pass rate to be tested. A sequential claim is evaluated repeatedly during the study.
+"""
 
 import sys
 import time
@@ -40,9 +43,9 @@ from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 SEQUENTIAL_BATCH_SIZE = 32
-"""Number of runs between two evaluations of a sequential claim, which ends the study as soon as it is decided."""
+"""Number of runs between two evaluations of a sequential claim. The study ends as soon as the claim is decided."""
 BATCH_SIZE = 256
-"""Number of runs of a batch without a sequential claim. It limits the number of scenarios in memory."""
+"""Number of runs per batch of a study without a sequential claim. It limits the number of scenarios in memory."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,8 @@ class StudyRun(NamedTuple):
     """Run of a study.
 
     number:      number of the variation; None for a scenario without variations
-    seed_index:  seed of the run minus first seed of the study
-    drawn:       number of variations drawn up to this run, including rejected draws; 0 without draws or conditions
+    seed_index:  seed of the run minus the first seed of the study
+    drawn:       number of random variations drawn up to this run, including rejected ones; 0 without conditions
     """
 
     number: int | None

@@ -74,7 +74,7 @@ class Screen:
             self.summary_error = error
 
     def exit(self, code: Exit) -> Exit:
-        """Return the exit code of the session, at least INCOMPLETE if output was lost, and print the reason.
+        """Return the exit code of the session. If output was lost, print why, and return at least INCOMPLETE.
 
         A closed pipe does not count as lost output.
         """
@@ -90,10 +90,10 @@ class Screen:
 
 @contextmanager
 def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
-    """Provide a Screen within the context, and print the end of the session afterwards.
+    """Provide a Screen within the context. Afterwards, restore the terminal and write the job summary.
 
-    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none. The format GITHUB also writes
-    the job summary. Raises UsageError if the file of the summary is not writable.
+    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none. Only the format GITHUB has a
+    job summary. Raises UsageError if the file of the summary is not writable.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
     printer = _printer(format_, summary, slow)

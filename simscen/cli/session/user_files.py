@@ -11,7 +11,7 @@ from simscen.loading.yaml.textfile import os_error_reason
 
 @contextmanager
 def create_file(file: Path, name: str) -> Iterator[None]:
-    """Create an empty file and its folder, and remove the file again if the body of the `with` statement fails.
+    """Create an empty file and its folder. If the body of the `with` statement fails, remove the file again.
 
     `name` is the name of the file in messages. Raises UsageError if the file exists or cannot be written.
     """

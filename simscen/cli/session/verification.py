@@ -1,4 +1,4 @@
-"""Comparison of a run of a reconstructed scenario with the log, for `simscen new --from-log --verify`."""
+"""Comparison of a run of a reconstructed scenario with the original log, for `simscen new --from-log --verify`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from simscen.reconstruction.verifying.comparison import Verification, compare_wi
 from simscen.reconstruction.verifying.page import verification_page
 
 PAGE_SUFFIX = ".verified.html"
-"""Suffix of the page. Its stem is the name of the scenario."""
+"""Suffix of the file name of the page, after the name of the scenario."""
 MAX_COLUMNS = 100
 """Width of the table in characters if stdout is not a terminal."""
 
@@ -30,7 +30,7 @@ MAX_COLUMNS = 100
 def verify_reconstruction(reconstruction: Reconstruction) -> None:
     """Run the scenario, print a table of the differences between run and log, and write a page with both drives.
 
-    Exits with code 1 if an incident of the log, such as a collision, does not happen in the run.
+    Exit with code 1 if an incident of the log, such as a collision, does not happen in the run.
     """
     name = reconstruction.file.name.partition(".")[0]
     log = reconstruction.file.with_name(f"{name}.verified.mcap")

@@ -42,7 +42,7 @@ def _stamp(file: Path) -> tuple[int, int, int] | None:
 
 
 class WatchReporter:
-    """Observer of a session that writes the files and the outcomes of scenarios to a pipe, as lines of JSON."""
+    """Observer in the child process that writes the files and the outcomes of scenarios to a pipe, as JSON lines."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -58,7 +58,7 @@ class WatchReporter:
             self._write({"scenario": file, "files": sorted(map(str, others))})
 
     def invalid_files(self, problems: Iterable[Problem]) -> None:
-        """Write the files with these problems, because of which the session did not run."""
+        """Write the files with these problems, which prevented the session."""
         self._write({"invalid": sorted({str(Path(problem.path).absolute()) for problem in problems})})
 
     def __call__(self, event: SessionEvent) -> None:
@@ -72,7 +72,7 @@ class WatchReporter:
 
 
 class WatchState:
-    """Watched scenarios, the files of each scenario, and the scenarios that did not pass."""
+    """State of the watch mode: scenarios, the files of each scenario, and the scenarios that did not pass."""
 
     def __init__(self, find_scenarios: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
         """Take the paths to watch, and a function that returns the scenarios below these paths."""
@@ -118,11 +118,11 @@ class WatchState:
             self._not_passed.add(scenario)
 
     def end(self, code: int) -> None:
-        """Record the exit code of the session. After an invalid file, the session is to be repeated."""
+        """Record the exit code of the session. A session with an invalid file is repeated after the next change."""
         self._unfinished = self._requested if code == Exit.USAGE else ()
 
     def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
-        """Return the scenarios to run after a change of these files: affected, new, and those to be repeated."""
+        """Return the scenarios to run after these files changed: affected, new, and the ones of a repeated session."""
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
         existing = set(self._discovered()) if changed & self._folders else known
@@ -132,6 +132,7 @@ class WatchState:
         return sorted((affected | new | unfinished) & existing)
 
     def _below(self, path: Path) -> list[Path]:
+        """Return the watched scenarios in a folder, or the scenario at `path` itself."""
         return [file for file in self._files if file.is_relative_to(path.absolute())]
 
     def _discovered(self) -> Sequence[Path]:
