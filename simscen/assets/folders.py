@@ -42,8 +42,8 @@ class NoSuchFile(UnusableFile):
 class AllowedFolders:
     """The folders in which files may be read.
 
-    roots:     absolute paths without symbolic links: the root of the scenarios first, then those of `--world-path`
-    packages:  folders of ROS packages by name; other packages are searched
+    roots:     absolute paths without symbolic links: the root of the scenarios, then the folders of `--world-path`
+    packages:  known folders of ROS packages by name; for other packages, the folders are searched
     """
 
     roots: tuple[Path, ...]

@@ -85,7 +85,7 @@ class Element:
         return (child for child in self.children if child.tag in tags)
 
 
-E = TypeVar("E", bound=Element)
+ElementT = TypeVar("ElementT", bound=Element)
 
 
 def refuse_doctype(data: bytes) -> None:
@@ -93,12 +93,12 @@ def refuse_doctype(data: bytes) -> None:
     _run(expat.ParserCreate(), data, Source(""))
 
 
-def parse(data: bytes, source: Source, kind: type[E]) -> E:
+def parse(data: bytes, source: Source, kind: type[ElementT]) -> ElementT:
     """Parse an XML text into elements of the class `kind`, and return the root. Raises MalformedXml."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    root: list[E] = []
-    open_elements: list[E] = []
+    root: list[ElementT] = []
+    open_elements: list[ElementT] = []
     count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:

@@ -9,6 +9,7 @@ from urllib.parse import unquote
 PACKAGE_SCHEMES = ("package://", "model://")
 """Schemes of ROS and Gazebo whose first path component is the name of a package or model."""
 SCHEMES = (*PACKAGE_SCHEMES, "file://")
+"""Schemes of all supported URIs except Fuel URIs."""
 MAX_MANIFEST_BYTES = 1 << 16
 """Number of bytes of a package.xml that are read to find the `<name>`."""
 _FUEL = re.compile(
@@ -22,7 +23,7 @@ _BUILTIN_MODELS = {"sun", "ground_plane"}
 
 @dataclass(frozen=True)
 class FuelUri:
-    """URI of a model or world on Gazebo Fuel, of which only local copies are used.
+    """URI of a model or world on Gazebo Fuel. Nothing is downloaded: only local copies are used.
 
     kind:     "models" or "worlds"
     version:  number, "tip" for the newest version, or "" if the URI has none

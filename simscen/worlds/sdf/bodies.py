@@ -183,7 +183,7 @@ def _volume(shape: Shape) -> float:
 
 
 class LinkGroups:
-    """Disjoint sets (union-find) of links, which are numbers from 0. The set with _WORLD is static."""
+    """Disjoint sets (union-find) of links, which are numbered from 0. The links in the set of _WORLD are static."""
 
     def __init__(self) -> None:
         self._parents: dict[int, int] = {_WORLD: _WORLD}
@@ -221,7 +221,7 @@ def split_model(
 
 
 def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport) -> LinkGroups:
-    """Return the groups of links, which are indices of `links`: joined by joints, or with _WORLD if static."""
+    """Return the groups of links, given by their indices in `links`. Static links are joined with _WORLD."""
     groups = LinkGroups()
     numbers = {id(link.frame): number for number, link in enumerate(links)}
     for number, link in enumerate(links):

@@ -203,7 +203,7 @@ def _quaternion_pose(element: Element, in_degrees: bool) -> Pose3:
 # Tables of elements. `report_unknown` uses them to distinguish harmless elements from misspelled ones.
 
 _HARMLESS_ANYWHERE = {"plugin", "light", "pose", "name", "meta", "description", "frame", "model_state"}
-HARMLESS = {
+HARMLESS_CHILDREN = {
     "world": {
         "audio", "wind", "gravity", "magnetic_field", "atmosphere", "gui", "physics", "scene", "spherical_coordinates",
         "road", "state", "material", "particle_emitter", "projector",
@@ -236,9 +236,9 @@ SHAPES: dict[str, set[str]] = {
     "mesh": {"uri", "scale", "submesh"},
     "empty": set(),
 }
-"""Shapes and the children that are read."""
+"""Elements of shapes, each with the children that are read."""
 
-GEOMETRIC = SHAPES | {
+GEOMETRIC_CHILDREN = SHAPES | {
     "world": {"model", "include", "actor", "population", "joint", "frame", "state"},
     "model": {"model", "include", "link", "joint", "frame", "pose", "static"},
     "link": {"collision", "pose", "inertial"},
@@ -249,48 +249,49 @@ GEOMETRIC = SHAPES | {
 """Elements that add or move solids, by parent. A misspelling of one of them is an error."""
 
 # Tags for which `report_unknown` looks in unknown elements and in `experimental:params`.
-_ADDS_SOLIDS = {"model", "include", "actor", "population", "link", "collision", "geometry"}
-_ADDS_NO_SOLIDS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
+_SOLID_TAGS = {"model", "include", "actor", "population", "link", "collision", "geometry"}
+_NON_SOLID_TAGS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 _XACRO_CONDITIONALS = ("xacro:if", "xacro:unless")
 
 
 def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
-    """Report an element that the importer does not read, unless it is harmless. `parent` is a key of GEOMETRIC.
+    """Report an element that the importer does not read, unless it is in HARMLESS_CHILDREN.
 
     Raises UnusableElement if the element could change the geometry: if it contains solids, if its parent is a shape, or
-    if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note to the report. Elements with a
-    namespace prefix are ignored, except xacro elements and `experimental:params`, which must be expanded first.
+    if its name is a misspelling of an element in GEOMETRIC_CHILDREN. Otherwise adds a note to the report. Elements with
+    a namespace prefix are ignored, except xacro elements and `experimental:params`, which must be expanded first.
+    `parent` is the key of the parent in GEOMETRIC_CHILDREN.
     """
     tag = element.tag
-    harmless = HARMLESS.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)
+    harmless = HARMLESS_CHILDREN.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)
     if tag in harmless or tag in _XACRO_DEFINITIONS:
         return
-    adds_solids = any(descendant.tag in _ADDS_SOLIDS for descendant in element.descendants())
+    adds_solids = any(descendant.tag in _SOLID_TAGS for descendant in element.descendants())
     if tag == "experimental:params" and _changes_no_solids(element):
         return
     if tag == "experimental:params" or (tag.startswith("xacro:") and (adds_solids or tag not in _XACRO_CONDITIONALS)):
         raise element.unusable(f"<{tag[:60]}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
     if ":" in tag and not adds_solids:
         return
-    similar = _most_similar_tag(tag[:60], frozenset(GEOMETRIC[parent] | harmless))
+    similar = _most_similar_tag(tag[:60], frozenset(GEOMETRIC_CHILDREN[parent] | harmless))
     hint = f"did you mean <{similar}>?" if similar else ""
-    if adds_solids or parent in SHAPES or similar in GEOMETRIC[parent]:
+    if adds_solids or parent in SHAPES or similar in GEOMETRIC_CHILDREN[parent]:
         raise element.unusable(f"unknown element <{tag[:60]}>", hint)
     report.note(element.location, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
 
 
 def report_unknown_children(element: Element, parent: str, report: ImportReport) -> None:
-    """Call `report_unknown` for all children of an element that are not in GEOMETRIC[parent]."""
+    """Call `report_unknown` for all children of an element that are not in GEOMETRIC_CHILDREN[parent]."""
     for child in element.children:
-        if child.tag not in GEOMETRIC[parent]:
+        if child.tag not in GEOMETRIC_CHILDREN[parent]:
             report_unknown(child, parent, report)
 
 
 def _changes_no_solids(params: Element) -> bool:
     """Return whether an `<experimental:params>` changes only visuals, lights, sensors and plugins."""
     return all(
-        child.tag in _ADDS_NO_SOLIDS
+        child.tag in _NON_SOLID_TAGS
         or (child.tag in ("model", "link") and child.attributes.get("action") == "modify" and _changes_no_solids(child))
         for child in params.children
     )

@@ -126,7 +126,7 @@ class IncludedFiles:
             raise uri.unusable(f"{self._files.display_path(folder)}: neither model.config nor model.sdf in this folder")
         try:
             data = self._files.read(config, uri, MAX_WORLD_BYTES)
-            return self._files.locate(_newest_model(parse(data, self._files.display_path(config), str(folder))))
+            return self._files.locate(_newest_sdf(parse(data, self._files.display_path(config), str(folder))))
         except UnusableElement as error:
             if not os.path.lexists(model):
                 raise
@@ -134,7 +134,7 @@ class IncludedFiles:
             return model
 
 
-def _newest_model(config: Element) -> Element:
+def _newest_sdf(config: Element) -> Element:
     """Return the `<sdf>` with the newest supported version in a model.config."""
     supported = [sdf for sdf in config.all("sdf") if sdf.text and _version(sdf) <= _NEWEST_PATCH]
     if not supported:

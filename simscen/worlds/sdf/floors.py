@@ -1,4 +1,4 @@
-"""Find the floor of a world that has a slab as its floor, on which robots drive."""
+"""Find the height of the floor of an SDF world. The floor on which robots drive can be a slab above z = 0."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ MIN_COVERED_FRACTION = 0.8
 """Minimum fraction of the area of the world that a floor covers."""
 MAX_UNCOVERED_WIDTH_M = 1.0
 """Maximum width of the ground plane beside a floor covering. Walls can stand there."""
-SAMPLES = 64
+SAMPLES_PER_SIDE = 64
 """Number of rows and columns of the grid on which the covered area is measured."""
 
 FaceMask = npt.NDArray[np.bool_]
@@ -104,7 +104,7 @@ def _carries_geometry(mesh: TriangleMesh, height: float) -> bool:
 def _covered_fraction(triangles: Array, bounds: Bounds) -> float:
     """Return the fraction of `bounds` that is covered by counterclockwise triangles (n, 3, 2), which may overlap."""
     left, bottom, right, top = bounds
-    cells = (triangles - (left, bottom)) * SAMPLES / (right - left, top - bottom)
+    cells = (triangles - (left, bottom)) * SAMPLES_PER_SIDE / (right - left, top - bottom)
     segments = np.stack((cells, np.roll(cells, -1, axis=1)), axis=2).reshape(-1, 2, 2)
     owners = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
-    return float(filled_cells(CrossSection(segments, owners), (SAMPLES, SAMPLES)).mean())
+    return float(filled_cells(CrossSection(segments, owners), (SAMPLES_PER_SIDE, SAMPLES_PER_SIDE)).mean())

@@ -24,7 +24,7 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_FRACTION = 0.05
-"""Maximum fraction of the models that are outliers; one more model is allowed."""
+"""Maximum fraction of the models that `outliers` may leave out, in addition to one model."""
 
 Placed = TypeVar("Placed", Solid, Body)
 """A solid or a body: both have a pose."""

@@ -115,7 +115,7 @@ def _read_obj(data: bytes) -> Iterator[MeshPart]:
 
 
 def _parts_from_trimesh(load: Callable[[], Mapping[str, Any]], file_format: str) -> Iterator[MeshPart]:
-    """Call a loader of trimesh, and yield the parts in the result: keyword arguments of a Trimesh or of a Scene."""
+    """Call `load`, a loader of trimesh, and yield the parts in its result (keyword arguments of a Trimesh or Scene)."""
     from trimesh.geometry import triangulate_quads
 
     try:
@@ -197,7 +197,7 @@ def _local_name(element: "ET.Element") -> str:
 def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
     """Yield the parts of a COLLADA scene in the unit of the file.
 
-    The first name of a part is the name of the nearest node that has a name, from the part upward.
+    The first name of a part is the name of its node or, if the node has no name, of the nearest named node above it.
     """
     from collada.scene import GeometryNode, Node
 

@@ -1,6 +1,6 @@
 """Convert `<mesh>` and `<heightmap>` elements to triangle meshes.
 
-A COLLADA `<unit>` is used, but `<up_axis>` is ignored, as in Gazebo.
+The `<unit>` of a COLLADA file is applied, but its `<up_axis>` is ignored, as in Gazebo.
 """
 
 import hashlib

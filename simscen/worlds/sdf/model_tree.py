@@ -34,7 +34,7 @@ class Frame:
 
     element:            the XML element; several frames can have the same one if a file is included several times
     pose:               the `<pose>` element; None for identity
-    default_reference:  name of the frame to which a `pose` without `relative_to` is relative; "" for the scope's own
+    default_reference:  name of the frame that `pose` refers to if it has no `relative_to`; "" for the scope's own frame
     attached_to:        name of the link or frame with which a joint or a `<frame>` moves; "" for the scope's own frame
     model_scope:        the frames in a nested model; None if this is not the frame of a model
     placement_frame:    name of a frame in the nested model that `pose` places; "" if `pose` places the model itself

@@ -30,7 +30,7 @@ class UnusableElement(Exception):
     """An element cannot be used, although it affects the geometry."""
 
     is_harmless = False
-    """Whether the element is left out with a note, because it cannot affect a robot."""
+    """Whether the element is left out with a note instead of a problem, because it cannot affect a robot."""
 
     def __init__(self, location: SourceLocation, message: str, hint: str = "") -> None:
         self.location, self.message, self.hint = location, message, hint
