@@ -1,1 +1,1 @@
-"""Subcommands of `simscen bench` and their output."""
+"""Subcommands of `simscen bench`, and the output of their results as tables and JSON."""

@@ -97,7 +97,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
 
 
 def _print_failures(name: str, trials: "Sequence[Trial]") -> None:
-    """Print each trial without success to stderr. `name` is that of the parameter set."""
+    """Print each trial without success to stderr. `name` is the name of the parameter set."""
     for trial in trials:
         if not trial.succeeded:
             log = f"building {trial.building}, log {trial.number}, {trial.circumstance}"
@@ -110,7 +110,7 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Column heading of each circumstance of the logs."""
+"""Columns of the table: heading by circumstance of the logs (a key of CIRCUMSTANCES in generated_logs)."""
 
 
 def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -> str:
@@ -127,6 +127,7 @@ def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -
 
 
 def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
+    """Return the table row of one parameter set."""
     return (
         row.parameters,
         *(_success_text(row.shares[name]) for name in COLUMN_NAMES),
@@ -145,7 +146,7 @@ def _interval_text(interval: "Interval", number_format: str = ".3f") -> str:
 
 
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
-    """Return lines with the ANEES for each circumstance, and its bounds for a consistent localizer."""
+    """Return two lines for each circumstance: the ANEES, and the 95 % bounds of a consistent localizer."""
     from simscen.bench.localization.campaign import CHECK_TIMES_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:

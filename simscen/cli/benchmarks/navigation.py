@@ -86,12 +86,14 @@ def command(
     sizes = Sizes(first, seeds, fields, dynamic, goals, lost)
     for group in experiment_groups(barn, nav2, project, generated, sizes):
         is_whole = _is_selected(group.name, only)
-        if not is_whole and not any(_is_selected(name, only) for name in group.parts):
+        if not is_whole and not any(_is_selected(name, only) for name in group.other_names):
             continue
         if group.missing:
             print(f"{group.name}: skipped, {group.missing}", file=sys.stderr)
             continue
-        experiments += [experiment for experiment in group.make() if is_whole or _is_selected(experiment.name, only)]
+        experiments += [
+            experiment for experiment in group.write_experiments() if is_whole or _is_selected(experiment.name, only)
+        ]
     if not experiments:
         raise NothingSelected("no experiment matches --only, or its data is missing")
     others = [] if stack is None else with_stack(stack, experiments, generated, project)
@@ -119,7 +121,7 @@ def command(
 
 
 def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
-    """Return experiments with the same drives and the parameters of a stack file. Raises InvalidInput.
+    """Return copies of the experiments that use the parameters of a stack file. Raises InvalidInput.
 
     Their scenarios are written to the folder `generated`. `project` is the root folder of the stack file.
     """

@@ -1,4 +1,4 @@
-"""Groups of experiments of `simscen bench nav`. The experiments of a group are created only if they are selected."""
+"""Groups of experiments of `simscen bench nav`. Scenario files are written only for the selected groups."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
 """Names of the shipped worlds in which robots drive to random goals."""
-BARN_SOURCE = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
-NAV2_SOURCE = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
-"""Messages if the data of BARN or Nav2 is missing."""
+BARN_HINT = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
+NAV2_HINT = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+"""Messages if the option with the folder of the data is missing."""
 LIDAR_HEIGHT_M = 0.2
-"""Height of the lidar with which the maps of the worlds are made."""
+"""Height of the lidar for the maps of the worlds."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class Sizes:
     goals: int = 20
     lost: int = 50
 
-    def seeds_or(self, default: int) -> Sequence[int]:
-        """Return the seeds of a scenario. `default` is their number if `seeds` is None."""
-        return self.numbers(self.seeds or default)
+    def scenario_seeds(self, default_count: int) -> Sequence[int]:
+        """Return the seeds of a scenario; `default_count` seeds if `seeds` is None."""
+        return self.numbers(self.seeds or default_count)
 
     def numbers(self, count: int) -> Sequence[int]:
-        """Return `count` consecutive numbers, of which the first is `first`."""
+        """Return `count` consecutive numbers, starting at `first`."""
         return range(self.first, self.first + count)
 
 
@@ -55,25 +55,25 @@ class Sizes:
 class ExperimentGroup:
     """Group of experiments that need the same data.
 
-    name:    name of the group
-    needs:   folder with the data; None if the option for the folder was not given
-    make:    function that creates the experiments
-    source:  message if `needs` is None
-    parts:   names of the experiments, except the name of the group
+    name:               name of the group
+    data_folder:        folder with the data; None if the option for the folder was not given
+    write_experiments:  function that writes the scenario files, and returns the experiments
+    missing_hint:       message if `data_folder` is None
+    other_names:        names of the experiments that do not have the name of the group
     """
 
     name: str
-    needs: Path | None
-    make: Callable[[], Sequence[Experiment]]
-    source: str = ""
-    parts: Sequence[str] = ()
+    data_folder: Path | None
+    write_experiments: Callable[[], Sequence[Experiment]]
+    missing_hint: str = ""
+    other_names: Sequence[str] = ()
 
     @property
     def missing(self) -> str:
         """Message that the data is missing; "" if the data is available."""
-        if self.needs is None:
-            return self.source
-        return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
+        if self.data_folder is None:
+            return self.missing_hint
+        return "" if self.data_folder.is_dir() else f"there is no folder {self.data_folder}"
 
 
 def experiment_groups(
@@ -86,14 +86,14 @@ def experiment_groups(
     """
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
-        replace(group, parts=_parts(group.name, scenarios))
-        for group in _groups_without_parts(barn_data, nav2, worlds, scenarios, generated, sizes)
+        replace(group, other_names=_other_names(group.name, scenarios))
+        for group in _groups_without_names(barn_data, nav2, worlds, scenarios, generated, sizes)
     ]
 
 
-def _parts(name: str, scenarios: Path) -> list[str]:
-    """Return the names of a group's experiments, except the name of the group."""
-    match name:
+def _other_names(group: str, scenarios: Path) -> list[str]:
+    """Return the names of the experiments in a group that do not have the name of the group."""
+    match group:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
@@ -116,11 +116,12 @@ def _parts(name: str, scenarios: Path) -> list[str]:
             return []
 
 
-def _groups_without_parts(
+def _groups_without_names(
     barn_data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
 ) -> list[ExperimentGroup]:
+    """Return all groups without `other_names`."""
     return [
-        ExperimentGroup("BARN", barn_data, lambda: list(_barn(generated, barn_data or Path(), sizes)), BARN_SOURCE),
+        ExperimentGroup("BARN", barn_data, lambda: list(_barn(generated, barn_data or Path(), sizes)), BARN_HINT),
         ExperimentGroup(
             "generated fields",
             generated,
@@ -149,17 +150,19 @@ def _groups_without_parts(
         ExperimentGroup(
             "tb3_sandbox",
             nav2,
-            lambda: experiments.write_sandbox(generated, nav2 or Path(), sizes.seeds_or(20)),
-            NAV2_SOURCE,
+            lambda: experiments.write_sandbox(generated, nav2 or Path(), sizes.scenario_seeds(20)),
+            NAV2_HINT,
         ),
         ExperimentGroup(
-            "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeds_or(20))
+            "corner cases",
+            scenarios,
+            lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.scenario_seeds(20)),
         ),
         ExperimentGroup(
             "localization",
             worlds,
             lambda: experiments.write_localization_experiments(
-                generated, worlds, sizes.seeds_or(20), sizes.numbers(sizes.lost)
+                generated, worlds, sizes.scenario_seeds(20), sizes.numbers(sizes.lost)
             ),
         ),
     ]
@@ -167,7 +170,7 @@ def _groups_without_parts(
 
 def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Write the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
-    seeds = sizes.seeds_or(5)
+    seeds = sizes.scenario_seeds(5)
     yield experiments.write_barn_challenge(generated, barn_data, seeds)
     yield experiments.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
@@ -185,7 +188,7 @@ def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Exper
 
 
 def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    """Write the experiments with sensor faults. The number of worlds is a quarter of `sizes.goals`."""
+    """Write the experiments with sensor faults in `sizes.goals` / 4 worlds, at least one."""
     folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)
     buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))

@@ -64,7 +64,7 @@ class ExperimentResult:
 def execute_experiments(
     experiments: Sequence[Experiment], journal: Journal, workers: int
 ) -> tuple[list[list[Trial]], Exit | None]:
-    """Execute all runs without a result in the journal, and print progress and failures to stderr.
+    """Execute all runs that have no result in the journal yet, and print progress and failures to stderr.
 
     Return the trials (runs with their results) of each experiment, and the exit code of the signal that interrupted the
     runs; None without a signal. Raises InvalidInput.
@@ -91,7 +91,7 @@ def execute_experiments(
 
 
 def completed_trials(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the trials that were not interrupted."""
+    """Return the trials whose runs were not interrupted."""
     return [trial for trial in trials if not _was_interrupted(trial.run)]
 
 

@@ -30,9 +30,10 @@ TABLE_HEAD = (
 
 
 def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
-    """Return the table of results, the comparisons of --stack in `pairs`, and the published figures of BARN.
+    """Return the table of results, the table of comparisons, and the published figures of BARN.
 
-    `columns` is the width of the terminal in characters; None stands for unlimited width.
+    `pairs` are the comparisons of the experiments without and with --stack. `columns` is the width of the terminal in
+    characters; None stands for unlimited width.
     """
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
     lines = align_columns(table)
@@ -55,7 +56,7 @@ def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] =
 
 
 def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
-    """Return a table with one line per comparison, or one number per line with its heading if the table is too wide."""
+    """Return a table with one line per comparison; if it is too wide, lines of cells with their headings instead."""
     changes = [_comparison_cells(pair) for pair in pairs]
     lines = align_columns([COMPARISON_HEAD, *changes])
     if columns is None or fits(lines, columns):
@@ -64,7 +65,7 @@ def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> 
 
 
 def _comparison_cells(pair: DriveComparison) -> tuple[str, ...]:
-    """Return the cells of one comparison, with the columns COMPARISON_HEAD."""
+    """Return the cells of one comparison in the columns of COMPARISON_HEAD."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
     changes = (_difference_text(difference, form) for difference, form in forms)
     return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
@@ -78,6 +79,7 @@ def _difference_text(difference: Difference | None, number_format: str) -> str:
 
 
 def _cells(row: ExperimentSummary) -> tuple[str, ...]:
+    """Return the cells of one experiment in the columns of TABLE_HEAD."""
     interval = row.success_interval
     return (
         row.case,

@@ -1,4 +1,7 @@
-"""Results of the speed benchmarks of `simscen bench`: JSON files, printed output, and comparison of two results."""
+"""Results of the speed benchmarks of `simscen bench`: JSON files, printed output, and comparison of two results.
+
+A figure is a measured value with a name. A round is one of several repeated measurements of a figure.
+"""
 
 import json
 import sys
@@ -22,7 +25,7 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True)
 class Result:
-    """Figures of one call of `simscen bench`, with a description of the machine and the version of simscen."""
+    """Figures that one call of `simscen bench` measured, the machine, and the version of simscen."""
 
     figures: Measurements
     machine: str
@@ -35,7 +38,7 @@ class Result:
 
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
-    """Return the result as JSON. `sections` are further keys."""
+    """Return the result as JSON, with the further keys `sections`."""
     header = {"simscen_bench": FORMAT_VERSION, "simscen": result.simscen, "machine": result.machine}
     figures = {name: asdict(figure) for name, figure in result.figures.items()}
     return json.dumps({**header, "figures": figures, **(sections or {})}, indent=2)
@@ -73,7 +76,7 @@ def _figure(entry: dict[str, Any]) -> Measurement:
 
 COMPARISON_HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
 MIN_ROUNDS = 2
-"""Minimum number of rounds (repeated measurements) of a figure to distinguish changes from noise."""
+"""Minimum number of rounds of a figure to distinguish changes from noise."""
 
 
 def compare_command(
@@ -149,9 +152,9 @@ def print_progress(text: str) -> None:
 
 
 def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:
-    """Print a result in a format: as JSON with further keys `sections`, or `text`.
+    """Print a result: in the format JSON with the further keys `sections`, in the format TEXT as `text`.
 
-    The text is followed by the comparison with the result `before`, if any.
+    The text is followed by the comparison with the earlier result `before`, if there is one.
     """
     print_progress("")
     if format_ is Format.JSON:

@@ -1,4 +1,4 @@
-"""Layouts of text tables: aligned columns, and narrower layouts for terminals with few columns."""
+"""Layouts of text tables: aligned columns, and narrower layouts for narrow terminals."""
 
 from collections.abc import Callable, Sequence
 
@@ -25,14 +25,14 @@ def align_columns(table: Sequence[TableRow], pad: PadFunction = str.rjust) -> li
 
 
 def stack_rows(table: Sequence[TableRow], columns: int) -> list[str]:
-    """Return two lines per row: the name of the row, and the other cells in aligned columns."""
+    """Return two lines per row, the name of the row and the other cells, for a terminal with `columns` characters."""
     widths = column_widths(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
     return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
 
 
 def label_cells(head: TableRow, row: TableRow, columns: int) -> list[str]:
-    """Return the lines of one row: its name, and then each other cell with its heading from `head`.
+    """Return the lines of one row: its name, and then the other cells, each after its heading from `head`.
 
     A line has as many cells as fit into `columns` characters.
     """

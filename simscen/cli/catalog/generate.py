@@ -159,6 +159,7 @@ def commands_page() -> str:
 
 
 def _index(all_topics: list[Topic]) -> str:
+    """Return a list of links to the sections, each with the names of its topics."""
     lines = []
     for group, members in groupby(all_topics, key=lambda topic: topic.group):
         title = _GROUPS[group][0]

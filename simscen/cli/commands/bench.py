@@ -190,7 +190,7 @@ def command(
         fields = [run_speed.measure_obstacle_field(count) for count in (209, 2090)]
         print_progress("the stack as an external process")
         external = measure_external(max(1, rounds // 2))
-    figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
+    figures = {**_patrol_figures(patrol), **overhead.figures, **_field_and_stack_figures(fields, external)}
     lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
     text = "\n".join([*lines, *_external_lines(external)])
     print_result(Result.on_this_machine(figures), text, _sections(patrol, overhead, fields, external), format_, before)
@@ -199,6 +199,7 @@ def command(
 def _sections(
     patrol: "PatrolTimes", overhead: "Overhead", fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost"
 ) -> dict[str, Any]:
+    """Return the further keys of the JSON output."""
     return {
         "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
         "overhead": asdict(overhead),
@@ -220,7 +221,7 @@ def _patrol_figures(patrol: "PatrolTimes") -> Measurements:
     }
 
 
-def _other_figures(fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost") -> Measurements:
+def _field_and_stack_figures(fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost") -> Measurements:
     figures = dict[str, Measurement]()
     for field in fields:
         figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")

@@ -93,7 +93,7 @@ def command(
 
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
-    """Raise InvalidInput if a scenario has changed between the sessions, unless `changed_scenarios`."""
+    """Raise InvalidInput if a scenario differs between the sessions and `changed_scenarios` is false."""
     baseline, current = (
         {run.key.test: run for run in session.planned if run.definition} for session in sessions.values()
     )
@@ -107,19 +107,19 @@ def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, cha
 
 
 def _links(sessions: dict[str, JournaledSession]) -> Links:
-    """Return the replay, log, or repeating command of each run that did not pass.
+    """Return the replay, log, or repeat command of each run that did not pass.
 
-    A key consists of BASELINE or CANDIDATE, the name of scenario, variation, and stack, and the seed.
+    A key consists of BASELINE or CANDIDATE, the name of the run without its seed, and the seed.
     """
     return {
-        (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)
+        (name, labeled_key(run.key, name).test, run.key.seed): _link(run)
         for name, session in sessions.items()
         for run in session.runs
         if not run.outcome.good
     }
 
 
-def _replay(run: RunFinished) -> str:
+def _link(run: RunFinished) -> str:
     """Return the replay or log of a run if it exists, otherwise the command that repeats the run."""
     files = run.artifacts.replay, run.artifacts.mcap
     return next((file for file in files if file and Path(file).is_file()), run.again)

@@ -80,7 +80,7 @@ def _line(sign: str, name: str, result: str) -> str:
 
 
 def check_cache() -> str:
-    """Check that the cache of maps and shortest paths is private to the user, and return its folder and size."""
+    """Check that only the user can write the cache of maps and shortest paths, and return its folder and size."""
     from simscen.run.scenario_cache import (
         CACHE_DIR_VARIABLE,
         MAX_CACHE_BYTES,

@@ -1,4 +1,4 @@
-"""Command `simscen edit`, which serves the editor for a scenario or a world."""
+"""Command `simscen edit`, which serves the editor of a scenario or a world as a local web page."""
 
 import os
 import signal
@@ -121,7 +121,7 @@ def _edited_file(
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
-    """Return a new scenario file for a map, and its text. Raises UsageError if the file exists, and InvalidInput."""
+    """Return a new scenario file for a map, and its text. Raises UsageError if the file cannot be created."""
     from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
@@ -134,7 +134,8 @@ def _new_file(
         raise UsageError(f"{target.parent} is not a folder; create it first")
     root_folder = root if root is not None else default_root([target, map_])
     text = new_scenario_text(target, map_, root_folder, world_path, lenient)
-    return _require_inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
+    edited = EditedFile(_real_path(target), "scenario", _real_folder(root_folder), world_path)
+    return _require_inside(edited, target), text
 
 
 def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
@@ -148,7 +149,7 @@ def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edi
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return _require_inside(EditedFile(_real(file), kind, _real_folder(root), world_path), file)
+    return _require_inside(EditedFile(_real_path(file), kind, _real_folder(root), world_path), file)
 
 
 def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
@@ -161,7 +162,7 @@ def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
     return edited
 
 
-def _real(file: Path) -> Path:
+def _real_path(file: Path) -> Path:
     """Return the absolute path of a file. Resolve symbolic links of its folder, but not of the file itself."""
     return Path(os.path.realpath(file.parent)) / file.name
 

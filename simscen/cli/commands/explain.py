@@ -1,4 +1,4 @@
-"""Command `simscen explain`, which describes names of the scenario language, and codes."""
+"""Command `simscen explain`, which prints the documentation of a name of the scenario language, or of a code."""
 
 import shutil
 import textwrap
@@ -75,7 +75,7 @@ def _key_names(topics: list[Topic]) -> list[str]:
 
 
 def _overview(width: int) -> str:
-    """Return the text without an argument: all names by group."""
+    """Return the text for a call without a name: all names by group."""
     groups: dict[str, list[str]] = {}
     for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)

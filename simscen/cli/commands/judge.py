@@ -81,7 +81,10 @@ def command(
 
 
 def _print(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> None:
-    """Print results, each with the path of its log: one in full, several in a table if all have the same criteria."""
+    """Print one result in full, or one line for each of several results; a table if all have the same criteria.
+
+    `runs` are pairs of the path of a log and its result.
+    """
     if len(runs) == 1:
         lines = list(full_log_lines(runs[0][1], runs[0][0]))
     elif has_same_criteria:
@@ -99,7 +102,7 @@ def _print(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> None
 def _document(runs: list[RunFinished], options: list[str]) -> str:
     """Return the JSON text: result.json for one log, results.json for several logs.
 
-    `options` are those of the command that judges a log again, the value of the key `again`.
+    `options` are options of the command under the key `again`, which evaluates a log again.
     """
     document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]

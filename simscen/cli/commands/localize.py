@@ -25,7 +25,7 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MIN_COMPARED_FRACTION = 0.99
-"""Minimum fraction of the beliefs (pose estimates) with a reference pose. The output states a smaller fraction."""
+"""Fraction of compared beliefs (pose estimates) below which the output states the fraction."""
 
 
 def command(
@@ -120,14 +120,14 @@ def _load_inputs(
 
 
 def _missing_localizer_problem(criteria: LoadedCriteria) -> Problem:
-    """Return the problem of a criteria file with an external stack, which has no localizer of simscen."""
+    """Return the problem that the stack of a criteria file is external, and so has no localizer of simscen."""
     position = value_position(criteria.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
     return criteria.library.with_source([Problem(*position, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
 def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
-    """Return the initial pose estimate from the option --start, or from the log. Raises UsageError without any."""
+    """Return the initial pose estimate from --start or from the log. Raises UsageError if there is none."""
     if start == "unknown":
         return Estimate(None)
     if start is None:

@@ -120,7 +120,7 @@ def command(
 
 
 def _target(name: str, out: Path | None, log: Path) -> Path:
-    """Return the scenario file for --from-log: NAME, --out, or a file with the name of the log. Raises UsageError."""
+    """Return the file to write with --from-log: NAME, --out, or a file named after the log. Raises UsageError."""
     if name and out is not None:
         raise UsageError("give either NAME or --out")
     written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]

@@ -47,7 +47,7 @@ def _entries_by_package() -> list[Entry]:
 
 
 def _row(entry: Entry) -> dict[str, Any]:
-    """Return the JSON data of one type. `broken` is the reason why it cannot be used; "" for a usable type."""
+    """Return the JSON data of one type. Its key `broken` is the reason why the type cannot be used; "" if it can."""
     text, broken, hint = "", "", ""
     try:
         text = _first_sentence(inspect.cleandoc(entry.load().__doc__ or ""))

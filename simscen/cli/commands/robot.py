@@ -125,24 +125,24 @@ def _check_line(check: "DriveCheck") -> str:
 
 
 def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
-    """Return all values as JSON data. Angles are in rad, and lengths in m, unless a unit is given."""
+    """Return all values as JSON data. Angles are in rad and lengths in m, except in a check with another `unit`."""
     return {
         "robot": body.name,
         "drive": body.drive.type,
         "passed": not checked.failed_count,
         "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
         "rest": asdict(checked.rest),
-        "trials": [_trial(trial) for trial in checked.trials],
+        "trials": [_trial_data(trial) for trial in checked.trials],
         "checks": [{**asdict(check), "held": check.passed} for check in checked.checks],
     }
 
 
-def _trial(trial: "Trial") -> dict[str, Any]:
-    motions = {name: _motion(getattr(trial, name)) for name in ("command", "odometry", "truth")}
+def _trial_data(trial: "Trial") -> dict[str, Any]:
+    motions = {name: _motion_data(getattr(trial, name)) for name in ("command", "odometry", "truth")}
     return {"name": trial.name, **motions, "tilt": trial.tilt}
 
 
-def _motion(motion: "Motion") -> dict[str, Any]:
+def _motion_data(motion: "Motion") -> dict[str, Any]:
     return {"driven": motion.driven, "turned": motion.turned, "end": motion.end._asdict()}
 
 

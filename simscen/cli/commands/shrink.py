@@ -120,7 +120,7 @@ def command(
 class ChosenRun:
     """Failed run to start from: scenario file, seed, variation, and value of --stack.
 
-    None stands for the seed or the stack in the scenario, and "" for no variation.
+    A `seed` or `stack` of None is the one in the scenario. The `variation` is "" for none.
     """
 
     file: Path
@@ -130,7 +130,7 @@ class ChosenRun:
 
 
 def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
-    """Return the run that the arguments of the command name. Raises UsageError and InvalidInput."""
+    """Return the failed run from the arguments of the command. Raises UsageError and InvalidInput."""
     if not run.is_dir():
         return ChosenRun(run, seed, variation, stack)
     if seed is not None or variation or stack is not None:
@@ -155,7 +155,7 @@ def _folder_name(key: RunKey) -> str:
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
-    """Run the scenario, and make it as small as possible. Return the shrinker, and the scenario before.
+    """Run the scenario, and make it as small as possible. Return the shrinker, and the scenario before shrinking.
 
     Raises UsageError if the scenario is invalid or does not fail.
     """
@@ -183,12 +183,13 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
 
 
 def _show_progress(runs: int, size: int) -> None:
-    """Replace the progress line on stderr."""
+    """Replace the progress line on stderr. `size` is the number of values in the scenario."""
     sys.stderr.write(f"\r{runs} runs, {size} values left \x1b[K")
     sys.stderr.flush()
 
 
 def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
+    """Return the value at `keys`; None if the tree has no such value."""
     node: Node | None = tree
     for key in keys:
         node = None if node is None else child(node, key)

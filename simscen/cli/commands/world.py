@@ -33,7 +33,7 @@ File = Annotated[Path, typer.Argument(metavar="WORLD", help="A *.world.yaml, a R
 Root = Annotated[Path | None, typer.Option(help="Root folder; the world may only refer to files below it.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
 LIDAR_HEIGHT_M = 0.2
-"""Default height of the lidar, at which the cross-section of a world is taken."""
+"""Default height of the lidar. The cross-section of a world is taken at this height."""
 
 
 @app.callback()
