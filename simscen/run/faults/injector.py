@@ -34,8 +34,8 @@ class _ActiveFault:
     """A fault that is active, or that has ended but still holds delayed messages.
 
     index:          index of the fault in the scenario
-    sensor:         name of the affected sensor or actuator
-    kind:           kind of the sensor or actuator: class of readings such as "Scan", or COMMAND, WHEELS, or BELIEF
+    sensor:         name of the target (the affected sensor or actuator)
+    kind:           kind of the target: class of its readings, such as "Scan", or COMMAND, WHEELS, or BELIEF
     effect:         implementation of the fault
     changed_count:  number of messages that the fault has changed or withheld
     has_ended:      whether only delayed messages remain
@@ -49,7 +49,7 @@ class _ActiveFault:
     has_ended: bool = False
 
     def affects(self, reading: Reading) -> bool:
-        """Return whether the fault affects a reading. A fault of the wheels affects all wheel odometry."""
+        """Return whether a reading is from the target. A fault of the wheels affects all wheel odometry."""
         if self.kind == WHEELS:
             return isinstance(reading, Odometry) and reading.sensor != TRUTH
         return reading.sensor == self.sensor
@@ -85,7 +85,7 @@ class FaultInjector:
         self._last_belief: tuple[int, Belief, Belief] | None = None
 
     def begin(self, index: int) -> str:
-        """Start the fault with this index; return the kind of the affected sensor or actuator."""
+        """Start the fault with this index; return the kind of its target, such as "Scan"."""
         entry = self._faults[index]
         self._activations[index] += 1
         rng = self._streams.generator(f"fault{self._names[index]}#{self._activations[index]}")
@@ -123,8 +123,8 @@ class FaultInjector:
     def command(self, tick: int, command: Twist) -> Twist:
         """Send the stack's command to the base, and return the command that the wheels execute.
 
-        Faults of cmd_vel change the message to the base. Faults of the wheels change the command that the base
-        executes. Call it exactly once at each beat (tick at which a sensor, the stack, or a truth sample is due).
+        Faults of cmd_vel change the message to the base. Faults of the wheels change what the wheels execute. Call it
+        exactly once at each beat (tick at which a sensor, the stack, or a truth sample is due).
         """
         is_sent = self._link.send(tick, command)
         if not self._affects_commands and not self.active:
@@ -142,7 +142,7 @@ class FaultInjector:
         return command
 
     def belief(self, tick: int, belief: Belief) -> Belief:
-        """Return the belief that the navigator receives: `belief` with the effects of faults of the localizer."""
+        """Return the belief that the navigator receives: `belief`, changed by the faults of the localizer."""
         if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._last_belief is None or self._last_belief[:2] != (tick, belief):

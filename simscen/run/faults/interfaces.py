@@ -1,4 +1,4 @@
-"""Interfaces between faults and a robot: information for faults, simulated readings, commands, and the localizer."""
+"""Helpers of faults: information on the target, simulated readings, the cmd_vel connection, a localizer wrapper."""
 
 from collections.abc import Callable, Collection
 from functools import cache
@@ -21,7 +21,7 @@ from simscen.sensors.sensor import SensorView
 from simscen.stack.protocols import Localizer
 
 CreateRayCaster = Callable[[TriangleMesh, frozenset[str]], RayCaster]
-"""Function that creates a ray caster for a static mesh and all moving objects, except objects with some names."""
+"""Function that takes the static mesh and names, and creates a ray caster that ignores the moving objects named."""
 
 
 class FaultSettingFactory:
@@ -63,11 +63,11 @@ def _without_objects(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
 
 
 CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
-"""Function that returns a ray caster for the world without the static and moving objects with some names."""
+"""Function that takes names, and returns a ray caster that ignores the static and moving objects named."""
 
 
 class HypotheticalSensor:
-    """Computes the readings of a sensor at another pose, or without some objects. Implements SensorSimulator."""
+    """Computes what a sensor would measure at another pose, or without some objects. Implements SensorSimulator."""
 
     def __init__(
         self,
@@ -77,14 +77,14 @@ class HypotheticalSensor:
         now: Callable[[], int],
         name: str,
     ) -> None:
-        """`spec` and `name` belong to the sensor. `view` gives the true pose, and `now` returns the current tick."""
+        """`spec` is the sensor's specification. `view` gives true poses and images. `now` returns the current tick."""
         self._spec, self._view, self._now, self._name = spec, view, now, name
         self._ray_caster_without = ray_caster_without
         mount = getattr(spec, "mount", None)
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges (n,) in m of `scan` if the pose of the lidar had an `error` (in the nominal lidar frame).
+        """Return the ranges (n,) in m that `scan` would have if the mount of the lidar had an `error` (lidar frame).
 
         Beams pass through the objects with the names in `without`.
         """
@@ -99,7 +99,7 @@ class HypotheticalSensor:
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
-        """Return the current image of the camera if its pose had an `error` (in the nominal camera frame)."""
+        """Return the image that the camera would take now if its mount had an `error` (camera frame)."""
         spec = self._spec
         assert isinstance(spec, Camera)
         captured = self._view.image(
@@ -108,7 +108,7 @@ class HypotheticalSensor:
         return Image(self._name, self._now(), *captured)
 
     def _assumed_mount(self, error: Pose3 | None) -> Pose3:
-        """Return the pose of the sensor with an error in the base frame."""
+        """Return the pose of the sensor in the base frame, displaced by an error."""
         mount_pose = self._mount.pose
         return mount_pose if error is None else mount_pose.compose(error)
 
@@ -133,7 +133,7 @@ class CommandLink:
         return sent
 
     def receive(self, tick: int, command: Twist) -> None:
-        """Receive a message at the base."""
+        """Let the base receive a message at `tick`."""
         self._received, self._received_at = command, tick
 
     def active_command(self, tick: int) -> Twist:
@@ -142,7 +142,7 @@ class CommandLink:
 
 
 class LocalizerWithFaults:
-    """Localizer whose published belief (pose estimate) `disturb` changes. The state of `inner` is not affected."""
+    """Wrapper of the localizer `inner`. `disturb` changes each published belief (pose estimate), but not its state."""
 
     def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
         self._inner, self._disturb = inner, disturb
