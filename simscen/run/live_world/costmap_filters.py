@@ -1,4 +1,4 @@
-"""Enabled zones of a stack's costmap filters. Events can switch zones during a run."""
+"""State of a stack's costmap filters: the zones and masks that are enabled. Events can switch them during a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from simscen.model.stack_base import StackBase
 
 @dataclass
 class _Filter:
-    """State of one filter. `zones` has the speed limit in m/s (0: none) and the enabled state of zones by region."""
+    """State of one filter. `zones` has, by region, the speed limit in m/s (0: none) and whether the zone is enabled."""
 
     zones: dict[str, tuple[float, bool]]
     has_mask: bool
@@ -35,7 +35,7 @@ class CostmapFilters:
         }
 
     def rejection_reason(self, order: ZoneSwitch) -> str:
-        """Return the reason why an order would have no effect, or "" if it would have an effect. Changes nothing."""
+        """Return why an order to switch a zone would have no effect, or "" if it would have one. Changes nothing."""
         target, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
             if not target.zones and not target.has_mask:
@@ -50,7 +50,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Execute an order that has an effect; return the names of the switched regions ("" is the mask)."""
+        """Execute an order without a `rejection_reason`; return the names of the switched regions ("" is the mask)."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled

@@ -1,4 +1,4 @@
-"""Start the events and faults of a scenario when their triggers fire."""
+"""Start the events and faults of a scenario when their triggers fire, and end the faults when their time is over."""
 
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ _IMMEDIATE_TRIGGER = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Evaluates all triggers at each beat (tick at which a robot acts), and starts due events and faults."""
+    """Evaluates all triggers at each beat (tick at which a robot acts), and starts and ends events and faults."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class Director:
         stage: LiveStage,
         injector: FaultInjector,
     ) -> None:
-        """Prepare the events `steps` and the `faults`. Triggers observe `stage` (the world), and actions change it.
+        """Prepare the events (`steps`) and the `faults`. Triggers observe the world through `stage`; actions change it.
 
         `injector` starts and ends the faults. `streams` gives random numbers for triggers with a probability.
         """
@@ -51,7 +51,7 @@ class Director:
         return bool(self._steps or self._starts)
 
     def process_beat(self) -> None:
-        """Perform all due events, end and start all due faults. Call it once at each beat."""
+        """Perform the events that are due, and end and start faults that are due. Call it once at each beat."""
         for index, (step, trigger) in enumerate(self._steps):
             situation = self._situations.get(index)
             for _ in range(0 if situation is None or trigger.is_exhausted else trigger.count_firings(situation)):
@@ -73,7 +73,7 @@ class Director:
         )
 
     def _observe_next_step(self, index: int) -> None:
-        """Start to evaluate the trigger of the next step of the same sequence, if there is one."""
+        """Evaluate the trigger of the next step of the same sequence, if there is one, from now on."""
         if index + 1 < len(self._steps) and self._steps[index + 1][0].after == index:
             self._situations[index + 1] = cast(Situation, RelativeSituation(self._stage))
 
@@ -108,7 +108,7 @@ class TriggerState:
         self._scheduled: list[int] = []
 
     def count_firings(self, now: Situation) -> int:
-        """Evaluate the trigger in the state `now`, and return how many times it fires. Call it once at each beat."""
+        """Evaluate the trigger in the situation `now`, and return how often it fires. Call it once at each beat."""
         if self._remaining and self._has_edge(now) and self._passes_probability():
             self._remaining -= 1
             self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
@@ -140,7 +140,7 @@ class ConditionState:
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition has been true for the required duration, up to the state `now`."""
+        """Return whether the condition has been true for the required duration, up to the situation `now`."""
         if not self._is_true(now):
             self._since = None
             return False
@@ -160,42 +160,42 @@ class ConditionState:
 
 
 class RelativeSituation:
-    """View of the run for a step of a sequence: time, distance, and events start at the previous step."""
+    """Situation as seen by a step of a sequence: time, distance, and events count from the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Start the view at the state `now`. `others` are the views of the other robots by name (None: create them)."""
+        """Count from the situation `now` on. `others` has this object for each robot by name (None: create them)."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
         self._start_tick, self._initial_distance, self._initial_event_count = now.tick, now.travelled, len(now.events)
 
     def of(self, robot: str) -> "RelativeSituation":
-        """Return the view for another robot."""
+        """Return the situation of another robot, relative to the same step."""
         return self._others[robot]
 
     @property
     def tick(self) -> int:
-        """Ticks since the start of the view."""
+        """Ticks since the previous step."""
         return self._now.tick - self._start_tick
 
     @property
     def travelled(self) -> float:
-        """Distance driven in m since the start of the view."""
+        """Distance driven in m since the previous step."""
         return self._now.travelled - self._initial_distance
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Events since the start of the view."""
+        """Events since the previous step."""
         return self._now.events[self._initial_event_count :]
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the last scan that the stack received, relative to the start of the view.
+        """Return the tick at which the stack last received a scan, relative to the previous step.
 
-        Returns the start of the run, relative to the start of the view, if there was no scan.
+        If there was no scan, the start of the run counts as a scan.
         """
         last = self._now.last_scan_tick(sensor)
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
-        """Return any other attribute of the state, such as the robot's pose."""
+        """Return any other attribute of the situation, such as the robot's pose."""
         return getattr(self._now, name)

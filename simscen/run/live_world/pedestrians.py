@@ -1,4 +1,4 @@
-"""Simulate the pedestrians of a run."""
+"""Connect the crowd model of pedestrians to the physics simulation of a run."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -67,11 +67,11 @@ EVENT_KINDS = {
     "reacted": EventKind.PEDESTRIAN_REACTED,
     "calmed": EventKind.PEDESTRIAN_CALMED,
 }
-"""Kind of event for each `PedestrianAction.what`."""
+"""Kind of event by the field `what` of a PedestrianAction."""
 
 
 class PedestrianSimulation:
-    """Steps all pedestrians of a run, and passes their events to `listeners`."""
+    """Moves all pedestrians of a run, and passes their events to `listeners`."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._map, self._simulation = PedestrianMap(built), simulation

@@ -1,4 +1,4 @@
-"""Ray casting against the static world and all moving objects."""
+"""Ray casting for lidars against the static world and all moving objects at their current poses."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -13,11 +13,11 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 REFRESH_DISTANCE_M = 4.0
-"""Distance that the origin of the rays moves between two updates of the reachable objects."""
+"""Distance that a sensor moves before the list of the objects that its rays can reach is computed again."""
 
 
 class LiveRayCaster(RayCaster):
-    """Casts the rays of a robot's sensors against the static world and all moving objects at their current poses."""
+    """Ray caster for the sensors of a robot. Before each cast, it updates the poses of the moving objects in reach."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
         """Cast rays for a robot in the static world `scene`, ignoring moving objects with the names in `without`."""
@@ -77,7 +77,7 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """Names of the moving objects that rays of `reach` m from `origin` can hit, according to `predicted` poses."""
+    """Names of the moving objects within `reach` m of `origin`, according to `predicted` poses."""
 
     predicted: PredictedPoses
     origin: Vector
@@ -85,7 +85,7 @@ class ReachableObjects(NamedTuple):
     names: list[str]
 
     def is_valid_for(self, predicted: PredictedPoses, origin: Vector, reach: float) -> bool:
-        """Return whether `names` has all objects that rays with these predicted poses, origin, and reach can hit."""
+        """Return whether `names` contains all objects that rays from another origin with another reach can hit."""
         return predicted is self.predicted and math.dist(origin, self.origin) + reach <= self.reach
 
 
@@ -95,5 +95,5 @@ def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
 
 
 def _extent(mesh: TriangleMesh) -> float:
-    """Return the largest distance of a vertex from the origin in m."""
+    """Return the largest distance in m of a vertex from the origin of the mesh."""
     return math.sqrt(float((mesh.vertices**2).sum(axis=1).max(initial=0.0)))

@@ -1,4 +1,4 @@
-"""View of the world during a run, for triggers that observe it and actions that change it."""
+"""Interface of triggers and actions to a running simulation: triggers observe the world, and actions change it."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -28,7 +28,7 @@ from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 
 class LiveStage:
-    """The world from the point of view of one robot. Implements core.stage.Stage, and keeps the robot's events.
+    """Interface of triggers and actions for one robot. Implements core.stage.Stage, and keeps the robot's events.
 
     An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. Orders
     are delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
@@ -81,7 +81,7 @@ class LiveStage:
     def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
         """Update the robot's pose at a beat, from a truth sample if there is one.
 
-        `is_due` states whether the beat belongs to this robot, so that orders can be delivered at once.
+        If `is_due`, the beat belongs to this robot, and orders are delivered at once.
         """
         self._is_due = is_due
         previous = self._pose
@@ -108,7 +108,7 @@ class LiveStage:
             self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
 
     def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
-        """Update the belief, the events, and the ticks of scans from the stack's decision and the stack's readings."""
+        """Update belief, events, and ticks of scans from the stack's decision and the readings that it received."""
         for reading in readings:
             if isinstance(reading, Scan):
                 self._scan_ticks[reading.sensor] = self.tick
@@ -266,7 +266,7 @@ class LiveStage:
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Switch a zone of a costmap filter. Returns the reason if this has no effect, else ""."""
+        """Switch a zone of a costmap filter. Return the reason if this has no effect, else ""."""
         if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
