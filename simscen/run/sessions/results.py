@@ -23,7 +23,7 @@ MAX_RECOVER_BYTES = 64 << 20
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
-    """Return the result of a run whose worker process has ended: an error if the worker did not finish the run."""
+    """Return the result of a run whose worker process has ended; an error if the worker did not finish the run."""
     failure = _with_log(_failure(end), job.folder)
     output = output_tail(end.output)
     result = (
@@ -61,7 +61,7 @@ def _without_log(job: Job, result: RunResult) -> RunFinished:
 
 
 def _read_result(job: Job, output: str) -> RunResult:
-    """Return the result in result.json with the key of the job, or an error if the file cannot be read."""
+    """Return the result in result.json, with the key of the job; an error result if the file cannot be read."""
     try:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
@@ -77,7 +77,7 @@ def _artifacts(folder: Path) -> Artifacts:
 
 
 def _stack_warnings(folder: Path) -> tuple[str, ...]:
-    """Return the distinct `warnings` that external stacks have sent, from stack.json."""
+    """Return the distinct `warnings` of external stacks, which stack.json contains."""
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
         given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
@@ -116,7 +116,7 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
 
 
 def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
-    """Recover the partial log of a failed run; return the failure with the name of the log in its message."""
+    """Recover the partial log of a failed run, and return the failure with the name of the log in its message."""
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
@@ -138,7 +138,7 @@ def _worker_failure(end: ProcessEnd, message: str, kind: str = "crashed") -> Run
 
 
 def _place(end: ProcessEnd | ForkServerDeath) -> str:
-    """Return ", in FRAME" with the innermost Python frame if the process dumped its stack, else ""."""
+    """Return ", in FRAME" with the innermost Python frame if the process wrote its traceback, else ""."""
     place = innermost_frame(end.output)
     return f", in {place}" if place else ""
 
@@ -162,5 +162,5 @@ def _stack_option(choice: StackChoice) -> str:
 
 
 def display_path(path: Path) -> str:
-    """Return a path relative to the working folder, or the absolute path if it is shorter."""
+    """Return the path relative to the working folder or the absolute path, whichever is shorter."""
     return min(os.path.relpath(path), str(path), key=len)

@@ -93,7 +93,7 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 def run_session(
     jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
 ) -> tuple[RunStore, Exit | None]:
-    """Run all jobs, and pass the session's events to `listen`, with exactly one result for each job.
+    """Run all jobs, and pass the events of the session to `listen`: exactly one result for each job, and progress.
 
     Returns the results, and the exit code if the session was interrupted, else None.
     """
@@ -152,7 +152,8 @@ def delete_log(run: RunFinished) -> RunFinished:
 def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
     """Return `run`, or an error with the first difference if its log differs from the log of `twin`.
 
-    `twin` is an earlier run with the same scenario and seed. Returns `run` if there is no twin or a log is missing.
+    `twin` is an earlier run of the same session with the same scenario and seed. Without a twin, or if a log is
+    missing, nothing is compared.
     """
     if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
         return run
@@ -172,16 +173,17 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
 
 
 def _unfinished_reason(started: bool, stopped: Exit | None) -> RunFailure:
-    """Return the failure of a run without a result; `stopped` is the exit code of an interrupted session."""
+    """Return why a run has no result. `stopped` is the exit code of an interrupted session, else None."""
     if started:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
 
 
 def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
-    """Return the run, or an error if it differs from the same run in the output folder `earlier`, or if none is there.
+    """Return the run, or an error if it differs from the same run of an earlier session, or if that run is missing.
 
-    Verdicts must be equal, and trajectories nearly equal, because the last bits differ between machines.
+    `earlier` is the output folder of that session. Verdicts must be equal, and trajectories nearly equal, because the
+    last bits differ between machines.
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
@@ -201,7 +203,7 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Return the folder of the run in the earlier session. Its name can contain the name of the stack."""
+    """Return the folder of the same run in an earlier session. Its name can contain the name of the stack."""
     stack = run.result.stack.partition("=")[0]
     labeled = run_folder(earlier, replace(run.key.original, stack_name=stack))
     return labeled if not run.key.original.stack_name and labeled.is_dir() else run_folder(earlier, run.key.original)

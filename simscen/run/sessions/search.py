@@ -1,4 +1,4 @@
-"""Search methods of `simscen falsify`: propose parameter values with which a scenario may fail.
+"""Search methods of `simscen falsify`, which propose parameter values with which a scenario may fail.
 
 The margin of a run is the smallest distance between a measured value and its limit. It is negative if the run fails.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from simscen.core.errors import UsageError
 
 Point = tuple[float, ...]
-"""One value for each parameter, given as its cumulative probability in the parameter's distribution (0 < p < 1)."""
+"""One value for each parameter, as cumulative probability (0 < p < 1) in the distribution of the parameter."""
 STARTUP_POINTS = 16
 """Number of random points at the start of TPE."""
 
@@ -35,7 +35,7 @@ class Search(Protocol):
         ...
 
     def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
-        """Learn from the margins of the points that the last `ask` returned (nan: unknown)."""
+        """Learn from the margins of the runs at the points that the last `ask` returned (nan: unknown)."""
         ...
 
 
