@@ -17,7 +17,7 @@ from simscen.core.geometry import Array
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.endpoints import Endpoints
 from simscen.stack.planners.ompl_planner import make_problem
-from simscen.stack.planners.ompl_search import Motion, OmplSearch, Problem, StateValidity, Termination
+from simscen.stack.planners.ompl_search import MotionCost, OmplSearch, Problem, StateValidity, Termination
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
@@ -156,19 +156,19 @@ def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet
     leg_start, distance_before = ends.start, 0.0
     for waypoint, along in [*waypoints, (ends.goal, np.inf)]:
         informed.restrict(slack, (distance_before, along))
-        yield Leg(Problem(leg_start, waypoint, informed.bounds(), _motion_within(costs.between, informed)))
+        yield Leg(Problem(leg_start, waypoint, informed.bounds(), _motion_cost_within(costs.between, informed)))
         leg_start, distance_before = waypoint, along
 
 
-def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
-    """Return a cost function of motions: `motion` within the informed set, otherwise inf."""
+def _motion_cost_within(motion_cost: MotionCost, informed: InformedSet) -> MotionCost:
+    """Return a cost function of motions: `motion_cost` within the informed set, otherwise inf."""
     contains = informed.contains
 
-    def confined_motion(ax: float, ay: float, bx: float, by: float) -> float:
+    def confined_cost(ax: float, ay: float, bx: float, by: float) -> float:
         inside = contains(0.5 * (ax + bx), 0.5 * (ay + by)) and contains(bx, by) and contains(ax, ay)
-        return motion(ax, ay, bx, by) if inside else np.inf
+        return motion_cost(ax, ay, bx, by) if inside else np.inf
 
-    return confined_motion
+    return confined_cost
 
 
 CHECKS_BEFORE_FIRST_BATCH = 4
@@ -182,7 +182,7 @@ class _SampledValidity(StateValidity):
     """
 
     def __init__(self, problem: Problem, samples: Array) -> None:
-        super().__init__(problem.motion)
+        super().__init__(problem.motion_cost)
         self._ends = (problem.start, problem.goal)
         self._remaining: Iterator[list[float]] = iter(samples.tolist())
 

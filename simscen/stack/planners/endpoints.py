@@ -1,4 +1,4 @@
-"""Checks of the start and the goal of a search, and their displacement to free cells."""
+"""Start and goal of a path search: checks that they are free, and displacement to free cells nearby."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 MAX_ESCAPE_M = 0.5
-"""Maximum distance from a start too close to an obstacle to the nearest free cell."""
+"""Maximum distance by which a start too close to an obstacle is moved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Endpoints:
 def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """Return the start and goal of the search.
 
-    A start too close to an obstacle is moved to the nearest free point that a straight line connects without obstacles.
+    A start too close to an obstacle is moved to the nearest free point; no obstacle may lie on the straight line to it.
     An unreachable goal is moved to the nearest reachable point within `tolerance` m. Raises NavigationFailure with
     START_OUTSIDE_MAP, GOAL_OUTSIDE_MAP, START_OCCUPIED, GOAL_OCCUPIED, or NO_VALID_PATH.
     """
@@ -60,6 +60,7 @@ def reachable_cells(costs: TraversalCosts, start: tuple[float, float]) -> npt.ND
 
 
 def _raise_if_blocked(costs: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, name: str) -> None:
+    """Raise the error `outside` if a pose is outside the map, or `occupied` if it is in an obstacle."""
     row, column = costs.cell((pose.x, pose.y))
     if not (0 <= row < costs.height and 0 <= column < costs.width):
         raise NavigationFailure(outside, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")

@@ -1,4 +1,4 @@
-"""Grid planners, Nav2's NavFn and SmacPlanner2D: the cheapest path from cell to cell for a round robot."""
+"""Grid planners for round robots, as Nav2's NavFn and SmacPlanner2D: find the cheapest path from cell to cell."""
 
 import numpy as np
 
@@ -39,7 +39,11 @@ def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
 
 
 class GridPlanner:
-    """Plans with Dijkstra's algorithm on the costmap cells. `moves` (rows, columns) connect the cells."""
+    """Plans with Dijkstra's algorithm on the costmap cells.
+
+    `moves` are the allowed moves between cells, in (rows, columns). `multiplier` weights the costs of cells as in
+    TraversalCosts. With `smooth`, the path is smoothed.
+    """
 
     def __init__(
         self,
@@ -61,13 +65,17 @@ class GridPlanner:
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
+        """Return the path on a costmap or on a window of it."""
         costs = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
         ends = find_endpoints(costs, start, goal, self._tolerance)
         path = self._postprocessed(costs, ends, self._search(costs, ends))
         return Path(with_headings(densify(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
     def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
-        """Return the path (n, 2) through cell centers, smoothed if possible, that cuts no corners of blocked cells."""
+        """Return the path (n, 2) between start and goal, smoothed if requested, without cut corners of blocked cells.
+
+        `cells` (n, 2) are the centers of the cells on the path.
+        """
         raw = np.vstack((ends.start, cells[1:-1], ends.goal))
         for points in (smoothed(costs, raw), raw) if self._smooth else (raw,):
             path = avoid_cell_corners(costs, densify(points, SPACING_M))

@@ -31,15 +31,15 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, Rob
 from simscen.stack.setting import Setting
 
 POSITION_PLANNERS = ("bit_star", "aorrtc", "medial_axis")
-"""Types of planners that do not search over poses. PosePlanner replaces them by RRT-Connect."""
+"""Types of planners that search only over positions. PosePlanner uses RRT-Connect instead."""
 MIN_TURNING_RADIUS_M = 0.2
-"""Turning radius in plans of a long robot, which could also turn in place."""
+"""Minimum turning radius in plans of PosePlanner, also for robots that can turn in place."""
 TURNING_RADIUS_RATIO = 1.15
-"""Ratio of the turning radius in plans of a car to its minimum, so that the controller can correct to both sides."""
+"""Turning radius in plans of a car, relative to its minimum: larger, so that the controller can correct deviations."""
 FINAL_CHECKS_PER_STEP = 50
-"""Number of poses between two poses of a found path at which the footprint is finally checked."""
-MAX_DEEPER_M = 0.01
-"""Distance by which a footprint in collision may get deeper into the obstacle before it leaves the obstacle."""
+"""Number of collision checks of the footprint per step of a found path."""
+MAX_DEEPENING_M = 0.01
+"""Distance by which a footprint that is in collision at the start may get deeper into the obstacle."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class PosePlanner:
             yield Attempt(bounds, contains, clearance, fraction, spacing)
 
     def _is_collision_free(self, costs: TraversalCosts, poses: Array) -> bool:
-        """Return whether the footprint is free of collisions along a path (n, 3). Checks more poses than the search."""
+        """Return whether a path (n, 3) is free of collisions, with finer checks than in the search."""
         fractions = np.arange(FINAL_CHECKS_PER_STEP) / FINAL_CHECKS_PER_STEP
         yaw = np.unwrap(poses[:, 2])
         unwrapped = np.column_stack((poses[:, :2], yaw))
@@ -166,7 +166,7 @@ class PosePlanner:
             if not free[clear] or (best is not None and clear + 1 >= len(best)):
                 continue
             clearances = self._footprint.clearance(costmap, arc[: clear + 1])
-            if (clearances >= clearances[0] - MAX_DEEPER_M).all():
+            if (clearances >= clearances[0] - MAX_DEEPENING_M).all():
                 best = arc[: clear + 1]
         if best is None:
             message = f"the robot does not fit at the start ({start.x:.2f}, {start.y:.2f}) and cannot get away from it"
@@ -174,7 +174,10 @@ class PosePlanner:
         return best
 
     def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
-        """Return a check that poses are reachable, free of collisions, and, except near `ends`, have clearance."""
+        """Return a function that checks that a pose is reachable, free of collisions, and has the attempt's clearance.
+
+        Near the `ends`, clearance is not required.
+        """
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance
         # The distances are those between cell centers, which are wrong by up to a cell diagonal.
@@ -195,15 +198,15 @@ class PosePlanner:
 
 
 FINE_SPACING_CELLS = 0.125
-"""Spacing of the collision checks after a search has returned a path through a blocked cell."""
+"""Spacing of the collision checks of later searches, after a search has returned a path through a blocked cell."""
 MAX_SEARCHES = 4
-"""Number of searches with different seeds before planning fails."""
+"""Maximum number of searches, each with a different seed, before planning fails."""
 REPEATED_REWIRE_FACTOR = 1.6
-"""Default `rewire_factor` after a search without a path. It permits longer motions, which find narrow gaps."""
+"""Default `rewire_factor` of searches after one without a path: permits longer motions, which find narrow gaps."""
 
 
 class OmplPlanner:
-    """Planner for compact robots: searches over positions of a disc with the inscribed radius of the robot."""
+    """Planner for robots that are neither cars nor long: searches over positions of a disc of the inscribed radius."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
@@ -213,6 +216,7 @@ class OmplPlanner:
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """Return the path on a costmap or on a window of it."""
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         costs, ends = self._avoid_narrow_gaps(costs, ends)
@@ -246,7 +250,7 @@ class OmplPlanner:
 
 
 def make_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
-    """Return the search problem within the bounding box of the reachable cells."""
+    """Return the problem for OmplSearch, within the bounding box of the reachable cells."""
     return Problem(ends.start, ends.goal, reachable_bounds(costs, ends), costs.between)
 
 
@@ -255,7 +259,7 @@ LONG_HULL_RATIO = 2.0
 
 
 def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Build the planner for the state space of `state_space_for`."""
+    """Build the planner for the robot: OmplPlanner for positions, PosePlanner for poses."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return OmplPlanner(spec, setting.robot)

@@ -1,4 +1,4 @@
-"""OMPL search over positions in the plane, with the costs of a costmap. Seeded, and limited by iterations."""
+"""OMPL search for the cheapest path over positions (x, y). Each search has a seed and a maximum of iterations."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -13,10 +13,10 @@ from ompl import util as ou
 from simscen.model.planners import OmplPlanner as PlannerSpec
 
 Point = tuple[float, float]
-Motion = Callable[[float, float, float, float], float]
-"""Function that returns the cost of a motion from (x, y) to (x, y): at least its length in m; inf if blocked."""
+MotionCost = Callable[[float, float, float, float], float]
+"""Function that returns the cost of a motion from (x, y) to (x, y): at least its length in m; inf if it is blocked."""
 Termination = Callable[[], bool]
-"""Function that OMPL calls in each iteration. The search stops when the result is True."""
+"""Termination condition: OMPL calls this function in each iteration, and stops when it returns True."""
 
 PLANNERS: dict[str, Callable[[Any], Any]] = {
     "rrt_connect": og.RRTConnect,
@@ -26,40 +26,40 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
     "aorrtc": og.AORRTC,
     "kpiece": og.KPIECE1,
 }
-"""OMPL planners by the `type` in the specification. The argument is OMPL's space information."""
-FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
+"""Constructors of OMPL's planners by the `type` in the specification. The argument is OMPL's SpaceInformation."""
+FIRST_PATH_PLANNERS = frozenset(("rrt_connect", "kpiece"))
 """Types of planners that stop at their first path. All others continue to improve the path."""
 DEFAULT_RANGE_M = 1.0
-"""Default of the parameter `range`."""
+"""Default of the parameter `range`: the maximum length of a motion in the search tree."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 """Default of the parameter `rewire_factor` of BIT*."""
 CHECK_PERIOD = 16
-"""Number of iterations between two evaluations of the condition that ends a search."""
+"""Number of iterations between two calls of `is_done` (see `stop_after`)."""
 PERTURBATIONS_M = (0.5, 0.15)
-"""Distances by which path simplification moves states, one after the other."""
+"""Distances by which path simplification moves states, in two successive passes."""
 ou.setLogLevel(ou.LOG_NONE)  # OMPL warns that its random generator is seeded again, although this has an effect
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y) in m. `motion` returns costs."""
+    """Search problem: a path from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m."""
 
     start: Point
     goal: Point
     bounds: tuple[float, float, float, float]
-    motion: Motion
+    motion_cost: MotionCost
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
     """Accepts motions with a finite cost."""
 
-    def __init__(self, information: Any, motion: Motion) -> None:
+    def __init__(self, information: Any, motion_cost: MotionCost) -> None:
         super().__init__(information)
-        self.motion = motion
+        self.motion_cost = motion_cost
 
     def checkMotion(self, a: Any, b: Any) -> bool:
         """Return whether the straight motion is possible."""
-        return self.motion(a[0], a[1], b[0], b[1]) < math.inf
+        return self.motion_cost(a[0], a[1], b[0], b[1]) < math.inf
 
 
 class _AcceptEveryMotion(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
@@ -70,33 +70,33 @@ class _AcceptEveryMotion(ob.MotionValidator):  # type: ignore[misc] # ompl has n
         return True
 
 
-class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
+class _CostBeyondLengthObjective(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
     """Objective: the cost of a motion minus its length."""
 
-    def __init__(self, information: Any, motion: Motion) -> None:
+    def __init__(self, information: Any, motion_cost: MotionCost) -> None:
         super().__init__(information)
-        self.motion = motion
+        self.motion_cost = motion_cost
 
     def motionCost(self, a: Any, b: Any) -> Any:
         """Return the cost of the straight motion minus its length."""
         ax, ay, bx, by = a[0], a[1], b[0], b[1]
-        return ob.Cost(self.motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
+        return ob.Cost(self.motion_cost(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
 
     def stateCost(self, _: Any) -> Any:
         """Return 0, because only motions have costs."""
         return ob.Cost(0.0)
 
 
-class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Objective: the cost of a motion. Subclass of the path length, for which OMPL has informed sampling."""
+class _MotionCostObjective(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
+    """Objective: the cost of a motion. A subclass of the path length, because OMPL then has informed sampling."""
 
-    def __init__(self, information: Any, motion: Motion) -> None:
+    def __init__(self, information: Any, motion_cost: MotionCost) -> None:
         super().__init__(information)
-        self.motion = motion
+        self.motion_cost = motion_cost
 
     def motionCost(self, a: Any, b: Any) -> Any:
         """Return the cost of the straight motion."""
-        return ob.Cost(self.motion(a[0], a[1], b[0], b[1]))
+        return ob.Cost(self.motion_cost(a[0], a[1], b[0], b[1]))
 
     def motionCostHeuristic(self, a: Any, b: Any) -> Any:
         """Return the length of the motion, a lower bound of its cost."""
@@ -106,13 +106,13 @@ class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # o
 class StateValidity:
     """Accepts states that are not in a blocked cell."""
 
-    def __init__(self, motion: Motion) -> None:
-        self.motion = motion
+    def __init__(self, motion_cost: MotionCost) -> None:
+        self.motion_cost = motion_cost
 
     def __call__(self, state: Any) -> bool:
         """Return whether a state of OMPL is valid."""
         x, y = state[0], state[1]
-        return self.motion(x, y, x, y) < math.inf
+        return self.motion_cost(x, y, x, y) < math.inf
 
 
 def _infinite_cost(_ax: float, _ay: float, _bx: float, _by: float) -> float:
@@ -128,7 +128,7 @@ class OmplSearch:
         self._callbacks: list[Any] = []
 
     def solve(self, *, simplify: bool) -> list[Point] | None:
-        """Return the points of a path from start to goal; None if there is no exact solution after `max_iterations`.
+        """Return the points of a path from start to goal; None if the search does not reach the goal.
 
         With `simplify`, the path is shortened, and its states are moved to reduce the cost.
         """
@@ -136,7 +136,7 @@ class OmplSearch:
             return self._solve(simplify)
         finally:
             for callback in self._callbacks:  # OMPL's bindings leak their callbacks: release the costmap
-                callback.motion = _infinite_cost
+                callback.motion_cost = _infinite_cost
 
     def _solve(self, simplify: bool) -> list[Point] | None:
         ou.RNG.setSeed(self.seed)  # before any object of OMPL is created: it has one generator for the whole process
@@ -176,7 +176,7 @@ class OmplSearch:
     def _make_termination(self, planner: Any) -> Termination:
         """Return the termination condition: after `max_iterations`, or when a path has been improved enough."""
         spec = self.spec
-        if spec.type in FEASIBLE_ONLY:
+        if spec.type in FIRST_PATH_PLANNERS:
             return stop_after(spec.max_iterations)
 
         def is_solved() -> bool:
@@ -188,16 +188,18 @@ class OmplSearch:
         return stop_after(spec.max_iterations, is_solved, spec.improving_iterations)
 
     def _make_validity(self) -> StateValidity:
-        return StateValidity(self.problem.motion)
+        """Return the check of states."""
+        return StateValidity(self.problem.motion_cost)
 
     def _make_information(self) -> Any:
+        """Return OMPL's SpaceInformation: the bounds, and the checks of states and motions."""
         space, limits, bounds = ob.RealVectorStateSpace(2), ob.RealVectorBounds(2), self.problem.bounds
         for axis in (0, 1):
             limits.setLow(axis, bounds[axis])
             limits.setHigh(axis, bounds[axis + 2])
         space.setBounds(limits)
         information = ob.SpaceInformation(space)
-        validity, motions = self._make_validity(), _MotionValidator(information, self.problem.motion)
+        validity, motions = self._make_validity(), _MotionValidator(information, self.problem.motion_cost)
         self._callbacks += [validity, motions]
         information.setStateValidityChecker(validity)
         information.setMotionValidator(motions)
@@ -205,13 +207,13 @@ class OmplSearch:
         return information
 
     def _make_objective(self, information: Any) -> Any:
-        """Return the cost of motions as objective; if possible, as OMPL's path length plus the rest of the cost."""
-        motion = self.problem.motion
+        """Return the objective: the cost of motions, if possible split into OMPL's path length and the rest."""
+        motion_cost = self.problem.motion_cost
         if self.spec.type == "informed_rrt_star":
-            whole = _MotionCost(information, motion)
+            whole = _MotionCostObjective(information, motion_cost)
             self._callbacks.append(whole)
             return whole
-        beyond = _CostBeyondLength(information, motion)
+        beyond = _CostBeyondLengthObjective(information, motion_cost)
         self._callbacks.append(beyond)
         total = ob.MultiOptimizationObjective(information)
         total.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
@@ -222,7 +224,7 @@ class OmplSearch:
 
 
 def set_parameters(planner: Any, spec: PlannerSpec) -> None:
-    """Set the parameters of the specification that have a value and that a planner of OMPL supports."""
+    """Set the parameters of the specification on a planner of OMPL, except unset and unsupported ones."""
     for setter, value in (
         ("setSamplesPerBatch", spec.samples_per_batch),
         ("setRewireFactor", spec.rewire_factor),
@@ -245,6 +247,7 @@ def _simplify(simplifier: Any, path: Any, steps: int) -> None:
 
 
 def _state(information: Any, point: Point) -> Any:
+    """Return a point as a state of OMPL."""
     state = information.allocState()
     state[0], state[1] = point
     return state

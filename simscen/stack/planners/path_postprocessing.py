@@ -1,4 +1,4 @@
-"""Postprocessing of planned paths: spacing, headings, smoothing, and avoidance of blocked cell corners."""
+"""Postprocessing of planned paths: adds points and headings, smooths paths, and avoids corners of blocked cells."""
 
 import math
 
@@ -79,9 +79,9 @@ def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
 
 
 def _cells_beside(before: Array, after: Array) -> tuple[Array, Array]:
-    """Return both cells next to each diagonal step from `before` to `after`, all (n, 2) as (column, row).
+    """Return the two cells that share an edge with both cells of each diagonal step, all (n, 2) as (column, row).
 
-    The first cells are in the column of `after`, the second cells in the column of `before`.
+    A step leads from `before` to `after`. The first result is in the column of `after`, the second in that of `before`.
     """
     return np.column_stack((after[:, 0], before[:, 1])), np.column_stack((before[:, 0], after[:, 1]))
 

@@ -10,14 +10,14 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_FULL_SEARCH_CELLS = 1_000_000
-"""Size up to which costmaps are searched completely at once: 50 x 50 m with a cell size of 5 cm."""
+"""Size up to which the whole costmap is searched at once: 50 x 50 m with a cell size of 5 cm."""
 WINDOW_MARGIN_M = 10.0
 """Minimum margin of the first window around start and goal."""
 WINDOW_MARGIN_RATIO = 1 / 3
 """Margin of the first window as a fraction of the distance from start to goal."""
 
 PlanFunction = Callable[[CostmapView, Pose2, Pose2, int], Path]
-"""Function with the arguments and the result of `Planner.plan`."""
+"""Function with the parameters and the result of `Planner.plan`."""
 
 
 def plan_in_windows(plan: PlanFunction, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:

@@ -1,4 +1,4 @@
-"""OMPL search over poses (position and heading), for cars and long robots."""
+"""OMPL search for a path over poses (position and heading), for cars and long robots."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -22,11 +22,11 @@ PoseCheck = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
 """Maximum distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Ratio of chord to length of a step below which the step contains a cusp."""
+"""Ratio of chord to path length of a step below which the step is searched for cusps."""
 CUSP_TOLERANCE_M = 1e-4
 """Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60
-"""Number of attempts to shorten the path by removing states."""
+"""Maximum number of attempts to shorten the path by removing states."""
 
 
 def search_poses(
@@ -42,7 +42,7 @@ def search_poses(
     check_spacing: float = POSE_SPACING_M,
     configure: Callable[[Any], None] = lambda _: None,
 ) -> list[Pose2] | None:
-    """Return poses from start to goal, POSE_SPACING_M apart; None if there is no path after `iterations`.
+    """Return poses from start to goal, at most POSE_SPACING_M apart; None if no path is found in `iterations`.
 
     planner_type:    key of PLANNERS
     space:           "dubins" drives only forward, "reeds_shepp" also backward, "se2" in any direction
@@ -118,6 +118,7 @@ def _pose(state: Any) -> Pose2:
 
 
 def _make_space(kind: Space, turning_radius: float) -> Any:
+    """Return OMPL's object for a state space."""
     if kind == "dubins":
         return ob.DubinsStateSpace(turning_radius)
     if kind == "reeds_shepp":
@@ -140,7 +141,7 @@ ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
-    """Yield arcs of MAX_ESCAPE_M on which the robot may leave a collision, as poses (n, 3)."""
+    """Yield arcs, MAX_ESCAPE_M long, on which the robot may leave a collision at `start`, as poses (n, 3)."""
     length_along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
     if space == "se2":
         for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
@@ -152,7 +153,10 @@ def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[A
 
 
 def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) -> Array:
-    """Return poses (n, 3) at path lengths (n,) in m along an arc that leaves the base in the direction `heading`."""
+    """Return poses (n, 3) at the path lengths `length_along` (n,) in m of an arc with this `curvature` in 1/m.
+
+    `heading` is the initial direction of motion relative to the heading of the start, in rad.
+    """
     turned = curvature * length_along
     chord = length_along * np.sinc(turned / (2.0 * math.pi))
     direction = start.yaw + heading + 0.5 * turned
@@ -162,7 +166,7 @@ def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) ->
 
 
 class DistanceLookup:
-    """Fast lookup of single distances of a costmap."""
+    """Fast lookup of the distance to obstacles at single points of a costmap."""
 
     def __init__(self, costmap: CostmapView) -> None:
         self.costmap = costmap

@@ -1,4 +1,4 @@
-"""Traversal costs on a costmap: costs per meter of path, as in Nav2's planners."""
+"""Traversal costs on a costmap: costs of cells, motions, and paths for planners, as in Nav2's planners."""
 
 import copy
 import math
@@ -20,9 +20,9 @@ NO_ROTATION_COST_FACTOR = 4.0
 EXEMPT_HALF_SIDE_M = 0.5
 """Half the side length of the square around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
-"""Minimum distance in cells between two samples of the costs along a line."""
+"""Distance in cells between two samples of the costs along a path; the minimum along a motion of a search."""
 SAMPLE_SPACING_RATIO = 0.4
-"""Distance between two samples along a motion of a search, relative to the inscribed radius."""
+"""Distance between two samples of the costs along a motion of a search, relative to the inscribed radius."""
 
 
 class TraversalCosts:
@@ -57,7 +57,7 @@ class TraversalCosts:
         self._last_cost = 0.0
 
     def without_narrow_gaps(self, clearance: float, exempt: Sequence[tuple[float, float]]) -> "TraversalCosts":
-        """Return a copy with blocked cells in all gaps where the robot has less than `clearance` m on each side.
+        """Return a copy in which gaps are blocked if the robot has less than `clearance` m on each side.
 
         Cells near the `exempt` points (x, y) keep their costs.
         """
@@ -74,7 +74,7 @@ class TraversalCosts:
         return costs
 
     def reusing_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
-        """Return this object. If `previous`, the object of the previous plan, has the same costs, use its cache."""
+        """Use the cache of `previous`, the costs of the previous plan, if both costs are equal. Return this object."""
         if previous is not None and np.array_equal(previous.rates, self.rates):
             self.cache = previous.cache
         return self
@@ -100,7 +100,7 @@ class TraversalCosts:
         return rates
 
     def between(self, ax: float, ay: float, bx: float, by: float) -> float:
-        """Return the cost of the straight motion from a to b, both on the map; inf if it is blocked."""
+        """Return the cost of the straight motion from (ax, ay) to (bx, by), both on the map; inf if it is blocked."""
         motion = (ax, ay, bx, by)
         if motion == self._last_motion:  # OMPL asks for cost and validity of a motion one after the other
             return self._last_cost

@@ -28,7 +28,7 @@ def walled(ax: float, ay: float, bx: float, by: float) -> float:
     return free(ax, ay, bx, by) if crossing > 6.0 else math.inf
 
 
-def solve(motion: ompl_search.Motion, seed: int = 1, simplify: bool = False, **parameters: Any) -> list[Point]:
+def solve(motion: ompl_search.MotionCost, seed: int = 1, simplify: bool = False, **parameters: Any) -> list[Point]:
     points = OmplSearch(PlannerSpec(**parameters), Problem(*ENDS, BOUNDS, motion), seed).solve(simplify=simplify)
     assert points is not None
     return points
