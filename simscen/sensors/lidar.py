@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, Pose3, rotated
-from simscen.core.geometry.ray_fans import RayFan, Singles
+from simscen.core.geometry.ray_fans import Float32Array, RayFan
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
@@ -57,7 +57,7 @@ class LidarSensor:
         distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
         return np.minimum(distances, floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2]))
 
-    def _to_ranges(self, distances: Array | Singles) -> Array:
+    def _to_ranges(self, distances: Array | Float32Array) -> Array:
         """Return the ranges (beams,) of a scan: true distances in m with noise, rounding, and limits."""
         spec = self._spec
         ranges: Array = distances + self._draw_noise() if spec.noise > 0 else distances.astype(np.float64)

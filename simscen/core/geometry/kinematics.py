@@ -24,8 +24,9 @@ WheelValues = tuple[float, float, float, float]
 class MecanumWheels:
     """Kinematics of a base with four mecanum wheels.
 
-    The wheels are `half_base` m (along x) and `half_track` m (along y) from the center. `radius` is in m. `slant` is
-    the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the rollers form an X.
+    The wheels have the radius `radius` m, and are `half_base` m (along x) and `half_track` m (along y) from the center.
+    `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the rollers
+    form an X.
     Source: Taheri, Qiao and Ghaeminezhad, "Kinematic Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015.
     """
 
@@ -36,7 +37,7 @@ class MecanumWheels:
 
     @property
     def lever(self) -> float:
-        """Distance in m that a wheel rolls when the base rotates by one radian."""
+        """Distance in m that each wheel rolls when the base rotates by one radian."""
         return self.half_track + self.slant * self.half_base
 
     def speeds(self, motion: Twist) -> WheelValues:
@@ -50,7 +51,7 @@ class MecanumWheels:
         )
 
     def motion(self, speeds: WheelValues) -> Twist:
-        """Return the velocity of the base for wheel speeds in rad/s, by the method of least squares."""
+        """Return the velocity of the base that fits wheel speeds in rad/s best (least squares)."""
         front_left, front_right, rear_left, rear_right = (self.radius * speed / 4 for speed in speeds)
         return Twist(
             front_left + front_right + rear_left + rear_right,

@@ -1,4 +1,4 @@
-"""Operations on triangle meshes: submeshes, convexity test, tiles of nearby faces, and search of drivable solids.
+"""Operations on triangle meshes: submeshes, convexity, search of nearby faces, and solids that a robot can climb.
 
 `vertices` are (n, 3) in m. `faces` are (m, 3) indices of vertices.
 """
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 MAX_CONVEX_FACES = 400
 """Maximum number of faces of a mesh that `is_convex` tests."""
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
-"""Orders of coordinates in a cross product."""
+"""Orders of the coordinates in the two products of a cross product."""
 CONVEX_TOLERANCE_M = 1e-6
 """Distance in m by which a vertex of a convex mesh may lie outside the plane of a face."""
 
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
-    """Return a mesh of the given faces, without the vertices that no face uses."""
+    """Return a mesh of these faces, without unused vertices."""
     if faces.size < len(vertices) // 8:
         used, indices = np.unique(faces, return_inverse=True)
         return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
@@ -41,7 +41,7 @@ def submesh(vertices: Array, faces: Faces) -> Mesh:
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
-    """Return a mesh of the faces that are at least partly between two `heights`: minimum and maximum z in m."""
+    """Return a mesh of the faces with a part between two `heights`, the minimum and maximum z in m."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
     outside_range = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
@@ -64,8 +64,8 @@ def is_convex(mesh: Mesh) -> bool:
 class FaceTiles:
     """Faces of a mesh, grouped by square tiles of the xy plane for a fast search of nearby faces.
 
-    Tile k contains `faces[starts[k]:starts[k + 1]]`. The bounding box of these faces extends from `low[k]` to
-    `high[k]`, given as (x, y) in m.
+    The faces of tile k are `faces[starts[k]:starts[k + 1]]`. Their bounding box extends from `low[k]` to `high[k]`,
+    given as (x, y) in m.
     """
 
     faces: Faces
@@ -89,7 +89,7 @@ class FaceTiles:
 
 
 def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Group faces by square tiles of `edge` x `edge` m. The center of a face determines its tile."""
+    """Group faces by square tiles with edges of `edge` m. The center of a face determines its tile."""
     corners = vertices[faces, :2]
     squares = np.floor(corners.mean(axis=1) / edge)
     order = np.lexsort((squares[:, 1], squares[:, 0]))
@@ -104,9 +104,9 @@ def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
 FLOOR_HEIGHT_M = 0.005
 """Height up to which faces belong to the floor."""
 MAX_SLOPE_RAD = math.radians(50)
-"""Maximum slope of faces that wheels can roll on. Steeper faces are walls."""
+"""Maximum slope of faces on which wheels can roll. Steeper faces are walls."""
 SOLIDS_PER_BATCH = 64
-"""Number of solids that `drivable_solids` compares with all other solids at once, which limits memory."""
+"""Number of solids that `drivable_solids` compares with all other solids at once, to limit the memory."""
 
 SolidIndices = frozenset[int]
 """Indices into `TriangleMesh.names`."""
@@ -130,10 +130,10 @@ def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
 
 @cached_on_instance
 def drivable_solids(mesh: TriangleMesh, max_step: float) -> SolidIndices:
-    """Return the indices of the solids that a robot can drive onto if its wheels climb steps of `max_step` m.
+    """Return the indices of the solids onto which a robot can drive if its wheels climb steps of `max_step` m.
 
-    The upward faces of such a solid begin at most `max_step` m above the floor, or their bounding box is at most
-    `max_step` m away from the upward faces of another drivable solid.
+    The robot can drive from the floor, or from another drivable solid, onto a solid with upward faces at most
+    `max_step` m away. Distances are between bounding boxes.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

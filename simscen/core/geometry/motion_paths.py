@@ -1,6 +1,6 @@
-"""Poses of bodies on scripted paths, and upper bounds of their speed and of their displacement per tick.
+"""Poses of bodies on scripted paths, and upper bounds on their speed and on their displacement per tick.
 
-A segment is the part of a path between two consecutive poses. `leg` is the index of a segment.
+Segment k of a path leads from pose k to pose k + 1.
 """
 
 import itertools
@@ -13,11 +13,11 @@ from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.shapes import MotionPath
 
 SMOOTH_PEAK_SPEED_RATIO = 1.5
-"""Ratio of peak speed to mean speed of a segment with smooth easing."""
+"""Ratio of the peak speed to the mean speed on a segment with smooth easing."""
 MAX_STEP_M = 0.1
-"""Maximum distance that any point of a scripted body may move per tick; a faster body can pass through a robot."""
-Step = tuple[float, float, float]
-"""Displacement (x, y, yaw) in m and rad, or velocity in m/s and rad/s."""
+"""Maximum distance that a point of a scripted body may move per tick. A faster body could pass through a robot."""
+XYYaw = tuple[float, float, float]
+"""Displacement (x, y, yaw) in m and rad, or velocity (x, y, yaw) in m/s and rad/s."""
 _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
@@ -27,12 +27,12 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
     if len(times) == 1:
         return path.poses[0]
     local = min(max(_fold_repetitions(path, path.elapsed(seconds)), times[0]), times[-1])
-    leg = min(bisect_right(times, local), len(times) - 1) - 1
-    begin, end = path.poses[leg], path.poses[leg + 1]
-    duration = times[leg + 1] - times[leg]
-    part = (local - times[leg]) / duration if duration > 0 else 1.0
+    k = min(bisect_right(times, local), len(times) - 1) - 1
+    begin, end = path.poses[k], path.poses[k + 1]
+    duration = times[k + 1] - times[k]
+    part = (local - times[k]) / duration if duration > 0 else 1.0
     if path.ease == "spline":
-        return _spline_pose(path, leg, part)
+        return _spline_pose(path, k, part)
     if path.ease == "smooth":
         part = part * part * (3.0 - 2.0 * part)
     return Pose2(
@@ -43,7 +43,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
 
 
 class PathSampler:
-    """Computes poses on a path at the height `z` (m). Fast for increasing times, because it caches the segment."""
+    """Computes poses on a path at the height `z` (m). Fast for increasing times, because the segment is cached."""
 
     def __init__(self, path: MotionPath, z: float) -> None:
         self._path, self._z = path, z
@@ -51,10 +51,10 @@ class PathSampler:
         self._even = len(path.times) > 1 and path.ease == "linear"
         self._once = path.mode == "once"
         self._begin, self._end = math.inf, -math.inf
-        self._leg: PathSegment
+        self._segment: PathSegment
 
     def at(self, seconds: float) -> Pose3:
-        """Return the pose in space, `seconds` after the start of the path. x, y, and yaw are those of `pose_at`."""
+        """Return the pose in space, `seconds` after the start of the path. x, y, and yaw are as in `pose_at`."""
         path, z = self._path, self._z
         if not self._even:
             return Pose3.planar(pose_at(path, seconds), z)
@@ -67,10 +67,10 @@ class PathSampler:
         elif local > self._last:
             local = self._last
         if not self._begin <= local < self._end:
-            number = min(bisect_right(path.times, local), len(path.times) - 1) - 1
-            self._leg, self._begin = PathSegment.of(path, number), path.times[number]
-            self._end = path.times[number + 1] if number + 2 < len(path.times) else math.inf
-        begin, duration, x, y, yaw, dx, dy, turn, qz, qw = self._leg
+            k = min(bisect_right(path.times, local), len(path.times) - 1) - 1
+            self._segment, self._begin = PathSegment.of(path, k), path.times[k]
+            self._end = path.times[k + 1] if k + 2 < len(path.times) else math.inf
+        begin, duration, x, y, yaw, dx, dy, turn, qz, qw = self._segment
         part = (local - begin) / duration if duration > 0 else 1.0
         x, y = x + part * dx, y + part * dy
         if turn:
@@ -97,33 +97,33 @@ class PathSegment(NamedTuple):
     qw: float
 
     @classmethod
-    def of(cls, path: MotionPath, number: int) -> "PathSegment":
-        """Return the segment from pose `number` to the next one."""
-        (x, y, yaw), to = path.poses[number], path.poses[number + 1]
-        begin, end = path.times[number : number + 2]
+    def of(cls, path: MotionPath, k: int) -> "PathSegment":
+        """Return segment k of a path."""
+        (x, y, yaw), to = path.poses[k], path.poses[k + 1]
+        begin, end = path.times[k : k + 2]
         *_, qz, qw = Pose3.planar(Pose2(x, y, wrap(yaw)))
         return cls(begin, end - begin, x, y, yaw, to.x - x, to.y - y, wrap(to.yaw - yaw), qz, qw)
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
-    """Return an upper bound in m/s of the speed of any point within `reach` m of the origin of the body.
+    """Return an upper bound in m/s on the speed of any point within `reach` m of the origin of the body.
 
     The result is inf if the path contains a jump, such as a segment without duration.
     """
-    speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
+    speeds = [_speed(path, k, reach) for k in range(len(path.times) - 1)]
     if path.mode == "loop" and _max_distance(_displacement(path.poses[-1], path.poses[0]), reach) > 0:
         return math.inf
     return max(speeds, default=0.0)
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return an upper bound in m of the distance that a point of the body moves within a period of `seconds`.
+    """Return an upper bound in m on the distance that a point of the body moves within any `seconds` of the path.
 
     The point is within `reach` m of the origin of the body. Jumps do not count: segments without duration, and the
     return to the first pose in a loop.
     """
     durations = [end - begin for begin, end in itertools.pairwise(path.times)]
-    lengths = [_speed(path, leg, reach) * duration if duration > 0 else 0.0 for leg, duration in enumerate(durations)]
+    lengths = [_speed(path, k, reach) * duration if duration > 0 else 0.0 for k, duration in enumerate(durations)]
     if path.mode == "back_and_forth":
         lengths, durations = lengths + lengths[::-1], durations + durations[::-1]
     if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count too
@@ -160,7 +160,7 @@ def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -
 
 
 class SweptSegment(NamedTuple):
-    """Straight line from (x, y) to (to_x, to_y), and the maximum `deviation` of a path segment from it, in m."""
+    """Straight line between the ends of a segment, which deviates from the line by at most `deviation`; in m."""
 
     x: float
     y: float
@@ -170,28 +170,28 @@ class SweptSegment(NamedTuple):
 
 
 def swept_segments(path: MotionPath) -> list[SweptSegment]:
-    """Return a straight line for each segment of the path."""
+    """Return the straight line between the ends of each segment."""
     (x, y, _), *_ = poses = path.poses
     legs = range(len(path.times) - 1)
-    return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _deviation(path, leg)) for leg in legs] or [
+    return [SweptSegment(*poses[k][:2], *poses[k + 1][:2], _deviation(path, k)) for k in legs] or [
         SweptSegment(x, y, x, y)
     ]
 
 
-def _deviation(path: MotionPath, leg: int) -> float:
-    """Return an upper bound in m of the distance of a segment from the straight line between its ends."""
+def _deviation(path: MotionPath, k: int) -> float:
+    """Return an upper bound in m on the distance of segment k from the straight line between its ends."""
     if path.ease != "spline":
         return 0.0
-    third = (path.times[leg + 1] - path.times[leg]) / 3  # a cubic curve lies in the convex hull of its control points
-    return third * max(_max_distance(_spline_velocity(path, k), 0.0) for k in (leg, leg + 1))
+    third = (path.times[k + 1] - path.times[k]) / 3  # a cubic curve lies in the convex hull of its control points
+    return third * max(_max_distance(_spline_velocity(path, pose), 0.0) for pose in (k, k + 1))
 
 
-def _speed(path: MotionPath, leg: int, reach: float) -> float:
-    """Return an upper bound in m/s of the speed on a segment of any point within `reach` m of the origin."""
-    step, seconds = _displacement(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
+def _speed(path: MotionPath, k: int, reach: float) -> float:
+    """Return an upper bound in m/s on the speed of any point within `reach` m of the origin on segment k."""
+    step, seconds = _displacement(path.poses[k], path.poses[k + 1]), path.times[k + 1] - path.times[k]
     if path.ease == "spline":
         # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
-        before, after = _spline_velocity(path, leg), _spline_velocity(path, leg + 1)
+        before, after = _spline_velocity(path, k), _spline_velocity(path, k + 1)
         middle = [3.0 * displacement / seconds - a - b for displacement, a, b in zip(step, before, after, strict=True)]
         return max(_max_distance(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
     meters = _max_distance(step, reach)
@@ -200,22 +200,22 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
     return meters / seconds * (SMOOTH_PEAK_SPEED_RATIO if path.ease == "smooth" else 1.0) if seconds > 0 else math.inf
 
 
-def _spline_pose(path: MotionPath, leg: int, part: float) -> Pose2:
-    """Return the pose on a spline after the fraction `part` of the duration of a segment."""
-    begin, end = path.poses[leg], path.poses[leg + 1]
-    duration = path.times[leg + 1] - path.times[leg]
+def _spline_pose(path: MotionPath, k: int, part: float) -> Pose2:
+    """Return the pose on a spline after the fraction `part` of the duration of segment k."""
+    begin, end = path.poses[k], path.poses[k + 1]
+    duration = path.times[k + 1] - path.times[k]
     smooth_part = part * part * (3.0 - 2.0 * part)
     leaving, arriving = part * (1.0 - part) ** 2 * duration, -(part**2) * (1.0 - part) * duration
     x, y, yaw = (
         start + smooth_part * displacement + leaving * before + arriving * after
         for start, displacement, before, after in zip(
-            begin, _displacement(begin, end), _spline_velocity(path, leg), _spline_velocity(path, leg + 1), strict=True
+            begin, _displacement(begin, end), _spline_velocity(path, k), _spline_velocity(path, k + 1), strict=True
         )
     )
     return Pose2(x, y, wrap(yaw))
 
 
-def _spline_velocity(path: MotionPath, k: int) -> Step:
+def _spline_velocity(path: MotionPath, k: int) -> XYYaw:
     """Return the velocity of a spline at pose k in m/s and rad/s (Catmull-Rom)."""
     last = len(path.poses) - 1
     if 0 < k < last:
@@ -225,22 +225,23 @@ def _spline_velocity(path: MotionPath, k: int) -> Step:
     else:
         return 0.0, 0.0, 0.0
     seconds = path.times[before + 1] - path.times[before] + path.times[after + 1] - path.times[after]
-    steps = [_displacement(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
+    steps = [_displacement(path.poses[k], path.poses[k + 1]) for k in (before, after)]
     x, y, yaw = ((a + b) / seconds for a, b in zip(*steps, strict=True))
     return x, y, yaw
 
 
-def _displacement(begin: Pose2, end: Pose2) -> Step:
+def _displacement(begin: Pose2, end: Pose2) -> XYYaw:
+    """Return the displacement from one pose to another, by the shorter rotation."""
     return end.x - begin.x, end.y - begin.y, wrap(end.yaw - begin.yaw)
 
 
-def _max_distance(step: Step, reach: float) -> float:
-    """Return an upper bound in m of the distance that any point within `reach` m of the origin moves in a step."""
+def _max_distance(step: XYYaw, reach: float) -> float:
+    """Return an upper bound in m on how far a displacement moves any point within `reach` m of the origin."""
     return math.hypot(step[0], step[1]) + reach * abs(step[2])
 
 
 def _fold_repetitions(path: MotionPath, seconds: float) -> float:
-    """Convert the time on a repeated path to the time of the same pose in the first repetition."""
+    """Convert a path time to the time of the same pose before the path repeats."""
     first, duration = path.times[0], path.times[-1] - path.times[0]
     since = seconds - first
     if duration <= 0 or since <= 0 or path.mode == "once":

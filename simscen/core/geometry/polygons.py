@@ -1,6 +1,6 @@
 """Polygons in the plane: distances, validity, decomposition into convex pieces, and path simplification.
 
-A polygon is a sequence of corners (x, y) in m. Its last corner is connected to the first one.
+A polygon is a sequence of corners (x, y) in m. The last corner is connected to the first one.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 Corner = tuple[float, float]
+"""(x, y) in m."""
 
 MIN_WIDTH_M = 1e-6
 """Minimum width of a valid polygon."""
 POINT = ((0.0, 0.0),)
-"""Outline of a robot that is treated as a point."""
+"""Outline that represents a robot by a point."""
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m from the position of a pose to a polygon; 0 inside."""
+    """Return the distance in m from the position of a pose to a polygon; 0 inside the polygon."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     if polygon_contains(corners, (point.x, point.y)):
         return 0.0
@@ -44,7 +45,7 @@ def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[n
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m from the position of a pose to the border of the polygon around it; -1 if outside."""
+    """Return how far in m the position of a pose is inside a polygon: its distance to the border; -1 if outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):
         return -1.0
     return min(
@@ -55,7 +56,7 @@ def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
 def polygon_defect(ring: Sequence[Corner]) -> str | None:
     """Return why a polygon is invalid: "encloses no area" or "crosses or touches itself"; None if it is valid.
 
-    The ring of corners may end with its first corner.
+    The last corner may repeat the first one.
     """
     corners = without_repeated_corners(ring)
     if _encloses_no_area(corners):
@@ -76,7 +77,7 @@ def polygon_defect(ring: Sequence[Corner]) -> str | None:
 
 
 def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
-    """Return the corners, without each corner that is equal to the previous one."""
+    """Return the corners without repetitions of the previous corner."""
     return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
 
 
@@ -86,6 +87,7 @@ def signed_double_area(a: Corner, b: Corner, c: Corner) -> float:
 
 
 def _encloses_no_area(corners: Sequence[Corner]) -> bool:
+    """Return whether a polygon is narrower than MIN_WIDTH_M."""
     if len(corners) < 3:
         return True
     far = max(corners, key=lambda corner: math.dist(corner, corners[0]))
@@ -142,7 +144,7 @@ def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
 
 
 def _ray_crosses_edge(point: Corner, a: Corner, b: Corner) -> bool:
-    """Return whether a ray from the point along +x crosses the edge from a to b."""
+    """Return whether a ray from the point in the direction +x crosses the edge from a to b."""
     # Only the lower end belongs to an edge, so that a ray through a corner crosses one edge.
     if (a[1] > point[1]) == (b[1] > point[1]):
         return False
@@ -168,7 +170,7 @@ def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
 
 
 def _triangles(corners: list[Corner]) -> list[Piece]:
-    """Triangulate by ear clipping (Meisters, 1975)."""
+    """Triangulate a counterclockwise polygon by ear clipping (Meisters, 1975)."""
     found: list[Piece] = []
     while len(corners) > 2:
         k = next((k for k in range(len(corners)) if _is_collinear(corners, k) or _is_ear(corners, k)), None)
@@ -181,7 +183,7 @@ def _triangles(corners: list[Corner]) -> list[Piece]:
 
 
 def _triangle_at(corners: Sequence[Corner], k: int) -> tuple[Corner, Corner, Corner]:
-    """Return corner k between the previous and the next corner."""
+    """Return the previous corner, corner k, and the next corner."""
     return corners[k - 1], corners[k], corners[(k + 1) % len(corners)]
 
 
@@ -190,7 +192,7 @@ def _is_collinear(corners: Sequence[Corner], k: int) -> bool:
 
 
 def _is_ear(corners: Sequence[Corner], k: int) -> bool:
-    """Return whether the triangle at corner k lies inside and contains no other corner."""
+    """Return whether the triangle at corner k is inside the polygon and contains no other corner."""
     a, b, c = _triangle_at(corners, k)
     if signed_double_area(a, b, c) <= 0:
         return False
@@ -233,11 +235,11 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
-    """Return the signed distance (n,) in m between two polygons: `moving`, placed at `poses` (n, 3), and `fixed`.
+    """Return the signed distance (n,) in m of the polygon `moving`, placed at `poses` (n, 3), from the polygon `fixed`.
 
-    The distance is negative if the polygons overlap. The magnitude is then the length of the shortest translation that
-    separates them; for concave polygons, a lower bound of this length. `moving` may be a single point. Raises
-    ValueError for a polygon that intersects itself.
+    If the polygons overlap, the distance is negative: minus the length of the shortest translation that separates them.
+    For concave polygons, this length is only a lower bound. `moving` may be a single point. Raises ValueError for a
+    polygon that intersects itself.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     others = [_array(piece) for piece in convex_pieces(fixed)]
@@ -256,10 +258,10 @@ POSES_PER_BATCH = 64
 
 
 def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
-    """Return the signed distance (n,) in m, as in `separation`, between a moving polygon and the nearest rectangle.
+    """Return the signed distance (n,) in m of the polygon `moving`, placed at `poses` (n, 3), from the nearest box.
 
-    The polygon `moving` is placed at `poses` (n, 3). `boxes` (m, 4) are the rectangles as min x, min y, max x, max y in
-    m. The result is inf without rectangles.
+    The sign is that of `separation`. `boxes` (m, 4) are rectangles as min x, min y, max x, max y in m. The result is
+    inf without boxes.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
@@ -277,7 +279,7 @@ def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) 
 
 
 def _can_be_nearest(points: Array, boxes: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Return a mask (n, m) of the boxes (m, 4) that can be the nearest one to a polygon around each point (n, 2).
+    """Return a mask (n, m) of the boxes (m, 4) that can be nearest to a polygon around each of the points (n, 2).
 
     The corners of the polygon are within `reach` m of the point.
     """
@@ -303,8 +305,8 @@ def _transformed_corners(poses: Array, corners: Array) -> Array:
 def _convex_separation(moving: Array, still: Array) -> Array:
     """Return the signed distances (n,) of n pairs of convex counterclockwise polygons, (n, h, 2) and (n, r, 2).
 
-    The method is the separating axis theorem: polygons that overlap do so along all edge normals, and the smallest
-    overlap is the shortest translation that separates them.
+    By the separating axis theorem, convex polygons overlap if they overlap along all edge normals. The smallest of
+    these overlaps is the length of the shortest translation that separates them.
     """
     along = np.maximum(_separation_along_normals(still, moving), _separation_along_normals(moving, still))
     apart = np.minimum(_distance_to_border(moving, still), _distance_to_border(still, moving))
@@ -315,7 +317,7 @@ def _convex_separation(moving: Array, still: Array) -> Array:
 def _separation_along_normals(polygon: Array, points: Array) -> Array:
     """Return the largest gap (n,) in m between polygons (n, m, 2) and points (n, k, 2) along an edge normal.
 
-    The gap of an edge is the signed distance of the innermost point from the edge; negative inside.
+    The gap at an edge is the smallest signed distance of the points from the line of the edge; negative inside.
     """
     if polygon.shape[1] < 2:
         return np.full(len(points), -np.inf)
@@ -327,7 +329,7 @@ def _separation_along_normals(polygon: Array, points: Array) -> Array:
 
 
 def _distance_to_border(points: Array, polygon: Array) -> Array:
-    """Return the smallest distance (n,) in m of the points (n, k, 2) from the border of `polygon` (n, m, 2)."""
+    """Return the smallest distance (n,) in m of points (n, k, 2) from the borders of polygons (n, m, 2)."""
     along = np.roll(polygon, -1, axis=1) - polygon
     squared = np.maximum((along**2).sum(axis=2), np.finfo(np.float64).tiny)[:, np.newaxis]
     offset = points[:, :, np.newaxis] - polygon[:, np.newaxis]
@@ -338,7 +340,7 @@ def _distance_to_border(points: Array, polygon: Array) -> Array:
 
 
 def path_corners(path: Array, tolerance: float) -> list[int]:
-    """Simplify a path (n, 2) to straight lines, and return the indices of their corners without the two ends.
+    """Simplify a path (n, 2) to straight lines. Return the indices of the corners between them.
 
     The path deviates from the lines by at most `tolerance` m. Source: Douglas and Peucker, Algorithms for the reduction
     of the number of points (1973).

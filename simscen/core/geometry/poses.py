@@ -36,17 +36,17 @@ Vector = tuple[float, float, float]
 """(x, y, z)."""
 
 
-def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
+def rotated(quaternion: tuple[float, float, float, float], vector: Vector) -> Vector:
     """Return a vector rotated by a unit quaternion (x, y, z, w)."""
-    x, y, z, w = turn
+    x, y, z, w = quaternion
     a, b, c = vector
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
 
 
-def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, Vector]:
-    """Return the x and y axes of a frame that is rotated by a unit quaternion (x, y, z, w)."""
-    x, y, z, w = turn
+def forward_and_left(quaternion: tuple[float, float, float, float]) -> tuple[Vector, Vector]:
+    """Return the x axis and the y axis of a frame that is rotated by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)),
         (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
@@ -173,7 +173,7 @@ class Pose3(NamedTuple):
         )  # fmt: skip
 
     def _transform_point(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return `point_in_a` for `a_from_b` and `point_in_b`. Level poses are computed faster, without numpy."""
+        """Return `point_in_a` for `a_from_b._transform_point(point_in_b)`. Faster than `apply` for level poses."""
         if self.qx != 0 or self.qy != 0:
             x, y, z = self.apply(np.array([point]))[0].tolist()
             return x, y, z
@@ -194,5 +194,5 @@ class Pose3(NamedTuple):
 
     @property
     def plane(self) -> Pose2:
-        """Position and heading in the plane: x, y, and yaw."""
+        """The pose projected on the ground plane: x, y, and yaw."""
         return Pose2(self.x, self.y, self.yaw)

@@ -1,4 +1,4 @@
-"""Interface of ray casters, fans of rays such as the beams of a lidar, and buffers of rays for Embree.
+"""Interface of ray casters, fans of rays such as the beams of a lidar, and ray buffers for the ray tracer Embree.
 
 Embree casts rays in packets of 16 (`RTCRayHit16`).
 """
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose3, Vector
 
-Singles = npt.NDArray[np.float32]
+Float32Array = npt.NDArray[np.float32]
 
 PACKET_SIZE = 16
 """Number of rays per packet."""
@@ -25,13 +25,13 @@ _ROWS = 21
 Rows: start (3), minimum distance, direction (3), time, maximum distance, mask, id, flags, and 9 values of the hit.
 """
 _LENGTH_ROW, _MASK_ROW, _HIT_ID_ROW = 8, 9, 17
-"""Rows of the maximum distance and of the mask, and first row of the ids of the hit geometry."""
+"""Row of the maximum distance, row of the mask, and first row of the ids of the hit geometry."""
 _PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
 """Alignment of packets, and size of values, in bytes."""
 _ALL_BITS = 0xFFFFFFFF
 """Mask of a ray that hits all geometries, and id of the hit geometry if nothing was hit."""
 MIN_DIRECTION_COMPONENT = 2e-18
-"""Magnitude below which components of directions are set to 0, because Embree misses hits with smaller components."""
+"""Magnitude below which components of directions are set to 0, because Embree then misses hits."""
 
 
 class RayPackets:
@@ -48,15 +48,15 @@ class RayPackets:
         ].reshape(packets, _ROWS, PACKET_SIZE)
         words = rows.view(np.uint32)
         words[:, _MASK_ROW] = words[:, _HIT_ID_ROW:] = _ALL_BITS
-        self.starts: Singles = rows[:, :3]
-        self.directions: Singles = rows[:, 4:7]
-        self.lengths: Singles = rows[:, _LENGTH_ROW]
+        self.starts: Float32Array = rows[:, :3]
+        self.directions: Float32Array = rows[:, 4:7]
+        self.lengths: Float32Array = rows[:, _LENGTH_ROW]
         self._count = count
         first, size = rows.ctypes.data, _ROWS * PACKET_SIZE * _VALUE_BYTES
         self.addresses = [c_void_p(first + number * size) for number in range(packets)]
         """Address of each packet."""
 
-    def set_rays(self, starts: Array, directions: Array, lengths: float | Singles) -> None:
+    def set_rays(self, starts: Array, directions: Array, lengths: float | Float32Array) -> None:
         """Set the start points (n, 3), the directions (n, 3), and the maximum lengths (n,) of all rays."""
         for rows, values in ((self.starts, starts), (self.directions, directions)):
             flat = np.zeros((len(rows) * PACKET_SIZE, 3), dtype=np.float32)
@@ -67,13 +67,13 @@ class RayPackets:
         padded[: self._count] = lengths
         self.lengths[:] = padded.reshape(-1, PACKET_SIZE)
 
-    def distances(self) -> Singles:
+    def distances(self) -> Float32Array:
         """Return the distance (n,) of the hit of each ray in m, after Embree has cast the rays."""
         return self.lengths.flatten()[: self._count]
 
 
 ALL_PACKETS = slice(None)
-"""All packets of a fan."""
+"""Index of all packets of a fan."""
 
 
 class RayFan:
@@ -92,7 +92,7 @@ class RayFan:
         return self._count
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
-        """Return origins (n, 3) and unit directions (n, 3) of the rays of a fan at `pose`."""
+        """Return origins (n, 3) and unit directions (n, 3) of the rays if the fan is at `pose`."""
         (x, y), rotation = self._flat[:, : self._count], pose.rotation()
         return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ rotation.T
 
@@ -117,9 +117,9 @@ class RayFan:
         self.rays.lengths[:] = reach
 
     def rays_towards(self, x: float, y: float, min_dot: float) -> list[slice]:
-        """Return the index ranges of the rays whose direction has a dot product with (x, y) of at least `min_dot`.
+        """Return the index ranges of the rays towards (x, y), given in the frame of the fan.
 
-        (x, y) is in the frame of the fan. The ranges can be slightly too long.
+        The dot product of their direction and (x, y) is at least `min_dot`. The ranges can be slightly too long.
         """
         far = math.hypot(x, y)
         if min_dot > far:
@@ -150,6 +150,6 @@ class RayCaster(Protocol):
         """
         ...
 
-    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Singles:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Float32Array:
         """Return the distances (n,) in m for the rays of a fan at `pose`. Larger values than `reach` mean no hit."""
         return self.cast(*fan.at(pose), reach)

@@ -13,10 +13,10 @@ _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 class PredictedPoses:
-    """Poses of all objects in a range of ticks in which only scripted paths move objects.
+    """Poses of all objects in a range of ticks, predicted under the condition that only scripted paths move objects.
 
     `names` are the moving objects. `table` (ticks, names, 7) contains their poses as x, y, z and a quaternion.
-    `all_objects` contains the poses of all objects, and is used for objects at rest.
+    `all_objects` contains the present poses of all objects, from which the poses of objects at rest are taken.
     """
 
     def __init__(self, ticks: range, names: tuple[str, ...], table: Array, all_objects: Mapping[str, Pose3]) -> None:
@@ -43,7 +43,7 @@ class PredictedPoses:
 
     @cached_property
     def all_moved(self) -> list[bool]:
-        """Whether the poses of all objects have changed since the previous tick, for each of `ticks`."""
+        """Whether all objects have moved since the previous tick, for each of `ticks`."""
         moved = (self.table[1:] != self.table[:-1]).any(axis=2).all(axis=1)
         return [False, *(moved & self.complete).tolist()]
 
@@ -79,7 +79,7 @@ class PosesAtTick(Mapping[str, Pose3]):
 
 
 class BatchPathSampler:
-    """Computes poses on many paths at many times at once. The results are bit-identical to `PathSampler.at`."""
+    """Computes poses on many paths at many times at once, with the same bits as `PathSampler.at`."""
 
     def __init__(self, paths_and_heights: Sequence[tuple[MotionPath, float]]) -> None:
         """Prepare the segments of the paths. Each path is paired with its constant height in m."""

@@ -1,4 +1,4 @@
-"""Shapes, solids, bodies, and the paths that move bodies.
+"""Shapes, solids (placed shapes), bodies (movable groups of solids), and the paths that move bodies.
 
 Boxes, cylinders, capsules and cones are centered at the origin of their frame, with z as their axis. Sizes are in m.
 """
@@ -83,7 +83,7 @@ Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
 
 @dataclass(frozen=True)
 class Solid:
-    """Shape at a pose. `pose` is in the frame of the body, or in the world frame for a solid that never moves."""
+    """Shape at a pose. `pose` is in the frame of its body, or in the world frame for a solid that never moves."""
 
     shape: Shape
     pose: Pose3 = Pose3()
@@ -142,8 +142,8 @@ class TriangleMesh:
     """One mesh of many solids: `vertices` (n, 3) in m, and `faces` (m, 3).
 
     `owners` (m,) contains the index of the solid of each face. `names`, `frictions`, and `hulls` have one element per
-    solid. `frictions` is empty if all are 1. `hulls` contains the range of vertices of each convex solid, and None for
-    each concave solid; it is empty if convexity was not tested.
+    solid. `frictions` is empty if all are 1. `hulls` contains the range of vertices of a convex solid, and None for a
+    concave one; it is empty if convexity was not tested.
     """
 
     vertices: Array
@@ -155,7 +155,7 @@ class TriangleMesh:
 
 
 MAX_SAGITTA_M = 0.0005
-"""Default maximum depth by which a facet may cut into a circle."""
+"""Default of the maximum depth by which a facet cuts into a circle."""
 FACET_COUNT_RANGE = (12, 192)
 """Minimum and maximum number of facets of a circle."""
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from simscen.core.geometry import Array, Pose3, Vector
-from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
+from simscen.core.geometry.ray_fans import Float32Array, RayCaster, RayFan
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Shape, TriangleMesh
 from simscen.sim.robots.robot import Robot
@@ -33,7 +33,7 @@ class LiveRayCaster(RayCaster):
         self._update_scene((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
-    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Float32Array:
         """Return the distances (n,) in m along the rays of a fan at `pose`; values beyond `reach` m mean no hit."""
         self._update_scene(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)

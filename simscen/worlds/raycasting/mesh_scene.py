@@ -18,7 +18,7 @@ from embreex import rtcore_scene
 
 from simscen.core.decorators import cached_on_instance
 from simscen.core.geometry import Array, Pose3, Vector, rotated
-from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, RayFan, RayPackets, Singles
+from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, Float32Array, RayFan, RayPackets
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
 _LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # also finds the functions of the libraries that it is linked with
@@ -131,7 +131,7 @@ class MeshScene:
         self.extent = math.hypot(*self.center) + self.radius
         self._scene = EmbreeScene(corners, mesh)
 
-    def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
+    def distances(self, origins: Array, directions: Array, ends: float | Float32Array) -> Float32Array:
         """Return the distances (n,) in m to the first hits of single rays; `ends` for rays without a hit.
 
         The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `ends` (n,) m long.
@@ -186,7 +186,7 @@ class MovingMesh:
         """Return a lower bound of the distance in m between the mesh and a position in the world frame."""
         return math.dist(self.pose[:3], position) - self.scene.extent
 
-    def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
+    def distances(self, origins: Array, directions: Array, ends: Float32Array) -> Float32Array:
         """Return the distances as `MeshScene.distances` does, but for rays in the world frame."""
         rotation = self._world_rotation
         return self.scene.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
@@ -223,7 +223,7 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
 
 
 def rays_hitting_sphere(
-    center: Vector, radius: float, origins: Array, directions: Array, ends: Singles
+    center: Vector, radius: float, origins: Array, directions: Array, ends: Float32Array
 ) -> npt.NDArray[np.int64]:
     """Return the indices of single rays that may hit a sphere. Rays are given as in `MeshScene.distances`."""
     offsets = center - origins

@@ -12,7 +12,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose3, Vector, forward_and_left
 from simscen.core.geometry.meshes import submesh_between_heights
-from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
+from simscen.core.geometry.ray_fans import Float32Array, RayCaster, RayFan
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 from simscen.worlds.raycasting.mesh_scene import (
     MeshScene,
@@ -76,7 +76,7 @@ class RestingBodies:
             if group.min_distance(pose[:3]) <= reach:
                 group.sweep(fan, pose, heights)
 
-    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
+    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Float32Array) -> None:
         """Shorten single rays in place: reduce their lengths `ends` (n,) in m to the first hits.
 
         The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are between the `heights`.
@@ -149,7 +149,7 @@ class RestingGroup:
         for packets in packets_towards_sphere(fan, pose, self._center, self._radius):
             self._scene_between(heights).sweep(fan, pose[:3], packets)
 
-    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
+    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Float32Array) -> None:
         """Shorten single rays; see `RestingBodies.cast`."""
         rays = rays_hitting_sphere(self._center, self._radius, origins, directions, ends)
         if len(rays):
@@ -207,7 +207,7 @@ class RayScene(RayCaster):
         result[distances > limit] = np.inf
         return result
 
-    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Float32Array:
         """Return the distances (n,) in m of a fan with its frame at `pose`. Values beyond `reach` mean no hit."""
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.set_directions(ahead, left)
@@ -221,7 +221,7 @@ class RayScene(RayCaster):
                 mover.sweep(fan, pose, (ahead, left))
         return fan.rays.distances()
 
-    def _first_hits(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
+    def _first_hits(self, origins: Array, directions: Array, reach: float, end: float) -> Float32Array:
         """Return the distances (n,) in m to the first hits of single rays, or `end` without a hit within `reach` m."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
