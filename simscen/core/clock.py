@@ -1,4 +1,4 @@
-"""Conversion of simulated time, counted in physics ticks, to seconds, nanoseconds, and ROS time."""
+"""Conversion of simulated time between physics ticks, seconds, nanoseconds, and ROS time."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ DEFAULT_TICK_RATE_HZ = 240
 
 @dataclass(frozen=True)
 class Clock:
-    """Converts between ticks and seconds. `rate` is the number of physics ticks per second."""
+    """Converts between ticks and seconds, and rates to periods. `rate` is the number of physics ticks per second."""
 
     rate: int = DEFAULT_TICK_RATE_HZ
 
@@ -29,22 +29,23 @@ class Clock:
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:
-        """Return the rate in Hz nearest to `hertz` whose period is a whole number of ticks.
+        """Return the nearest rate in Hz that has a period of whole ticks.
 
-        The result is a divisor of the clock rate, or it has a period of 1 to 10 whole seconds.
+        The result divides the clock rate, or its period is 1 to 10 whole seconds.
         """
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))
 
 
 NS_PER_SECOND = 1_000_000_000
+"""Nanoseconds per second."""
 
 Stamp = tuple[int, int]
 """Time as in builtin_interfaces/Time: seconds since the start of the run, and nanoseconds of the current second."""
 
 
 class SimTime:
-    """Converts ticks to nanoseconds and ROS time, rounded down to whole nanoseconds.
+    """Converts ticks to nanoseconds and ROS time, rounded down to whole nanoseconds, and nanoseconds to ticks.
 
     `rate` is the number of ticks per second. Raises ValueError unless it is in 1 … 999,999,999.
     """
@@ -66,5 +67,5 @@ class SimTime:
         return self._last[1]
 
     def tick(self, nanoseconds: int) -> int:
-        """Return the tick at a time since the start of the run: the inverse of the method `nanoseconds`."""
+        """Return the first tick at or after a time in nanoseconds since the start of the run."""
         return -(-nanoseconds * self.rate // NS_PER_SECOND)

@@ -1,7 +1,7 @@
 """Environment variables that make NumPy and OpenBLAS compute identical results on all processors with AVX2.
 
-When they are loaded, both libraries choose kernels (AVX2, AVX-512, …) for the processor. The results of different
-kernels differ in the last bits, which makes runs diverge. The variables select the AVX2 kernels on all processors.
+By default, both libraries choose kernels (AVX2, AVX-512, …) for the processor when they are loaded. The results of
+different kernels differ in the last bits, so that runs on different processors diverge.
 """
 
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 CPUINFO = Path("/proc/cpuinfo")
 """File in which Linux lists the instruction sets of the processors."""
 _FIRST_PROCESSOR_BYTES = 8192
-"""Number of bytes of CPUINFO that contain the entry of the first processor."""
+"""Number of bytes to read from CPUINFO, enough for the entry of the first processor."""
 _AVX512_BEFORE_2_4 = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"
 """Names of the AVX-512 kernels before NumPy 2.4."""
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"

@@ -23,7 +23,7 @@ def fast_dataclass(*, eq: bool = True) -> Callable[[type[_Class]], type[_Class]]
 
 
 def _init_function(slotted: type) -> Any:
-    """Generate an `__init__` that sets the slots directly, without the name lookup of `object.__setattr__`."""
+    """Return a generated `__init__` that sets the slots directly, without the name lookup of `object.__setattr__`."""
     namespace: dict[str, Any] = {"MISSING": MISSING}
     arguments, lines = ["self"], ["pass"]
     for field in fields(slotted):
@@ -52,9 +52,9 @@ Result = TypeVar("Result")
 def cached_on_instance(
     compute: Callable[Concatenate[Instance, Args], Result],
 ) -> Callable[Concatenate[Instance, Args], Result]:
-    """Cache the results of `compute` in the `__dict__` of its first argument, the instance.
+    """Cache the results of a method or function in the `__dict__` of its first argument, the instance.
 
-    The other arguments are the cache key and must be hashable. Callers must not modify the results.
+    The other arguments are the key of the cache and must be hashable. Callers must not modify the results.
     """
     name = f"_{compute.__module__}.{compute.__qualname__}"
 

@@ -8,8 +8,8 @@ class Exit(IntEnum):
     """Exit codes of the command line.
 
     FAILED: a run failed. USAGE: the command line or an input file is invalid. INCOMPLETE: a run could not be completed.
-    INTERNAL: a defect of simscen. UNDECIDED: the runs of a study do not decide whether its required pass rate is met.
-    The last three are 128 plus the number of the signal that ended the command.
+    INTERNAL: a defect of simscen. UNDECIDED: a study had too few runs to decide on its required pass rate.
+    HUNG_UP, INTERRUPTED, TERMINATED: a signal ended the command. The code is 128 plus the number of the signal.
     """
 
     PASSED = 0
@@ -25,10 +25,10 @@ class Exit(IntEnum):
 
 
 class SimscenError(Exception):
-    """Base class of the exceptions of simscen. It ends a command or a run."""
+    """Base class of the exceptions of simscen, which end a command or a run."""
 
     exit = Exit.INTERNAL
-    """Exit code of a command that this error ends."""
+    """Exit code of the command if this error ends it."""
 
 
 class InvalidInput(SimscenError):
@@ -58,7 +58,7 @@ class NothingSelected(SimscenError):
 
 
 BROKEN_COMPONENT = "broken-component"
-"""`kind` of a RunError: a component of a plug-in returned an invalid value."""
+"""Value of `RunError.kind`: a component of a plug-in returned an invalid value."""
 
 
 class RunError(SimscenError):

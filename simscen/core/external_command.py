@@ -18,7 +18,7 @@ class ExternalCommand:
         argv: The program and its arguments. The program is looked up in the PATH of `env`.
         env: Complete environment of the program.
         cwd: Working folder.
-        start_limit: Maximum wall time in s from the start of the program to its subscription to topics.
+        start_limit: Maximum wall time in s until the program has started and subscribed to its topics.
         answer_limit: Maximum wall time in s of each later answer.
         digest: Hash of the arguments, of the files that they name, and of the environment variables that the user
             configuration sets.
@@ -33,9 +33,9 @@ class ExternalCommand:
 
 
 def split_command(command: str) -> tuple[str, ...]:
-    """Return the words of a command line with shell quoting.
+    """Split a command line with shell quoting into words.
 
-    Raises ValueError if a quote is not closed or if the command names no program.
+    Raises ValueError if a quote is not closed, or if no program is named.
     """
     try:
         words = tuple(shlex.split(command))

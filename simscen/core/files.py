@@ -1,4 +1,4 @@
-"""Checks of output paths that protect existing files, and a record of the input files that were read."""
+"""Checks that protect existing files from being overwritten, and a record of the input files that were read."""
 
 import errno
 import os
@@ -31,12 +31,12 @@ def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
 
 
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
-"""Set that `collect_read_files` yielded; None outside of its `with` block."""
+"""Set to which `record_read_file` adds files; None outside of a `with` block of `collect_read_files`."""
 
 
 @contextmanager
 def collect_read_files() -> Iterator[set[Path]]:
-    """Yield a set to which `record_read_file` adds files during the `with` block."""
+    """Collect the files that are read during the `with` block: yield a set to which `record_read_file` adds them."""
     read: set[Path] = set()
     token = _READ.set(read)
     try:
@@ -46,9 +46,9 @@ def collect_read_files() -> Iterator[set[Path]]:
 
 
 def record_read_file(file: Path) -> None:
-    """Add `file` to the set of `collect_read_files`. Has no effect outside of its `with` block.
+    """Record that an input file was read. Has no effect outside of a `with` block of `collect_read_files`.
 
-    Call this for every file that another input file refers to.
+    Call this for every file to which another input file refers.
     """
     read = _READ.get()
     if read is not None:

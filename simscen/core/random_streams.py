@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 MAX_SEED = 2**32 - 1
-"""Greatest seed: the largest unsigned integer of 32 bits."""
+"""Largest seed: the largest unsigned integer of 32 bits."""
 
 
 @dataclass(frozen=True)
 class Streams:
-    """Random streams of a run, derived from its seed.
+    """Source of the random generators of a run, which are derived from its `seed`.
 
-    Raises ValueError unless `seed` is in 1 … MAX_SEED. `robot` is the name of the robot that uses the streams; "" for a
-    single robot.
+    `robot` is the name of the robot that uses them; "" for a single robot. Raises ValueError unless `seed` is in
+    1 … MAX_SEED.
     """
 
     seed: int

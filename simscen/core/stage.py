@@ -1,4 +1,4 @@
-"""Interfaces to a running simulation. Triggers observe the simulation by Situation. Actions change it by Stage.
+"""Interfaces to a running simulation: triggers observe it through `Situation`, actions change it through `Stage`.
 
 Poses are in the world frame. Only the estimated pose (belief) and the plan are in the map frame.
 """
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action: whether anything changed, and a description of the change or of the reason for none."""
+    """Result of an action: `what` describes the change, or the reason why nothing `happened`."""
 
     happened: bool
     what: str
 
 
 class Situation(Protocol):
-    """Current state of the run for triggers, with the pose, sensors, and navigation of one of the robots."""
+    """Current state of the run and of one robot, for triggers."""
 
     @property
     def tick(self) -> int:
@@ -56,7 +56,7 @@ class Situation(Protocol):
     def clearance(self) -> float | None:
         """True distance in m from the robot to the nearest obstacle; None before the first measurement.
 
-        Larger distances than the measuring range (`Case.clearance_range`) are replaced by this range.
+        The distance is at most the measuring range (`Case.clearance_range`).
         """
         ...
 
@@ -98,7 +98,7 @@ class Situation(Protocol):
         ...
 
     def of(self, robot: str) -> Situation:
-        """Return the situation of the robot with this name."""
+        """Return the same interface for the robot with this name."""
         ...
 
     def region(self, name: str) -> Polygon:
@@ -111,14 +111,14 @@ class Situation(Protocol):
 
 
 class Stage(Situation, Protocol):
-    """Changes that actions can make to the run, to its world, and to one of the robots."""
+    """Interface with which actions change the run, its world, and one robot."""
 
     def of(self, robot: str) -> Stage:
-        """Return the stage of the robot with this name."""
+        """Return the same interface for the robot with this name."""
         ...
 
     def spawn(self, body: Body) -> None:
-        """Add a body to physics, ray casting and pictures from the next tick on; replaces a body of the same name."""
+        """Add a body to the world from the next tick on. Replaces a body of the same name."""
         ...
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
@@ -145,7 +145,7 @@ class Stage(Situation, Protocol):
         ...
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that an object follows, and the time in s since its start; None if it follows no path."""
+        """Return the path of an object, and the time in s since the path started; None for an object without a path."""
         ...
 
     def mass(self, name: str) -> float:
@@ -157,11 +157,11 @@ class Stage(Situation, Protocol):
         ...
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place an object at `pose`, at rest, and end its motion along a path."""
+        """Move an object to `pose` at once, and end its motion along a path. It is then at rest."""
         ...
 
     def place_robot(self, pose: Pose2) -> None:
-        """Place the robot at `pose`, at rest, without informing the stack."""
+        """Move the robot to `pose` at once, without informing the stack. It is then at rest."""
         ...
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
@@ -184,13 +184,13 @@ class Stage(Situation, Protocol):
         ...
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Send a command to the costmap filters of the stack. Return the reason if it had no effect, otherwise ""."""
+        """Send a command to the costmap filters of the stack. Return the reason if it has no effect, otherwise ""."""
         ...
 
     def record_world_event(self, event: Event) -> None:
-        """Add an event to the recorded events of all robots. A tick of 0 is replaced by the current tick."""
+        """Record an event for all robots. A tick of 0 is replaced by the current tick."""
         ...
 
     def record_event(self, event: Event) -> None:
-        """Add an event to the recorded events of this robot. A tick of 0 is replaced by the current tick."""
+        """Record an event for this robot. A tick of 0 is replaced by the current tick."""
         ...

@@ -1,4 +1,4 @@
-"""Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square distribution, without SciPy."""
+"""Statistics of run results without SciPy: confidence intervals, tests, and the chi-square distribution."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 MIN_PAIRS = 5
-"""Minimum number of pairs for a bootstrap interval."""
+"""Minimum number of paired differences for a bootstrap interval."""
 RESAMPLES = 10_000
-"""Number of bootstrap resamples. MAX_DRAWS can reduce it to a tenth."""
+"""Number of bootstrap resamples, unless MAX_DRAWS requires fewer."""
 MAX_DRAWS = 20_000_000
-"""Limit for the number of values that a bootstrap draws."""
+"""Number of drawn values above which a bootstrap uses fewer resamples, but at least a tenth of RESAMPLES."""
 CONFIDENCE = 0.95
-"""Probability with which the bootstrap interval contains the true mean."""
+"""Confidence level of the bootstrap interval."""
 _LN_2 = math.log(2.0)
 _DRAWS_PER_BATCH = 1 << 20
 """Number of values that a bootstrap draws at once."""
@@ -23,7 +23,7 @@ _DRAWS_PER_BATCH = 1 << 20
 def bootstrap_mean_interval(
     differences: Sequence[float], rng: np.random.Generator, weights: Sequence[float] | None = None
 ) -> tuple[float, float] | None:
-    """Return lower and upper confidence limit of the mean of paired differences; None for fewer than MIN_PAIRS pairs.
+    """Return the lower and upper confidence limit of the mean of paired differences; None for fewer than MIN_PAIRS.
 
     `weights` contains the weight of each difference; None for equal weights. The method is the percentile bootstrap
     (Efron and Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13).
@@ -58,7 +58,7 @@ def sign_test(more: int, less: int) -> float:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Return the p-values of several tests with Holm's adjustment for multiple tests, in the same order.
+    """Return p-values with Holm's adjustment for multiple tests, in the same order.
 
     Source: Holm, A Simple Sequentially Rejective Multiple Test Procedure, 1979.
     """
@@ -74,10 +74,10 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
-    """Return lower and upper limit of the Wilson score interval of a success rate (Wilson 1927, JASA 22(158)).
+    """Return the lower and upper limit of the Wilson score interval of a success rate (Wilson 1927, JASA 22(158)).
 
-    `successes` may be fractional. `z` is the normal quantile of the confidence. Raises ValueError if `runs` is 0, or if
-    there are more successes than runs.
+    `successes` may be fractional. `z` is the two-sided normal quantile of the confidence level. Raises ValueError
+    unless 0 <= successes <= runs and runs >= 1.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")
@@ -103,9 +103,9 @@ def chi2_quantile(probability: float, freedom: int) -> float:
 
 
 def chi2_cdf(value: float, freedom: int) -> float:
-    """Return the cumulative distribution function of chi-square at `value` > 0, for `freedom` degrees of freedom.
+    """Return the chi-square distribution function at `value` > 0 for `freedom` degrees of freedom.
 
-    Computed by the power series of the incomplete gamma function (Abramowitz and Stegun 1964, 6.5.29).
+    The method is the power series of the incomplete gamma function (Abramowitz and Stegun 1964, 6.5.29).
     """
     a, x = freedom / 2.0, value / 2.0
     term = total = 1.0 / a
@@ -118,10 +118,10 @@ def chi2_cdf(value: float, freedom: int) -> float:
 
 
 def nees_mean_bounds(samples: int, dimensions: int, probability: float) -> tuple[float, float]:
-    """Return the bounds of the mean NEES (normalized estimation error squared) of a consistent estimator.
+    """Return the bounds between which the mean NEES of a consistent estimator lies with this `probability`.
 
-    The mean over `samples` independent errors with `dimensions` components lies between the bounds with this
-    `probability`. The bounds are two-sided quantiles of chi2(dimensions x samples) / samples (Bar-Shalom et al. 2001).
+    NEES is the normalized estimation error squared. The mean is over `samples` independent errors with `dimensions`
+    components. The bounds are two-sided quantiles of chi2(dimensions x samples) / samples (Bar-Shalom et al. 2001).
     """
     tail, freedom = (1.0 - probability) / 2.0, dimensions * samples
     return chi2_quantile(tail, freedom) / samples, chi2_quantile(1.0 - tail, freedom) / samples

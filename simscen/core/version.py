@@ -5,4 +5,4 @@ from pathlib import Path
 __version__ = "0.1.0"
 
 PACKAGE = Path(__file__).parents[1]
-"""Folder of the package with its shipped data."""
+"""Folder of the Python package, which contains the shipped data."""

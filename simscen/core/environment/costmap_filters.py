@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FilterMasks:
-    """Filter masks that a stack receives. A mask that the stack does not receive is None."""
+    """Filter masks that a stack receives; None for a mask that it does not receive."""
 
     keepout: OccupancyGrid | None = None
     speed: SpeedLimits | None = None
@@ -29,8 +29,8 @@ class FilterMasks:
 class SpeedLimits:
     """Mask of speed limits.
 
-    A cell of value v limits the speed to `base + multiplier * v`. The limit is in percent of full speed if `percent` is
-    True, and in m/s otherwise.
+    A cell of value v limits the speed to `base + multiplier * v`: in percent of full speed if `percent`, otherwise in
+    m/s.
     """
 
     grid: OccupancyGrid
@@ -63,7 +63,7 @@ class SpeedLimits:
     def limit_of_cell(self, value: int, full_speed: float) -> float | None:
         """Return the limit in m/s for the value of a cell; None if there is no limit.
 
-        As in Nav2's SpeedFilter, there is no limit if the value or the limit is at most 0, or the limit is above 100 %.
+        As in Nav2's SpeedFilter, values and limits of 0 or less mean no limit, as do limits above 100 %.
         """
         limit = self.base + self.multiplier * value
         if value <= 0 or limit <= 0 or (self.percent and limit > 100):
@@ -72,7 +72,7 @@ class SpeedLimits:
 
 
 def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]:
-    """Return for each of the points (n, 2) in the map frame whether it lies in an occupied cell of a keepout mask."""
+    """Return a mask (n,) of the points (n, 2) in the map frame that lie in occupied cells of a keepout mask."""
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 
@@ -82,7 +82,7 @@ Block = tuple[int, int, int, int, int]
 
 @dataclass(frozen=True)
 class MaskBlocks:
-    """Compact form of a filter mask for logs: `blocks` of cells with values from 1 to 100, which do not overlap.
+    """Compact form of a filter mask for logs: disjoint `blocks` of cells with values from 1 to 100.
 
     `resolution` is in m per cell. `origin` is the pose of the corner of cell (0, 0) in the map frame.
     """
@@ -103,7 +103,7 @@ class MaskBlocks:
 
     @property
     def occupied_boxes(self) -> Array:
-        """Blocks of value OCCUPIED (n, 4) as min x, min y, max x, max y in m in the frame of the mask."""
+        """Occupied blocks (n, 4) as min x, min y, max x, max y, in m in the frame of the mask."""
         cells_xywh = np.array([block[:4] for block in self.blocks if block[4] == OCCUPIED], dtype=np.float64).reshape(
             -1, 4
         )
@@ -118,7 +118,7 @@ class MaskBlocks:
 
 
 def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
-    """Divide a mask into blocks: runs of equal cells in a row, joined with the same runs in the following rows."""
+    """Divide a mask into blocks. A block is a run of equal cells in a row that repeats in the following rows."""
     blocks: list[Block] = []
     first_row: dict[tuple[int, int, int], int] = {}
     for row in range(len(grid.cells) + 1):
@@ -135,18 +135,18 @@ def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
 
 
 def _row_runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Return first column, width, and value of each run of equal cells in a row; without runs of value 0 or less."""
+    """Return first column, width, and value of each run of equal cells above 0 in a row."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(cells)) + 1, [len(cells)])).tolist()
     return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
 
 
 Filter = Literal["keepout", "speed"]
-"""Kind of a costmap filter."""
+"""Kind of costmap filter: KeepoutFilter or SpeedFilter of Nav2."""
 
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """Enabled zones and masks, in the map frame. `speed` contains pairs of a polygon and its speed limit in m/s."""
+    """Enabled zones and masks, in the map frame. `speed` contains pairs of a polygon and its limit in m/s."""
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
-"""Values of cells."""
+"""Values of cells. Values between FREE and OCCUPIED are probabilities of occupancy in percent."""
 
 MAX_CELLS = 2**24
 """Maximum number of cells of a map that `refined` returns."""
@@ -39,9 +39,9 @@ class OccupancyGrid:
         return self.cells.shape[0], self.cells.shape[1]
 
     def refined(self, max_cell_size: float) -> OccupancyGrid:
-        """Return the map with cells that are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
+        """Split the cells so that they are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
 
-        Each cell is split into equal cells of the same value.
+        Return a map in which the parts of a cell have the value of the cell.
         """
         rows, columns = self.shape
         max_parts = math.isqrt(MAX_CELLS // max(1, rows * columns))
@@ -49,7 +49,7 @@ class OccupancyGrid:
         return self if parts <= 1 else _split(self, parts)
 
     def cell_of(self, points: Array) -> npt.NDArray[np.int64]:
-        """Return the cells (n, 2), as (row, column), at map points (n, 2). Cells can lie outside the grid."""
+        """Return the cells (n, 2), as (row, column), at points (n, 2) in the map frame, also outside the grid."""
         local = self.origin.inverse().apply(points) / self.resolution
         return np.floor(local[:, ::-1]).astype(np.int64)
 
@@ -58,12 +58,12 @@ class OccupancyGrid:
         return self.origin.apply((cells[:, ::-1].astype(np.float64) + 0.5) * self.resolution)
 
     def inside(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Return a mask (n,) of the cells (n, 2) that lie on the grid."""
+        """Return a mask (n,) of the cells (n, 2), given as (row, column), that lie inside the grid."""
         result: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < self.shape), axis=1)
         return result
 
     def values_at(self, points: Array) -> npt.NDArray[np.int8]:
-        """Return the cell values (n,) at map points (n, 2); UNKNOWN outside the grid."""
+        """Return the cell values (n,) at points (n, 2) in the map frame; UNKNOWN outside the grid."""
         cells = self.cell_of(points)
         values = np.full(len(points), UNKNOWN, dtype=np.int8)
         known = self.inside(cells)

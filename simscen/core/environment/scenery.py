@@ -1,4 +1,4 @@
-"""Data that replay pages and pictures of a run show: objects, places, ramps, floors, zones, and map of the world."""
+"""Visible parts of the world for replay pages and pictures of a run: objects, places, ramps, floors, zones, map."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class DrivableSurface:
 
 @dataclass(frozen=True)
 class FrictionRegion:
-    """Region whose floor does not have the default friction of 1 (rubber on dry concrete) at the start of the run."""
+    """Region with a floor friction other than the default of 1 (rubber on dry concrete) at the start of the run."""
 
     region: str
     outline: Polygon
@@ -62,8 +62,8 @@ class FrictionRegion:
 class FilterZone:
     """Zone or mask of a costmap filter at the start of the run.
 
-    A zone has a `region` and an `outline`. A mask has `cells`. `speed_limit` is in m/s; 0 for none. `robot` is the name
-    of the robot that uses the filter.
+    A zone has a `region` (its name) and an `outline`; a mask has `cells`. `speed_limit` is in m/s; 0 for none. `robot`
+    is the name of the robot that uses the filter.
     """
 
     filter: Filter
@@ -109,8 +109,8 @@ class CompressedGrid:
 class Scenery:
     """Visible parts of the world at the start of a run.
 
-    `places` are named poses, and `zones` are zones and masks of costmap filters. `map` is the map of the world; None if
-    it is the same as the map of the robot.
+    `places` are named poses, `things` are movable objects, and `zones` are zones and masks of costmap filters. `map` is
+    the map of the world; None if it is the same as the map of the robot.
     """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)

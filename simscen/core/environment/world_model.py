@@ -1,4 +1,4 @@
-"""Data of a world: solids, bodies, named places, map, friction of the floor, and pedestrians."""
+"""Data of a world: fixed solids, movable bodies, places, regions, doors, floor friction, map, and pedestrians."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class World:
         doors: Closed pose and open pose of each door panel, by the name of its body.
         friction: Friction coefficient of the floor by name of region; 1 elsewhere.
         bounds: (min x, min y, max x, max y) in m.
-        has_open_ground: Whether the level ground reaches beyond `bounds`.
+        has_open_ground: Whether the level ground continues beyond `bounds`.
         grid: ROS map that the world was loaded from; None for other worlds.
         notes: Warnings of the importer, with file and element.
     """
@@ -50,9 +50,9 @@ class World:
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """World with the data that are computed once for all its runs.
+    """World with its `mesh` of all fixed solids, and its `map`: the occupancy grid that robots receive.
 
-    `mesh` contains all fixed solids. `map` is the occupancy grid that robots receive.
+    All runs in a world share these data.
     """
 
     world: World
@@ -61,7 +61,7 @@ class BuiltWorld:
 
 
 DISC_CORNERS = 32
-"""Number of corners of the polygon that approximates a disc."""
+"""Number of corners of a polygon that approximates a disc."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
 
 
 Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "threatening"]
-"""Reaction of a pedestrian to the robot, with the names of HuNavSim."""
+"""Reaction of a pedestrian to robots, with the names of HuNavSim."""
 Ignorable = Literal["robots", "people", "objects"]
 """Obstacles that a pedestrian can ignore; "people" are other pedestrians."""
 Repeat = Literal["once", "loop", "back_and_forth"]
-"""Order in which a pedestrian walks to its goals."""
+"""Whether a pedestrian stops at its last goal, returns to the first one, or reverses the order."""
 
 PEDESTRIAN_HEIGHT_M = 1.7
 """Default height of the upright cylinder that represents a pedestrian."""

@@ -13,7 +13,7 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""Recovery behavior with Nav2's name. Only simscen has `retrace`: drive back along the trail."""
+"""Recovery behavior with Nav2's name; except `retrace`, which drives back along the robot's own path."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
 """Reason for a new plan to the same goal.
@@ -59,13 +59,13 @@ class ErrorCode(IntEnum):
 
 
 _SINGLE_POSE_CODES = {code + 100: code for code in (*range(200, 209), *range(9000, 9004))}
-"""Codes of ComputePathToPose and NavigateToPose by the codes of the same errors of the …ThroughPoses actions."""
+"""Error codes of …ToPose actions, by the code of the same error of the …ThroughPoses action."""
 
 
 def error_code(number: int) -> ErrorCode | int:
-    """Return the member of ErrorCode with this number, or the number itself if there is none.
+    """Return the ErrorCode with this number, or the number itself if there is none.
 
-    Numbers of …ThroughPoses actions are replaced by the number of the same error of the …ToPose action.
+    An error of a …ThroughPoses action gets the code of the same error of the …ToPose action.
     """
     number = _SINGLE_POSE_CODES.get(number, number)
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
@@ -142,14 +142,14 @@ class Belief:
 
 
 Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
-"""Nav2's navigation actions: one goal at a time, all goals in one drive, or a list of waypoints with a stop at each."""
+"""Navigation action of Nav2: one goal at a time, all goals without a stop, or a list of waypoints with stops."""
 
 FAILED = "failed"
-"""Value of the YAML key `expect` of a goal that must fail with any error code."""
+"""Value of the YAML key `expect` for a goal that must fail, with any error code."""
 
 
 def loop_goal_name(name: str, loop: int) -> str:
-    """Return the name of a goal in a repetition of the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
+    """Return the name of a goal in a loop over the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
     return name if loop == 1 else f"{name}#{loop}"
 
 

@@ -1,4 +1,4 @@
-"""Sensor readings, and conversion of the readings of tilted sensors.
+"""Sensor readings, and their conversion to level scans and to the base frame.
 
 Each reading contains the name of its `sensor` in the robot file and the `tick` at which it was measured.
 """
@@ -84,7 +84,7 @@ class Imu:
     """Reading of an IMU: angular velocity (rad/s) and acceleration (m/s²) along x, y, z of the sensor frame.
 
     The acceleration of a sensor at rest is 1 g upwards. `mount` is the pose of the sensor frame in the base frame. The
-    variances are those of the white noise of each axis, without the bias; 0 if unknown, as in ROS.
+    variances describe the white noise of each axis, without the bias; 0 if unknown, as in ROS.
     """
 
     sensor: str
@@ -126,7 +126,7 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Height below which `level_scan` ignores hits on the floor. For a lidar below 0.1 m, it is half the lidar's height."""
+"""Minimum height of hits that `level_scan` uses; half the height of the lidar if that is lower."""
 MAX_HEIGHT_M = 2.0
 """Maximum height of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
 AT_BASE = Pose3()
@@ -138,7 +138,7 @@ def level_scan(scan: Scan) -> Scan:
 
     As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M or
     above MAX_HEIGHT_M are ignored. The range is inf if nothing was hit, and nan in directions without a usable beam.
-    The scan of a level lidar is returned unchanged.
+    A scan without `tilted_mount` is returned unchanged.
     """
     if scan.tilted_mount is None:
         return scan
@@ -159,7 +159,7 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Return the reading along the axes of the base frame, with the acceleration at the position of the sensor."""
+    """Rotate a reading to the axes of the base frame. It still applies to the position of the sensor."""
     if imu.mount == AT_BASE:
         return imu
     quaternion = imu.mount.quaternion
@@ -177,8 +177,8 @@ def _level_beams(
 ) -> tuple[float, float, Array, Array, Array]:
     """Return angle_min and angle_increment of the level scan, and three arrays (count,) for the tilted beams.
 
-    The arrays contain the index of the level beam in the same direction, and the horizontal and the vertical part of
-    the unit vector along the tilted beam. `first` and `increment` are the angles of the tilted beams in rad.
+    The arrays contain the index of the level beam in the same direction, and the horizontal and vertical components of
+    the unit vector along the tilted beam. The tilted beams have the angles `first` + k `increment` in rad.
     """
     rotation = mount.rotation()
     angles = first + increment * np.arange(count, dtype=np.float64)

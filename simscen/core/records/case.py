@@ -1,4 +1,4 @@
-"""Parts of a scenario that criteria need (Case), and a judged run with its recorded trace (Run)."""
+"""Input of the judge: the parts of a scenario that criteria need (Case). Its output: a judged run (Run)."""
 
 import math
 from collections.abc import Mapping
@@ -20,9 +20,9 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Passage:
-    """Narrow passage on the shortest path to a goal: a line between two static solids, which the path crosses.
+    """Narrow passage on the shortest path to a goal: a gap between two static solids.
 
-    `goal` is the name of the goal. `ends` are the ends of the line in m in the world frame. `between` contains the
+    `goal` is the name of the goal. `ends` are the two sides of the gap, in m in the world frame. `between` contains the
     names of the solids; "" for a solid without a name.
     """
 
@@ -32,12 +32,12 @@ class Passage:
 
     @property
     def width(self) -> float:
-        """Distance between the solids in m."""
+        """Width of the gap in m."""
         return math.dist(*self.ends)
 
     @property
     def middle(self) -> Point:
-        """Center of the line."""
+        """Center of the gap."""
         (ax, ay), (bx, by) = self.ends
         return (ax + bx) / 2, (ay + by) / 2
 
@@ -57,23 +57,23 @@ CLEARANCE_RANGE_M = 2.0
 
 @dataclass(frozen=True)
 class Case:
-    """Parts of a scenario that criteria need to judge its runs. The log of each run contains them.
+    """Parts of a scenario that criteria need to judge its runs. They are also written to the log of each run.
 
     Attributes:
         start: Start pose of the robot.
         goals: Goals of the scenario, in order.
-        shortest: Length in m, by goal name, of the shortest path from the previous goal or the start. The path is for a
-            disc of radius `inscribed_radius` in the static world; inf if there is no path.
+        shortest: Length in m of the shortest path to each goal from the previous goal or the start, by goal name; inf
+            if there is no path. It is the path of a disc of radius `inscribed_radius` in the static world.
         regions: Regions of the world by name.
         footprint: Footprint of the robot in the base frame; empty if unknown.
         inscribed_radius: Radius in m of the largest circle around the base that fits in the footprint.
         time_limit: Maximum simulated time of the run in s.
-        clearance_range: Distance in m up to which clearance is measured. Larger clearances are recorded as this value.
+        clearance_range: Measuring range of the clearance in m. Larger clearances are recorded as this value.
         disturbances: The events of the scenario, followed by its faults.
-        sent: Goals that events can send.
+        sent: Goals that events can send during the run.
         passages: Narrow passages on the shortest paths, in driving direction.
         masks: Filter masks that criteria refer to, by file name.
-        expected: Expected failures by goal name: "failed", or the name of an error code.
+        expected: Expected failure of goals, by goal name: "failed" for any failure, or the name of an error code.
     """
 
     start: Pose2
@@ -106,8 +106,8 @@ class Run:
         case: Parts of the scenario that the criteria used.
         log: MCAP file of the run; None if none was requested.
         stack: Facts that an external stack sent, such as its version; empty for the reference stack.
-        robots: For several robots, one run for each robot by name. `trace`, `case`, and `stack` of the run itself
-            are then those of the first robot.
+        robots: One run for each robot by name, if there are several robots. `trace`, `case`, and `stack` of the run
+            itself then belong to the first robot.
     """
 
     result: RunResult
@@ -137,7 +137,7 @@ class Run:
         return self.result.outcome.good
 
     def verdict(self, name: str) -> Verdict:
-        """Return the verdict with the id `name`, e.g. "path_length". Raises KeyError if there is none."""
+        """Return the verdict with the id `name`, e.g. "path_length". Raises KeyError if no verdict has this id."""
         found = {verdict.id: verdict for verdict in self.result.verdicts}
         if name not in found:
             raise KeyError(f"no criterion has the id {name!r}; there are: {', '.join(found)}")

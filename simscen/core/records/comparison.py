@@ -14,15 +14,15 @@ class OutcomeCounts:
 
     @property
     def decided(self) -> int:
-        """Number of completed runs."""
+        """Number of runs that were completed."""
         return self.passed + self.failed
 
 
 @dataclass(frozen=True)
 class Flip:
-    """Scenario and seed that passed with one of two stacks or sessions, and failed with the other.
+    """Pair of runs with the same scenario and seed, of which only one passed.
 
-    `passed` is the name of the stack or session that passed, and `failed` of the one that failed. `why` is the
+    `passed` and `failed` are the names of the stack or session of the passed and of the failed run. `why` is the
     criterion that failed.
     """
 
@@ -43,7 +43,7 @@ class MetricDifference:
         value: Mean of the metric for the stack or session.
         difference: `value` minus `baseline`.
         interval: 95 % confidence interval of the difference; None for too few pairs.
-        lower: Number of pairs in which the metric is lower than for the baseline. `equal` and `higher` are analogous.
+        lower: Number of pairs with a lower value than the baseline. `equal` and `higher` are analogous.
         p: P-value of Wilcoxon's signed-rank test.
     """
 
@@ -64,9 +64,9 @@ class MetricDifference:
 class ScenarioChange:
     """Significant change of the pass rate or of the mean of a metric, relative to the baseline.
 
-    `scenario` is a scenario or "all scenarios". `what` is "pass rate" or the name of a metric. `baseline` is the mean
-    for the baseline, and `value` the mean for the other stack or session. `p` is the p-value with Holm's adjustment for
-    multiple tests. `is_worse` is None for a metric without a better direction.
+    `scenario` is the id of a scenario or "all scenarios". `what` is "pass rate" or the name of a metric. `baseline` and
+    `value` are the means for the baseline and for the other stack or session. `p` is the p-value with Holm's adjustment
+    for multiple tests. `is_worse` is None for a metric without a better direction.
     """
 
     scenario: str
@@ -88,8 +88,8 @@ class BaselineComparison:
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
         unpaired_runs: Number of runs without a partner.
-        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Of the metrics of
-            these pairs, only `collisions` is compared.
+        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Only the metric
+            `collisions` is compared for these pairs.
         flips: Pairs in which only one run passed.
         p: P-value of the sign test of the flips.
         differences: Difference of each metric.

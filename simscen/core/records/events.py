@@ -1,4 +1,4 @@
-"""Recorded events of a run, disturbances (events and faults) of a scenario, and the kinds of targets of faults."""
+"""Recorded events of a run, scheduled events and faults of a scenario (disturbances), and targets of faults."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
 
 
 class EventKind(str, Enum):
-    """Kinds of recorded events. A comment beside each kind states the meaning of `Event.name` and `Event.data`."""
+    """Kinds of recorded events. The comment beside a kind describes its `Event.name`, then its `Event.data`."""
 
     GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
     GOAL_REACHED = "goal.reached"  # goal; index
@@ -47,7 +47,7 @@ class EventKind(str, Enum):
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 
     def __str__(self) -> str:
-        """Return the value, which logs contain."""
+        """Return the value, as it is written in logs."""
         return self.value
 
 
@@ -65,7 +65,7 @@ class Event:
 class Disturbance:
     """Event or fault that a scenario schedules.
 
-    `when` is the trigger in the words of the scenario; "" for a fault that is active from the start. If `required`, the
+    `when` is the trigger as text from the scenario; "" for a fault that is active from the start. If `required`, the
     run fails unless the disturbance takes place. `line` is the line in the scenario file; 0 if unknown. `after` is the
     index of the previous event in a sequence (`then`); None for other disturbances.
     """
@@ -90,8 +90,8 @@ class DisturbanceOutcome:
     """Outcome of a disturbance.
 
     `fired` contains the ticks at which the trigger fired. `happened` is True if the disturbance took effect. `effect`
-    is one line about the change, or about the reason for no change. `tick` is the tick of the first change, or of the
-    first attempt if nothing changed; None without an attempt.
+    describes the change, or the reason for no change. `tick` is the tick of the first change, or of the first attempt
+    if nothing changed; None without an attempt.
     """
 
     disturbance: Disturbance
@@ -107,16 +107,16 @@ class DisturbanceOutcome:
 
 
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
-"""Classes of sensor readings, in core.messages.sensor_data, that faults can change."""
+"""Kinds of fault targets that are sensors: names of the classes of their readings in core.messages.sensor_data."""
 COMMAND = "Command"
-"""Target kind `cmd_vel`: velocity commands from the stack to the base."""
+"""Kind of the fault target `cmd_vel`: velocity commands from the stack to the base."""
 WHEELS = "Wheels"
-"""Target kind `wheels`: the motion that the motors execute, and the motion that odometry measures."""
+"""Kind of the fault target `wheels`: the motion that the motors execute, and the motion that odometry measures."""
 BELIEF = "Belief"
-"""Target kind `localizer`: the estimated pose that the navigator receives."""
+"""Kind of the fault target `localizer`: the estimated pose that the navigator receives."""
 MAP = "Map"
-"""Target kind `map`: the map that the stack receives."""
+"""Kind of the fault target `map`: the map that the stack receives."""
 KIND_BY_TARGET_NAME = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
-"""Target kinds of faults by name in a scenario. A sensor of the same name takes precedence."""
+"""Kinds of fault targets by name in a scenario. A sensor of the same name takes precedence."""
 FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_TARGET_NAME.values())
-"""All kinds of targets that a fault can have in its attribute `affects`."""
+"""All kinds of fault targets. The attribute `affects` of a fault contains some of them."""

@@ -26,9 +26,9 @@ class Outcome(str, Enum):
 
 
 REPEAT_SUFFIX = "again"
-"""Suffix of `RunKey.stack_name` for a repeated run."""
+"""Suffix of `RunKey.stack_name` for the repetition of a run."""
 _SEPARATOR = "@"
-"""Separator of variation and stack in folder names."""
+"""Separator between variation and stack in folder names."""
 
 
 @total_ordering
@@ -36,9 +36,9 @@ _SEPARATOR = "@"
 class RunKey:
     """Identifies a run in a session.
 
-    `scenario` is the id of the scenario. `variation` and `stack_name` are "" if there is only one. Each run can be
-    repeated to check that it is deterministic; `stack_name` of the repetition ends with REPEAT_SUFFIX. Keys are ordered
-    by scenario, variation, seed, and stack.
+    `scenario` is the id of the scenario. `variation` and `stack_name` are "" if there is only one. A run can be
+    repeated to check that it is deterministic; the `stack_name` of the repetition ends with REPEAT_SUFFIX. Keys are
+    ordered by scenario, variation, seed, and stack.
     """
 
     scenario: str
@@ -55,7 +55,7 @@ class RunKey:
 
     @property
     def test(self) -> str:
-        """Scenario id, with the variation in brackets as in pytest. The option `-k` selects runs by this name."""
+        """Scenario id with the variation in brackets, as in pytest. The option `-k` selects runs by this name."""
         return scenario_title(self.scenario, self.variation)
 
     @property
@@ -108,7 +108,7 @@ class RunResult:
 
     Attributes:
         path: Scenario file relative to the root, the folder that contains all files of a scenario.
-        verdicts: Verdicts of required events and faults that did not take place, followed by the criteria's verdicts.
+        verdicts: Verdicts of required disturbances that did not take place, then the verdicts of the criteria.
         lines: Line of each verdict in the scenario file, in the same order; 0 if unknown. Empty if all are unknown.
         metrics: Value of each metric; None if the metric is undefined for the run.
         undefined: Reason for each metric that is None.
@@ -118,8 +118,8 @@ class RunResult:
         simulated: Simulated time in s.
         tick_rate: Ticks per second.
         error: Reason why the run could not be completed; None for other outcomes than ERROR.
-        stack: Value of the option --stack, with files relative to the root; "" for the stack of the scenario.
-        reason: Reason in the scenario for an expected failure or for skipping the run.
+        stack: Value of the option --stack, with file paths relative to the root; "" for the stack of the scenario.
+        reason: Reason that the scenario states for an expected failure or for skipping the run.
     """
 
     key: RunKey

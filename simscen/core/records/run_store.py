@@ -1,4 +1,4 @@
-"""Compressed storage in memory for the results of many runs, as a list and by key."""
+"""Compressed in-memory storage for the results of many runs: a list, and a mapping by run key."""
 
 import pickle
 import sys
@@ -10,14 +10,11 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 
 MAX_UNCOMPRESSED = 2000
-"""Number of results that a store keeps uncompressed."""
+"""Number of results, from the first one on, that a store keeps uncompressed."""
 
 
 class RunStore(Sequence[RunFinished]):
-    """List of results. After the first MAX_UNCOMPRESSED results, further ones are stored in compressed form.
-
-    A compressed result is decompressed each time it is read.
-    """
+    """List of results. Results after the first MAX_UNCOMPRESSED are compressed, and decompressed at each access."""
 
     def __init__(self, runs: Iterable[RunFinished] = ()) -> None:
         self._entries: list[RunFinished | bytes] = []
@@ -83,14 +80,14 @@ class RunStore(Sequence[RunFinished]):
 
 
 class FinishedRuns(Mapping[RunKey, RunFinished]):
-    """Newest result of each run, by key."""
+    """Newest result of each run by key. `store` contains all results, in the order in which they were added."""
 
     def __init__(self) -> None:
         self._index: dict[RunKey, int] = {}
         self.store = RunStore()
 
     def add(self, key: RunKey, run: RunFinished) -> None:
-        """Add the result of a run, or replace it."""
+        """Add the newest result of a run."""
         self._index[key] = len(self.store)
         self.store.append(run)
 

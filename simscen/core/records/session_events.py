@@ -1,4 +1,4 @@
-"""Events of a session (one call of `simscen run`), from which reports are made."""
+"""Events that a session (one call of `simscen run`) emits. All reports are made from these events."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ class Artifacts:
 
 @dataclass(frozen=True)
 class SessionStarted:
-    """First event of a session.
+    """First event of a session, with its plan.
 
     Attributes:
         version: Version of simscen.
@@ -80,7 +80,7 @@ class RunFinished:
     Attributes:
         wall: Wall time of the run in s.
         artifacts: Output files.
-        again: Command that repeats the run in the working folder; "" if it is the same as `result.again`.
+        again: Command that repeats the run from the working folder; "" if it is the same as `result.again`.
         file: Path of the scenario, relative to the working folder; "" if it is the same as `result.path`.
         tags: Tags of the scenario.
         warnings: Warnings of the external stack.
@@ -141,3 +141,4 @@ class SessionFinished:
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished
 Listener = Callable[[SessionEvent], None]
+"""Function that is called with each event of a session, such as a reporter."""

@@ -12,7 +12,7 @@ from simscen.core.records.run_result import RunKey
 
 
 class ClaimStatus(str, Enum):
-    """Decision on a claim. BLOCKED: no decision is possible, because some runs could not be completed."""
+    """Decision on a claim. HELD: the claim is accepted. BLOCKED: runs that were not completed prevent a decision."""
 
     HELD = "held"
     REFUTED = "refuted"
@@ -30,7 +30,7 @@ class ClaimResult:
         confidence: Minimum probability, for example 0.95, that a decision for the claim is right.
         max_runs: Maximum number of runs.
         status: Decision on the claim.
-        passed: Number of passed runs among `runs`.
+        passed: Number of runs that passed, out of `runs`.
         runs: Number of runs that decide the claim.
         errors: Number of runs that could not be completed.
         limits: Lower and upper confidence limit of the pass rate. Each limit holds with the probability `confidence`;
@@ -102,9 +102,9 @@ class Study:
         limits: 95 % confidence interval of the pass rate; None if the values are not random.
         rates: Pass rate by value of each varied parameter.
         effects: Association of parameters with margins, strongest first.
-        worst: Run, smallest margin, and unit of the margin, by criterion.
+        worst: Run with the smallest margin, this margin, and its unit, by criterion.
         values: Values of the varied parameters, by run and then by YAML path.
-        coverage: Fraction of the possible pairs of values of two parameters that were run; None for random values.
+        coverage: Fraction of all pairs of values of two parameters that occur in a run; None for random values.
         accepted: Fraction of the drawn values that met the condition `require`; None without such a condition.
     """
 

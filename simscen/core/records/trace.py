@@ -29,7 +29,7 @@ else:
 
 
 class Truth(NamedTuple):
-    """True state of the robot: `pose` of its base in the world frame, `twist` in the base frame.
+    """Sample of the ground truth: `pose` of the robot's base in the world frame, `twist` in the base frame.
 
     `clearance` is the distance in m from the robot to the nearest obstacle, up to the measuring range; negative if they
     overlap. `objects` contains the poses of movable objects in the world frame, by name.
@@ -67,7 +67,7 @@ class CostGrid(NamedTuple):
 
 @fast_dataclass(eq=False)
 class Decision:
-    """Output of the stack at one beat: the velocity `command` in the base frame, and published messages.
+    """Output of the stack at one beat: the velocity `command` in the base frame, and new messages.
 
     Attributes without a new message are None or empty. `belief` is the pose estimate, `lines` are log messages, and
     `odometry` is the output of the odometry filter.
@@ -87,8 +87,8 @@ class Decision:
 class Moment:
     """Everything that is recorded at one beat.
 
-    `sample` is the ground truth; None at beats without a sample. `readings` are the readings that the stack received,
-    with faults applied. `events` are the events of the world and the scenario, without the events of the stack.
+    `sample` is the ground truth; None if no sample is due. `readings` are the readings that the stack received, with
+    faults applied. `events` are the events of the world and the scenario; `decision` contains the events of the stack.
     """
 
     tick: int
@@ -99,14 +99,14 @@ class Moment:
 
     @property
     def truth(self) -> Truth | None:
-        """The ground truth; None at beats without a sample."""
+        """The ground truth; None if no sample was due."""
         sample = self.sample
         return sample if sample is None or isinstance(sample, Truth) else sample.truth()
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Recording of a whole run. Samples have the tick of the beat at which they were received.
+    """Recording of a whole run. The tick of a sample is the beat at which it was received.
 
     Attributes:
         tick_rate: Ticks per second.
@@ -164,7 +164,7 @@ class Samples:
     def at(self, ticks: Ticks) -> Array:
         """Return the values (m, k) of the newest sample at each of the `ticks` (m,).
 
-        At ticks before the first sample, return the first sample.
+        The first sample is used for ticks before it.
         """
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
 

@@ -66,7 +66,7 @@ class Verdict:
 
     @property
     def tightest(self) -> Finding | None:
-        """Of the findings with the status of the verdict, the one with the smallest margin; None without findings."""
+        """Finding with the smallest margin among the findings with the status of the verdict; None without findings."""
         deciding = [f for f in self.findings if f.status is self.status]
         return min(deciding, key=lambda f: f.margin if f.margin is not None else float("inf"), default=None)
 
@@ -114,8 +114,8 @@ POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
 class LogCoverage:
     """Evidence that a log lacks, with the reason for each.
 
-    `missing` evidence is not in the log. `partial` evidence is in the log only for a part of the time. Only in logs of
-    other recorders may signals be irregular or not finite; `recorded_by_simscen` is then False.
+    `missing` evidence is not in the log. `partial` evidence covers only a part of the time. Logs of other recorders
+    (`recorded_by_simscen` is False) can contain irregular signals and values that are not finite.
     """
 
     missing: Mapping[Evidence, str] = field(default_factory=dict)
@@ -127,9 +127,9 @@ class LogCoverage:
         return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
 
     def with_gaps(self, gaps: Mapping[Evidence, str]) -> "LogCoverage":
-        """Return the coverage with additional partial evidence. `gaps` contains the reasons."""
+        """Return a copy with additional `partial` evidence. `gaps` contains the reasons."""
         return replace(self, partial={**gaps, **self.partial})
 
 
 COMPLETE_COVERAGE = LogCoverage()
-"""Coverage of a log in which nothing is missing."""
+"""Coverage of a log that lacks nothing."""
