@@ -21,7 +21,8 @@ from simscen.cli.main import main
 simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 main()
 """
-LIMIT_S = 10.0
+WALL_LIMIT_S = 3
+"""Wall limit of the runs that never end. The other runs have the default limit."""
 
 
 class Case(NamedTuple):
@@ -39,14 +40,6 @@ CASES = [
     Case(53, "SIGKILL", "sigkill.at.0", "crashed", r"killed \(SIGKILL; possibly out of memory; peak memory \d+ MiB"),
     Case(54, "exit 0", "exit-0.at.0", "crashed", "^exited 0 without a result"),
     Case(55, "sys.exit(0)", "sys-exit.at.0", "crashed", r"^exited 0 by itself \(\w+.py:\d+\)"),
-    Case(
-        56,
-        "a loop in C",
-        "spin.at.0",
-        "timeout",
-        r"^stopped after 1[0-3] s of wall time, in spin \(\w+.py:\d+\)",
-    ),
-    Case(57, "ignores SIGTERM", "deaf.at.0", "timeout", r"^stopped after 1[0-4] s of wall time, in ignore_sigterm"),
     Case(58, "memory in Python", "memory.at.0", "out-of-memory", "exceeded its memory limit"),
     Case(58, "memory in C", "swell.at.0", "crashed", r"^crashed: SIGABRT, in leak .*peak memory \d+ MiB of 4096 MiB"),
     Case(59, "a grandchild", "grandchild.at.0", "crashed", "left a process behind"),
@@ -75,6 +68,11 @@ CASES = [
     Case(66, "no fault", "fine", "", ""),
     Case(66, "no fault, another run", "fine-too", "", ""),
 ]
+ENDLESS = [
+    Case(56, "a loop in C", "spin.at.0", "timeout", r"^stopped after \d+ s of wall time, in spin \(\w+.py:\d+\)"),
+    Case(57, "ignores SIGTERM", "deaf.at.0", "timeout", r"^stopped after \d+ s of wall time, in ignore_sigterm"),
+]
+"""Faults of runs that never end."""
 SPAWN_LID = """\
 events:
   - when: {time: 0.1}
@@ -94,17 +92,23 @@ class Session(NamedTuple):
 @pytest.fixture(scope="session")
 def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Session:
     home = tmp_path_factory.mktemp("faults")
+    blocked = texts["a.scenario.yaml"].replace(
+        "goals: [{pose: {x: 1.5, y: 1}}]", "goals: [{pose: {x: 3, y: 1}, timeout: 6 s}]"
+    )
+    (home / "63-shut.scenario.yaml").write_text(blocked + SPAWN_LID)
+    return run_cases(home, texts, CASES)
+
+
+def run_cases(home: Path, texts: dict[str, str], cases: list[Case], *options: str) -> Session:
+    """Run a scenario for each case, and the scenarios that are in the folder `home` already, in one session."""
     for name in ("room.world.yaml", "cube.robot.yaml"):
         (home / name).write_text(texts[name])
-    text = texts["a.scenario.yaml"]
-    for case in CASES:
-        tagged = text.replace("seed: 7", f"seed: 7\ntags: [{case.fault}]")
+    for case in cases:
+        tagged = texts["a.scenario.yaml"].replace("seed: 7", f"seed: 7\ntags: [{case.fault}]")
         if case.number == 64:
             tagged += "stack: {localizer: {type: scan_matching_amcl, max_particles: 500}}\n"
         (home / f"{case.number}-{case.fault}.scenario.yaml").write_text(tagged)
-    blocked = text.replace("goals: [{pose: {x: 1.5, y: 1}}]", "goals: [{pose: {x: 3, y: 1}, timeout: 6 s}]")
-    (home / "63-shut.scenario.yaml").write_text(blocked + SPAWN_LID)
-    command = [sys.executable, "-c", WITH_FAULTS, "run", ".", "--out", "out", "-j", "2", "--wall-limit", str(LIMIT_S)]
+    command = [sys.executable, "-c", WITH_FAULTS, "run", ".", "--out", "out", "-j", "2", *options]
     done = subprocess.run(command, cwd=home, capture_output=True, text=True, timeout=300, check=False)
     assert done.stderr == ""
     runs = json.loads((home / "out/results.json").read_text())["runs"]
@@ -114,12 +118,23 @@ def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.number} {case.name}")
 def test_fault_of_a_worker_is_reported_with_its_type(session: Session, case: Case) -> None:
+    assert_outcome_of_fault(session, case)
+
+
+def assert_outcome_of_fault(session: Session, case: Case) -> None:
     run = session.runs[f"{case.number}-{case.fault}"]
     if not case.kind:
         assert (run["outcome"], run["error"]) == ("passed", None)
         return
     assert (run["outcome"], run["error"]["kind"]) == ("error", case.kind)
     assert re.search(case.words, run["error"]["message"])
+
+
+def test_56_57_run_that_never_ends_is_stopped_at_its_wall_limit(tmp_path: Path, texts: dict[str, str]) -> None:
+    session = run_cases(tmp_path, texts, ENDLESS, "--wall-limit", str(WALL_LIMIT_S))
+    assert session.code == 3
+    for case in ENDLESS:
+        assert_outcome_of_fault(session, case)
 
 
 def test_63_unreachable_goal_is_a_failure_not_an_error(session: Session) -> None:

@@ -47,24 +47,26 @@ class RunTimes(NamedTuple):
 class PatrolTimes:
     """CPU times in s of runs of PATROL. The names of the fields are keys of the JSON output.
 
-    simulated:      simulated time of a run in s
-    cpu, cpus:      CPU time of a run: median, and value of each round
-    parts, parted:  CPU time of each part of a run by name: median, and value of each round
-    bare, bares:    CPU time of the PyBullet baseline with the same steps and scans: median, and value of each round
+    simulated: simulated time of a run in s
+    cpu:       CPU time of a run
+    parts:     CPU time of each part of a run by name
+    baseline:  CPU time of the PyBullet baseline with the same steps and scans
+
+    `cpu`, `parts`, and `baseline` are medians. The fields `…_rounds` have the value of each round.
     """
 
     simulated: float
     cpu: float
     parts: dict[str, float]
-    bare: float
-    cpus: tuple[float, ...]
-    bares: tuple[float, ...]
-    parted: dict[str, tuple[float, ...]]
+    baseline: float
+    cpu_rounds: tuple[float, ...]
+    baseline_rounds: tuple[float, ...]
+    part_rounds: dict[str, tuple[float, ...]]
 
     @property
     def ratios(self) -> tuple[float, ...]:
         """CPU time of the run divided by that of the PyBullet baseline, for each round."""
-        return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
+        return tuple(cpu / baseline for cpu, baseline in zip(self.cpu_rounds, self.baseline_rounds, strict=True))
 
     @property
     def ratio(self) -> float:
@@ -81,15 +83,15 @@ class PatrolTimes:
 class ObstacleFieldTimes:
     """CPU times of a scan in ms and of a physics step in µs among `obstacles` cylinders.
 
-    `scan_ms` and `step_us` are measured with one mesh of all cylinders, as in simscen. `bare_scan_ms` and
-    `bare_step_us` are measured in PyBullet with a body for each cylinder.
+    `scan_ms` and `step_us` are measured with one mesh of all cylinders, as in simscen. `baseline_scan_ms` and
+    `baseline_step_us` are measured in PyBullet with a body for each cylinder.
     """
 
     obstacles: int
     scan_ms: float
     step_us: float
-    bare_scan_ms: float
-    bare_step_us: float
+    baseline_scan_ms: float
+    baseline_step_us: float
 
 
 def no_progress(_: str) -> None:
@@ -100,17 +102,20 @@ def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress)
     """Measure `rounds` runs of PATROL and of its baseline, and then the parts of further runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     simulated = time_run(prepared).simulated  # the first run pays for imports and caches
-    cpus, bares = list[float](), list[float]()
+    cpu_rounds, baseline_rounds = list[float](), list[float]()
     for number in range(rounds):
         report_progress(f"patrol, round {number + 1} of {rounds}")
-        cpus.append(time_run(prepared).cpu)
-        bares.append(time_baseline_patrol(prepared, simulated))
-    cpu = statistics.median(cpus)
+        cpu_rounds.append(time_run(prepared).cpu)
+        baseline_rounds.append(time_baseline_patrol(prepared, simulated))
+    cpu = statistics.median(cpu_rounds)
     report_progress("parts of the patrol")
-    part_rounds = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
-    parted = {name: tuple(parts[name] for parts in part_rounds) for name in part_rounds[0]}
-    parts = {name: statistics.median(times) for name, times in parted.items()}
-    return PatrolTimes(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
+    measured = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
+    part_rounds = {name: tuple(parts[name] for parts in measured) for name in measured[0]}
+    return PatrolTimes(
+        simulated, cpu, parts={name: statistics.median(times) for name, times in part_rounds.items()},
+        baseline=statistics.median(baseline_rounds), cpu_rounds=tuple(cpu_rounds),
+        baseline_rounds=tuple(baseline_rounds), part_rounds=part_rounds,
+    )  # fmt: skip
 
 
 def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
@@ -191,8 +196,8 @@ def measure_obstacle_field(obstacles: int) -> ObstacleFieldTimes:
         obstacles,
         scan_ms=1e3 * _cpu_per_call(lambda: rays.cast(origins, directions), 200),
         step_us=1e6 * _cpu_per_call(lambda: merged.step(1), 2000),
-        bare_scan_ms=1e3 * _cpu_per_call(lambda: separate.scan(planar, 0.12, 30.0, height), 10),
-        bare_step_us=1e6 * _cpu_per_call(lambda: separate.step(1), 500),
+        baseline_scan_ms=1e3 * _cpu_per_call(lambda: separate.scan(planar, 0.12, 30.0, height), 10),
+        baseline_step_us=1e6 * _cpu_per_call(lambda: separate.step(1), 500),
     )
     merged.close()
     separate.close()

@@ -41,18 +41,18 @@ MILLISECONDS, MEGABYTES = "ms", "MB"
 class Overhead:
     """Overhead of runs, with one value for each round. The names of the fields are keys of the JSON output.
 
-    run:        CPU time in ms of a run of SHORT_RUN_S in this process
-    outside:    CPU time in ms of the same run outside the simulation: setup, start and end of the log, verdicts
-    process:    CPU time in ms of such a run in its own process, from the fork on, including its picture
-    wall:       wall time in ms of the run in its own process
-    memory:     maximum memory in MB of the run in its own process
-    preparing:  CPU time in ms for preparing the scenario: world, map, and shortest paths
-    start:      CPU time in ms for importing the modules of the fork server
-    validate:   CPU time in ms of `simscen validate`
+    run:       CPU time in ms of a run of SHORT_RUN_S in this process
+    outside_simulation: the part of `run` outside the simulation, in ms: setup, log file, and verdicts
+    process:   CPU time in ms of such a run in its own process, from the fork on, including its picture
+    wall:      wall time in ms of the run in its own process
+    memory:    maximum memory in MB of the run in its own process
+    preparing: CPU time in ms for preparing the scenario: world, map, and shortest paths
+    start:     CPU time in ms for importing the modules of the fork server
+    validate:  CPU time in ms of `simscen validate`
     """
 
     run: tuple[float, ...]
-    outside: tuple[float, ...]
+    outside_simulation: tuple[float, ...]
     process: tuple[float, ...]
     wall: tuple[float, ...]
     memory: tuple[float, ...]
@@ -65,7 +65,7 @@ class Overhead:
         """Median of each field by printed name."""
         return {
             f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, MILLISECONDS),
-            "of that outside the simulation": Measurement.of(self.outside, MILLISECONDS),
+            "of that outside the simulation": Measurement.of(self.outside_simulation, MILLISECONDS),
             "the same as a process": Measurement.of(self.process, MILLISECONDS),
             "the same as a process, wall time": Measurement.of(self.wall, MILLISECONDS),
             "preparing a scenario": Measurement.of(self.preparing, MILLISECONDS),
@@ -125,7 +125,7 @@ def measure_overhead(
         measured = ends[1:]  # the first run includes the import of the engines
         return Overhead(
             run=tuple(whole for whole, _ in durations),
-            outside=tuple(whole - simulated for whole, simulated in durations),
+            outside_simulation=tuple(whole - simulated for whole, simulated in durations),
             process=tuple(1e3 * end.cpu for end in measured),
             wall=tuple(1e3 * end.wall for end in measured),
             memory=tuple(end.peak_bytes / 1e6 for end in measured),
@@ -173,7 +173,7 @@ class SuiteResult:
     wall:       wall time of the session in s
     cpu:        CPU time of all runs in s
     memory:     maximum memory of the process of each run in MB
-    bare:       CPU time in s of the PyBullet baseline per simulated second
+    baseline:   CPU time in s of the PyBullet baseline per simulated second
     """
 
     runs: int
@@ -183,12 +183,12 @@ class SuiteResult:
     wall: float
     cpu: float
     memory: tuple[float, ...]
-    bare: float
+    baseline: float
 
     @property
     def figures(self) -> Measurements:
         """All figures of the suite by printed name."""
-        baseline_s = self.bare * self.simulated
+        baseline_s = self.baseline * self.simulated
         return {
             "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
             "suite: wall time": Measurement(self.wall, "s"),
@@ -239,7 +239,7 @@ def measure_suite(
         wall=wall,
         cpu=sum(end.cpu for end in ends),
         memory=tuple(end.peak_bytes / 1e6 for end in ends),
-        bare=statistics.mean(baselines) / BASELINE_DURATION_S,
+        baseline=statistics.mean(baselines) / BASELINE_DURATION_S,
     )
 
 

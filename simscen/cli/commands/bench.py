@@ -127,7 +127,7 @@ def suite_command(
 
 def suite_text(suite: "SuiteResult") -> str:
     """Return the printed lines about a suite: wall time, CPU time, and memory."""
-    figures, baseline = suite.figures, suite.bare * suite.simulated
+    figures, baseline = suite.figures, suite.baseline * suite.simulated
     duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([
         f"{suite.runs} runs, {duration}",
@@ -212,11 +212,11 @@ def _patrol_figures(patrol: "PatrolTimes") -> Measurements:
     scale, unit = 1e3 / patrol.simulated, "ms per simulated second"
     return {
         "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
-        "patrol": Measurement.of([scale * cpu for cpu in patrol.cpus], unit),
-        "PyBullet alone": Measurement.of([scale * baseline for baseline in patrol.bares], unit),
+        "patrol": Measurement.of([scale * cpu for cpu in patrol.cpu_rounds], unit),
+        "PyBullet alone": Measurement.of([scale * baseline for baseline in patrol.baseline_rounds], unit),
         **{
             name: Measurement.of([scale * seconds for seconds in rounds], unit)
-            for name, rounds in patrol.parted.items()
+            for name, rounds in patrol.part_rounds.items()
         },
     }
 
@@ -237,10 +237,10 @@ def _patrol_lines(patrol: "PatrolTimes", rounds: int) -> list[str]:
     return [
         f"patrol of {patrol.simulated:g} s, all features, one core",
         f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
-        f"  {ratio} ({patrol.bare:.2f} s; {spread})",
+        f"  {ratio} ({patrol.baseline:.2f} s; {spread})",
         f"    {'':{width}}  share   ms per simulated second   times PyBullet alone",
         *(
-            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:25.2f} {s / patrol.bare:22.2f}"
+            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:25.2f} {s / patrol.baseline:22.2f}"
             for n, s in shares
         ),
     ]
@@ -257,8 +257,8 @@ def _field_lines(fields: "list[ObstacleFieldTimes]") -> list[str]:
         "a scan of 720 beams and a physics step among cylinders",
         "    obstacles      scan   PyBullet alone      step   PyBullet alone",
         *(
-            f"    {f.obstacles:9} {f.scan_ms:6.2f} ms {f.bare_scan_ms:13.2f} ms"
-            f" {f.step_us:6.0f} µs {f.bare_step_us:13.0f} µs"
+            f"    {f.obstacles:9} {f.scan_ms:6.2f} ms {f.baseline_scan_ms:13.2f} ms"
+            f" {f.step_us:6.0f} µs {f.baseline_step_us:13.0f} µs"
             for f in fields
         ),
     ]

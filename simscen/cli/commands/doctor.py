@@ -125,7 +125,7 @@ def check_speed() -> str:
         from simscen.bench.speed import run_speed
 
         patrol = run_speed.measure_patrol(1)
-    ratio = f"{patrol.cpu / patrol.bare:.1f} times the cost of PyBullet alone"
+    ratio = f"{patrol.cpu / patrol.baseline:.1f} times the cost of PyBullet alone"
     result = f"{patrol.factor:.0f} times real time on one core, {ratio}"
     if patrol.factor < MIN_REAL_TIME_FACTOR:
         raise CheckFailed(f"{result}; use a faster processor, or one that is not shared with other containers")

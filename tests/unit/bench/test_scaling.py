@@ -44,7 +44,7 @@ def test_sample_of_a_large_suite_is_evenly_spaced():
 
 
 def test_suite_time_is_compared_with_pybullet_for_the_same_simulated_time():
-    suite = SuiteResult(60, (), 2, simulated=1200.0, wall=20.0, cpu=36.0, memory=(100.0, 120.0, 300.0), bare=0.0075)
+    suite = SuiteResult(60, (), 2, simulated=1200.0, wall=20.0, cpu=36.0, memory=(100.0, 120.0, 300.0), baseline=0.0075)
     figures = {name: figure.value for name, figure in suite.figures.items()}
     assert figures["suite: runs a minute"] == 180.0
     assert figures["suite: wall time, times PyBullet alone on one core"] == pytest.approx(20 / 9)

@@ -89,6 +89,7 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) 
     assert "variations" not in shrunk
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("options", "message"),
     [

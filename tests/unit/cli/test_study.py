@@ -25,7 +25,7 @@ pass: [{{clearance: {{min: 1 m}}}}]
 RANDOM = """\
 variations:
   sampled:
-    count: 40
+    count: 24
     values:
       robot.pose.x: {uniform: [0.8 m, 2 m]}
       robot.motor_torque: {uniform: [0.5, 1]}
@@ -56,7 +56,7 @@ def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> Non
     xs = [float(each["values"]["robot.pose.x"].removesuffix(" m")) for each in found["values"]]
     radius = 0.22 + 0.05  # of the robot, and half of the wall
     assert found["passed"] == pytest.approx(sum(x - radius >= 1.0 for x in xs), abs=1)  # it moves while it settles
-    assert found["passed"] + found["failed"] == 40
+    assert found["passed"] + found["failed"] == 24
     assert [each["seed"] for each in found["values"]] == [
         int(each["variation"].removeprefix("variation-")) for each in found["values"]
     ]
@@ -78,7 +78,7 @@ def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> Non
 
 
 def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
-    text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 9}}\n"
+    text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 5}}\n"
     for workers in (1, 2):
         study(tmp_path, text, "--out", f"out{workers}", "-j", workers)
     assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
@@ -151,10 +151,10 @@ def test_values_meet_the_conditions_and_their_share_is_reported(tmp_path: Path) 
     done = study(tmp_path, text, "--out", "out")
     assert done.returncode == 0, done.stderr
     found = results(tmp_path)["study"]
-    assert found["passed"] == 40
+    assert found["passed"] == 24
     assert 0.3 < found["accepted"] < 0.7
     last = max(int(each["variation"].removeprefix("variation-")) for each in found["values"])
-    assert found["accepted"] == pytest.approx(40 / last)
+    assert found["accepted"] == pytest.approx(24 / last)
     impossible = study(tmp_path, SCENARIO + RANDOM + "  require: ['robot.pose.x > 9']\n")
     assert impossible.returncode == 2
     assert "none of 10000 draws in a row meets the conditions" in impossible.stderr
@@ -162,7 +162,7 @@ def test_values_meet_the_conditions_and_their_share_is_reported(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_printed_command_repeats_a_failed_run(tmp_path: Path) -> None:
-    study(tmp_path, SCENARIO + RANDOM.replace("count: 40", "count: 2000"), "--out", "out", "--runs", 8)
+    study(tmp_path, SCENARIO + RANDOM.replace("count: 24", "count: 2000"), "--out", "out", "--runs", 8)
     runs = results(tmp_path)["runs"]
     failed = next(run for run in runs if run["outcome"] == "failed")
     command = [sys.executable, "-m", *failed["again"].split(), "--out", "again"]
@@ -193,7 +193,7 @@ def test_invalid_studies_are_refused(
 
 
 def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
-    study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 12, "--keep-logs", "failed")
+    study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 6, "--keep-logs", "failed")
     runs = results(tmp_path)["runs"]
     assert {run["outcome"] for run in runs} == {"passed", "failed"}
     for run in runs:

@@ -14,6 +14,8 @@ from simscen.editor.server import MAX_REQUEST_BYTES, EditorServer
 from simscen.editor.session import EditorSession
 from simscen.run.process.jobs import Backend
 
+POLL_INTERVAL_S = 0.01
+"""Time in which `shutdown` ends the server; the default is 0.5 s."""
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\npass: []\n"
 
 
@@ -27,7 +29,7 @@ def server(tmp_path: Path) -> Iterator[EditorServer]:
     file.write_text(TEXT)
     (tmp_path / "secret.txt").write_text("secret")
     running = EditorServer(EditorSession(EditedFile(file, "scenario", tmp_path), _no_backend))
-    threading.Thread(target=running.serve_forever, daemon=True).start()
+    threading.Thread(target=running.serve_forever, args=(POLL_INTERVAL_S,), daemon=True).start()
     yield running
     running.shutdown()
     running.server_close()

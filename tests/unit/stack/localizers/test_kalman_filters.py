@@ -17,6 +17,7 @@ def test_scipy_stats_is_not_imported() -> None:
     assert output_of(BEFORE + "print('scipy.stats' in sys.modules, 'filterpy.stats' in sys.modules)") == "False False"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "code",
     [
