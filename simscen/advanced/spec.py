@@ -29,8 +29,8 @@ class ScanMatchingAmcl(AmclParameters):
     match_scans: bool = True
     """Predict the motion by matching each scan with earlier scans, with odometry as the initial guess."""
     likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Exponent of the likelihood of a scan, which is a product over its beams. It is below 1 because the errors of
-    neighboring beams are similar. `likelihood_field_prob` only."""
+    """Exponent of the likelihood of a scan, which is the product of the likelihoods of its beams. It is below 1 because
+    the errors of neighboring beams are similar. `likelihood_field_prob` only."""
     beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
     """Whether beams that end outside the map, or in unknown space next to free space, are ignored (`say_nothing`) or
     count as a miss, as in Nav2. `likelihood_field_prob` only."""
@@ -38,7 +38,8 @@ class ScanMatchingAmcl(AmclParameters):
     """A scan is ignored if at most this share of its beams fits the map. This applies only while the particles are one
     narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
-    """A scan has its full weight if at least this share of its beams fits the map. 0 = every scan has, as in Nav2."""
+    """A scan has its full weight if at least this share of its beams fits the map. 0 = full weight of all scans, as in
+    Nav2."""
     settling_distance: NonNegativeLength = 4.0
     """Distance from a given initial pose over which the weight of scans grows from a fifth to its full value. Early
     scans count less because one room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as
@@ -46,13 +47,13 @@ class ScanMatchingAmcl(AmclParameters):
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a lost robot is found. `scan_matching`: by matching the scans of the last meters with the whole map.
     `random`: by random particles, which `recovery_alpha_*` adds as in Nav2. `scan_matching` ignores
-    `recovery_alpha_*`, because random particles at poses that look alike would lead away from a correct pose."""
+    `recovery_alpha_*`, because random particles at a similar place would draw the filter away from a correct pose."""
     sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
     """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
-    """Covariance of the pose. `particles`: that of the particles, as in Nav2. `scatter`: the covariance of the
-    particles, scaled by the residuals of the beams and the scatter of recent poses. `scatter` needs `match_scans`."""
+    """Covariance of the pose. `particles`: the covariance of the particles, as in Nav2. `scatter`: the same, scaled by
+    the residuals of the beams and the scatter of recent poses. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod

@@ -1,4 +1,7 @@
-"""The advanced stack and its builder: the reference stack with motion prediction and compensation of turn slip."""
+"""The advanced stack and its builder: the reference stack with motion prediction and compensation of turn slip.
+
+Turn slip is the curvature that the wheels do not measure, in rad per meter driven.
+"""
 
 import math
 from typing import Any
@@ -18,14 +21,14 @@ from simscen.stack.reference import ReferenceStack
 
 DECAY_DISTANCE_M = 0.5
 """Distance driven in which the weight of a measurement decays by a factor of e, because the ground changes."""
-MAX_CURVATURE_PER_M = 1.0
-"""Maximum absolute value of the estimated curvature in rad/m. Only a broken sensor would measure more."""
+MAX_TURN_SLIP_RAD_PER_M = 1.0
+"""Maximum absolute value of the estimated turn slip. Only a broken sensor would measure more."""
 
 
 class TurnSlipObserver:
-    """Estimates the curvature that the wheels do not measure, and corrects commands for it.
+    """Estimates turn slip, and corrects commands for it.
 
-    This curvature is the turn in rad per meter driven by which fused odometry and wheel odometry differ.
+    Turn slip is measured as the turn by fused odometry (with gyroscope) minus the turn by wheel odometry.
     """
 
     def __init__(self) -> None:
@@ -45,7 +48,7 @@ class TurnSlipObserver:
         gain = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
         if ahead != 0.0:
             curvature = self._curvature + gain * (turned / ahead - self._curvature)
-            self._curvature = min(max(curvature, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
+            self._curvature = min(max(curvature, -MAX_TURN_SLIP_RAD_PER_M), MAX_TURN_SLIP_RAD_PER_M)
 
     def compensate(self, command: Twist) -> Twist:
         """Return `command` with the estimated turn slip subtracted, so that the robot turns as intended."""
@@ -54,14 +57,14 @@ class TurnSlipObserver:
         return Twist(command.vx, command.vy, command.wz - self._curvature * command.vx)
 
 
-ROBOT_FRAME = Pose2(0.0, 0.0)
-"""Pose of the robot in its own frame."""
+ROBOT_IN_BASE_FRAME = Pose2(0.0, 0.0)
+"""Pose of the robot in its own base frame."""
 
 
 class AdvancedStack(ReferenceStack):
     """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal.
 
-    The private methods are hooks of ReferenceStack.
+    The private methods are hooks that ReferenceStack calls.
     """
 
     def __init__(
@@ -73,7 +76,7 @@ class AdvancedStack(ReferenceStack):
         self._has_moving_obstacles = False
 
     def cancel(self, tick: int) -> None:
-        """Cancel the current goal and all after it, and stay in place."""
+        """Cancel the current goal and all following goals, and stay in place."""
         super().cancel(tick)
         self._prediction.hold()
 
@@ -97,7 +100,7 @@ class AdvancedStack(ReferenceStack):
         """Pass the moving obstacles to the collision monitor (base frame) and to both costmaps (odom and map frame)."""
         if self._prediction.is_idle and not self._has_moving_obstacles:
             return
-        moving = self._prediction.moving_obstacles_in_frame(tick, ROBOT_FRAME)
+        moving = self._prediction.moving_obstacles_in_frame(tick, ROBOT_IN_BASE_FRAME)
         self._has_moving_obstacles = len(moving) > 0
         self._monitor.set_moving_obstacles(moving)
         self._costmaps.local_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.odometry)
@@ -148,7 +151,7 @@ class AdvancedStackBuilder(StackBuilder):
         return FullClearing() if self.spec.recovery.clear_entirely else ClearingBackoff()
 
     def make_stack(self, *parts: Any) -> AdvancedStack:
-        """Make the stack from the components of the reference stack, which are `parts`."""
+        """Make the stack from `parts`, the components of the reference stack."""
         surroundings, spec = self.surroundings, self.spec
         prediction = MotionPrediction(
             spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self._full_speed

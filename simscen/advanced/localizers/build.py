@@ -1,4 +1,4 @@
-"""Functions that build the advanced localizers from their specifications, and the models they share between runs."""
+"""Builders of the advanced localizers, and models of a map that are computed once for all runs on the map."""
 
 from dataclasses import dataclass, replace
 
@@ -75,5 +75,5 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
 
 
 def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
-    """Compute the models of a map before worker processes are forked, so that these share the models."""
+    """Compute the models of a map in the parent process, so that all worker processes forked from it share them."""
     map_models(grid, spec).search.precompute()

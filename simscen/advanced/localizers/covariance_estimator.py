@@ -1,4 +1,7 @@
-"""Covariance of a pose estimate, from the scatter of recent poses and the residuals of scans."""
+"""Covariance of a pose estimate, from the scatter of recent poses and the residuals of scans.
+
+A correction is an update of the estimated pose by comparing a scan with the map.
+"""
 
 import math
 from collections import deque
@@ -12,24 +15,24 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotation_matrix
 
 WINDOW_SIZE = 36
-"""Number of recent corrections that are compared, about 9 m of driving."""
+"""Number of recent corrections whose poses are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
 """Correlation lengths of the errors (longitudinal, lateral, yaw), as distances driven by `step_length`."""
-DRIFT_VARIANCE = np.square((0.002, 0.002, 0.0016))
+DRIFT_VARIANCE_PER_M = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
 """Factor on the weights of all learned values at each correction."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
-"""Initial ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, if residuals
-are as large as `sigma_hit`; and the number of corrections that have the same weight as this ratio."""
+"""Ratio of true standard deviations (longitudinal, lateral, yaw) to standard deviations of the particles that is
+assumed at first, for residuals as large as `sigma_hit`. PRIOR_WEIGHT is its weight as a number of corrections."""
 EXPECTED_WEIGHT = 0.05
 """Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections."""
 DEGREES_OF_FREEDOM = 6.0
 """Degrees of freedom of a covariance that is estimated from few, correlated corrections."""
 ODOMETRY_STD = 0.05, 0.05
-"""Initial standard deviations of odometry in m and rad per meter."""
+"""Standard deviations of odometry that are assumed at first, in m and rad per meter."""
 ODOMETRY_STD_WEIGHT = 0.2
-"""Weight of ODOMETRY_STD, as a sum of squared step lengths in m²: that of about three steps."""
+"""Weight of ODOMETRY_STD, as a sum of squared step lengths in m². It is the weight of about three steps."""
 MIN_COVARIANCE = np.diag(np.square((1e-3, 1e-3, 1e-3)))
 """Covariance (m², m², rad²) that is added to each covariance, so that none is singular."""
 
@@ -38,16 +41,16 @@ class CovarianceEstimator:
     """Scales the covariance of the particles to the real errors of the estimated pose.
 
     A particle filter treats the errors of successive scans as independent. Moved furniture causes equal errors in many
-    scans, so that the covariance of the particles is too small. Two measurements show the ratio of real errors to
-    estimated standard deviations:
+    scans, so that the covariance of the particles is too small. The ratio of real errors to the standard deviations of
+    the particles is measured in two ways:
 
     - The scatter of the last WINDOW_SIZE poses, which scan matching without the map propagates to the present.
     - The residuals of the beams that the map explains. The ratio of pose errors to residuals is learned from the
       scatter.
 
-    The ratio is the mean of both, divided by the share of the beams that the map explains. Because it is estimated, the
-    errors have a Student's t-distribution with DEGREES_OF_FREEDOM. Between corrections, the covariance grows by the
-    errors of odometry that scan matching has observed.
+    The mean of both ratios is divided by the share of the beams that the map explains. Because this ratio is only
+    estimated, the errors have a Student's t-distribution with DEGREES_OF_FREEDOM. Between corrections, the covariance
+    grows by the errors of odometry that scan matching has observed.
     """
 
     def __init__(self) -> None:
@@ -58,7 +61,7 @@ class CovarianceEstimator:
         self.forget_poses()
 
     def forget_poses(self) -> None:
-        """Forget the stored poses, because the robot was found elsewhere, but keep all learned values."""
+        """Forget the stored poses but keep all learned values. Call this when the robot was found elsewhere."""
         self._poses: Array = np.empty((0, 3))
         self._bases: Array = np.empty((0, 3))
         self._drifts: Array = np.empty((0, 3, 3))  # since each pose, in the frame of the bases
@@ -102,14 +105,16 @@ class CovarianceEstimator:
         frame = rotation_matrix(last.yaw)
         lever = np.array(((1.0, 0.0, last.y - base.y), (0.0, 1.0, base.x - last.x), (0.0, 0.0, 1.0)))
         self._drifts = (
-            lever @ self._drifts @ lever.T + frame @ (step_covariance + np.diag(DRIFT_VARIANCE * distance)) @ frame.T
+            lever @ self._drifts @ lever.T
+            + frame @ (step_covariance + np.diag(DRIFT_VARIANCE_PER_M * distance)) @ frame.T
         )
         self._distances = self._distances + distance
 
     def estimate(self, pose: Pose2, covariance: Array, residuals: ScanResiduals | None) -> Array:
-        """Store the corrected `pose` in the map, and return its covariance (3, 3). Call `propagate_poses` before.
+        """Store the corrected `pose` (map frame), and return its covariance (3, 3). Call `propagate_poses` before.
 
-        `covariance` is that of the particles. `residuals` are those of the scan, or None if the map explains no beam.
+        `covariance` is the covariance of the particles. `residuals` belong to the scan of the correction; None if the
+        map explains none of its beams.
         """
         own = covariance + MIN_COVARIANCE
         self._add(pose, 1.0 / float(own[0, 0] + own[1, 1]))
@@ -149,7 +154,7 @@ class CovarianceEstimator:
         """Return the ratio (3,) of the scatter of poses to the standard deviations of the particles.
 
         The axes are longitudinal, lateral, and yaw. `own` (3,) are the variances of the particles. `expected` (3,) are
-        the squared ratios to assume without independent poses.
+        the squared ratios that are assumed if no poses with independent errors are stored.
         """
         x, y, yaw = self._poses[-1]
         rotations = self._poses[:, 2] - self._bases[:, 2]

@@ -1,4 +1,4 @@
-"""Search of a robot's pose on the whole map by correlative scan matching over the likelihood field.
+"""Search of the whole map for the pose of a robot, by correlative scan matching over the likelihood field.
 
 Source: Olson, Real-time correlative scan matching (ICRA 2009), section III. The score of a pose combines the nearness
 of endpoints to obstacles of the map, and the share of points along the beams that are in free space. All poses of a
@@ -25,11 +25,12 @@ MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
 COARSE_CELL_M, HEADING_COUNT = 0.2, 180
 """Cell size and number of headings of the coarse grid."""
 COARSE_POINTS, FINAL_POINTS = 80, 240
-"""Maximum number of endpoints, and of points along beams: in the search, and for the final scores."""
+"""Maximum number of endpoints, and maximum number of points along beams: COARSE_POINTS in the search, FINAL_POINTS for
+the final scores."""
 MAX_RANGE_M = 15.0
 """Range beyond which points are ignored, because the headings of the coarse grid are too far apart for them."""
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
-"""Maximum number of poses that are taken from the coarse grid, that are refined, and that are returned."""
+"""Maximum numbers of poses that are taken from the coarse grid, that are refined, and that are returned."""
 NEARBY_STEPS = ((6, 0.2), (9, 0.035))
 """Grid of `search_near`: number of steps to each side and step size, for x and y in m, and for yaw in rad."""
 REFINED_NEARBY_POSES = 12
@@ -47,7 +48,10 @@ Levels = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Endpoints of beams, `ends` (n,), and points along the beams, `passed` (m,), in the base frame."""
+    """Points that one or several scans show, in the base frame as x + iy in m.
+
+    `ends` (n,) are the endpoints of beams. `passed` (m,) are points along the beams, which should be free.
+    """
 
     ends: Plane
     passed: Plane
@@ -58,20 +62,22 @@ class View:
 
 
 def _without_far_points(view: View) -> View:
+    """Return the points within MAX_RANGE_M."""
     return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (view.ends, view.passed)))
 
 
 def _thin(points: Plane, count: int) -> Plane:
+    """Return at most `count` of the points, evenly spaced."""
     if len(points) <= count:
         return points
     return points[evenly_spaced(len(points), count)]
 
 
 class GlobalSearch:
-    """Finds the poses on a map at which a view fits best."""
+    """Finds the poses on a map at which the points of a view fit the map best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Prepare searches on the map `grid`. `field` has the distances from its obstacles, if already computed."""
+        """Prepare searches on the map `grid`. `field` is its field of distances from obstacles, if already computed."""
         self._grid, self._given_field = grid, field
 
     def precompute(self) -> None:
@@ -86,21 +92,21 @@ class GlobalSearch:
         poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
         fine = near_view.thinned(FINAL_POINTS)
         coarse = near_view.thinned(COARSE_POINTS)
-        poses, _ = distinct(poses, self.score(poses, coarse), REFINED_POSES)
+        poses, _ = select_distinct(poses, self.score(poses, coarse), REFINED_POSES)
         for meters, turn in ((0.1, 1.0), (0.05, 0.5)):
             poses = self._improve(poses, coarse, meters, np.radians(turn))
-        return distinct(poses, self.score(poses, fine), MAX_RESULTS)
+        return select_distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
-        """Return poses and scores as `search` does, but only within NEARBY_STEPS of `pose` (3,)."""
+        """Return poses and scores as `search` does, but only for poses within NEARBY_STEPS of `pose` (3,)."""
         near_view = _without_far_points(view)
         coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(FINAL_POINTS)
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
         poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
-        poses, _ = distinct(poses, self.score(poses, coarse), REFINED_NEARBY_POSES)
+        poses, _ = select_distinct(poses, self.score(poses, coarse), REFINED_NEARBY_POSES)
         for meters, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
             poses = self._improve(poses, coarse, meters, np.radians(degrees))
-        return distinct(poses, self.score(poses, fine), MAX_RESULTS)
+        return select_distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
     def score(self, poses: Array, view: View) -> Array:
         """Return the scores (n,) in 0 … 1 of `poses` (n, 3) for a view."""
@@ -111,7 +117,7 @@ class GlobalSearch:
         return scores
 
     def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
-        """Return the means (n,), 0 … 1, of the table values at the `points` of a view, for the `poses` (n, 3)."""
+        """Return for each of `poses` (n, 3) the mean (n,), 0 … 1, of the table values at the `points` of a view."""
         blocks = [
             table.take(self._field.endpoint_cells(poses[begin : begin + 512], points)).mean(axis=1)
             for begin in range(0, len(poses), 512)
@@ -195,14 +201,14 @@ def _nearness(meters: Float32) -> Levels:
 
 
 def _pooled(levels: Levels, factor: int) -> Levels:
-    """Return the maximum of each block of `factor` x `factor` cells."""
+    """Return the maximum score in each block of `factor` x `factor` cells."""
     rows, columns = (-(-size // factor) for size in levels.shape)
     padded = np.pad(levels, ((0, rows * factor - levels.shape[0]), (0, columns * factor - levels.shape[1])))
     pooled: Levels = padded.reshape(rows, factor, columns, factor).max(axis=(1, 3))
     return pooled
 
 
-def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
+def select_distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
     """Return the best distinct poses (MIN_SEPARATION) of `poses` (n, 3), and their scores, best first."""
     order = np.argsort(-scores, kind="stable")
     remaining = poses[order]

@@ -1,4 +1,7 @@
-"""Agreement of scans with the map: residuals of the endpoints, and lower weights of scans if the map is outdated."""
+"""Agreement of scans with the map: residuals of the endpoints, and lower weights of scans if the map is outdated.
+
+The mapped area consists of all known cells and of the inside of walls (`particle_filter.unmapped_cells`).
+"""
 
 from typing import NamedTuple
 
@@ -26,8 +29,9 @@ class ScanResiduals(NamedTuple):
 class MapResiduals:
     """Computes how well the map explains scans.
 
-    The map explains a beam with the probability hit / (hit + random), by the two parts of the likelihood. Residuals are
-    weighted by this probability, so that people who are not on the map do not increase them.
+    The map explains a beam with the probability hit / (hit + random). Both are terms of AMCL's likelihood of a beam,
+    weighted by `z_hit` and `z_rand`. Residuals are multiplied by this probability, so that people, who are not on the
+    map, do not increase them.
     """
 
     def __init__(
@@ -52,12 +56,12 @@ class MapResiduals:
 FIT_DISTANCE_M = 0.3
 """Distance from an obstacle of the map below which the endpoint of a beam fits."""
 CLUSTER_RADIUS_M = 1.0
-"""Maximum distance of the particles from their mean for being one narrow cluster."""
+"""Particles are one narrow cluster if all of them are within this distance of their mean."""
 SAMPLED_PARTICLES = 50
 """Approximate number of particles at which beams are compared with the map."""
 MAPPED_SHARE = 0.1, 0.8
-"""Share of the beams that end on the mapped area, up to which a scan is ignored, and from which on it has its full
-weight."""
+"""Limits of the share of beams that end on the mapped area. Up to the first limit, a scan is ignored. From the second
+one on, it has its full weight."""
 MIN_PARTICLE_SHARE = 0.5
 """A beam is used if it ends on the mapped area for more than this share of the particles."""
 _UNMAPPED, _FITS, _MISSES = 0, 1, 2
@@ -68,8 +72,8 @@ class ScanWeight(NamedTuple):
     """Weight of a scan.
 
     exponent:       exponent of the likelihood, 0 (scan is ignored) … 1
-    fitting_share:  share of the beams that fit the map, among those that end on the mapped area
-    used_hits:      mask (m,) of the m beams with a hit: which of them to use; None for all
+    fitting_share:  share of fitting beams among the beams that end on the mapped area
+    used_hits:      mask (m,) of the hits to use, among the m beams with a hit; None for all
     """
 
     exponent: float
@@ -78,7 +82,7 @@ class ScanWeight(NamedTuple):
 
 
 class MapTrust:
-    """Determines the weight of each scan.
+    """Determines how much weight a scan has in the update of the particle filter.
 
     The weight is low if few beams end on the mapped area. It is also low if few beams fit the map while the particles
     are one narrow cluster: the pose is then probably right, and the map outdated.
@@ -96,8 +100,8 @@ class MapTrust:
     def weight(self, particles: Particles, beams: Beams) -> ScanWeight:
         """Return the weight of a scan.
 
-        For a narrow cluster, only beams that end on the mapped area for most particles are used. Others would attract
-        the particles to the edge of the map, or repel them.
+        For a narrow cluster, only beams that end on the mapped area for most particles are used. The other beams would
+        draw the particles to the edge of the map, or push them away from it.
         """
         classes = self._classes(self._endpoint_cells(particles.poses, beams))
         known_share, fitting = _shares(classes)
@@ -110,7 +114,7 @@ class MapTrust:
         return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used)
 
     def fitting_share(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
-        """Return the share of the beams that fit at `poses` (n, 3), among those that end on the mapped area.
+        """Return the share of fitting beams at `poses` (n, 3), among the beams that end on the mapped area.
 
         `ends` are the endpoints in the base frame. None if less than the share `min_mapped` ends on the mapped area.
         """
@@ -126,6 +130,7 @@ class MapTrust:
         return self._field.endpoint_cells(poses[::step], beams.ends)
 
     def _classes(self, cells: Cells) -> npt.NDArray[np.uint8]:
+        """Return the class of each cell: _UNMAPPED, _FITS, or _MISSES."""
         classes: npt.NDArray[np.uint8] = self._class_table.take(cells, mode="wrap")
         return classes
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD
-from simscen.advanced.localizers.scan_matcher import Step, sample_step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion, sample_motion
 from simscen.advanced.localizers.scan_memory import step_length
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
@@ -23,7 +23,8 @@ from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNMAPPED_LIKELIHOOD_RATIO = 0.4
-"""Likelihood of a beam that ends outside the map, relative to a hit: about the mean of a well localized robot."""
+"""Likelihood of a beam that ends outside the mapped area, as a share of `z_hit`: about the mean likelihood of all beams
+of a well localized robot."""
 MAX_WALL_THICKNESS_M = 1.0
 """Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 
@@ -50,8 +51,8 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
 def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     """Return the mask (rows + 2, columns + 2) of the cells outside the mapped area, with a border of one cell.
 
-    These are the unknown cells whose nearest known cell is free, and those farther than MAX_WALL_THICKNESS_M from all
-    known cells. The other unknown cells are the inside of walls.
+    An unknown cell is outside the mapped area if its nearest known cell is free, or if all known cells are farther away
+    than MAX_WALL_THICKNESS_M. The other unknown cells are the inside of walls.
     """
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
@@ -112,14 +113,14 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self._settle(delta)
         super().move(delta)
 
-    def follow(self, step: Step, delta: Pose2) -> None:
-        """Move each particle by its own sample of the motion `step` from scan matching.
+    def move_by_scan_matching(self, step: MatchedMotion, delta: Pose2) -> None:
+        """Move each particle by its own sample of `step`, the motion by scan matching.
 
         `delta` is the same motion by odometry, in the base frame. If both disagree, the share ODOMETRY_SHARE of the
-        particles follows odometry, unless the last scan was ignored.
+        particles moves by odometry, unless the last scan was ignored.
         """
         self._settle(delta)
-        poses = sample_step(self.particles.poses, step, self._rng)
+        poses = sample_motion(self.particles.poses, step, self._rng)
         if self._map_weight > 0 and not step.agrees(delta):
             by_odometry = self._rng.random(len(poses)) < ODOMETRY_SHARE
             poses[by_odometry] = self._motion.sample(self.particles.poses[by_odometry], delta, self._rng)

@@ -1,11 +1,14 @@
-"""Prior probability of poses: the last certain pose, propagated by the motion that scans and wheels have measured."""
+"""Prior probability of poses, with which the Relocalizer rates candidate poses.
+
+The prior is the last certain pose, propagated by the motion that scans and wheels have measured since then.
+"""
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simscen.advanced.localizers.scan_matcher import Step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.dead_reckoning import Noise, propagate_covariance, rotate_covariance, rotation_matrix
 from simscen.stack.localizers.particles import pose_errors
@@ -18,10 +21,10 @@ MAX_SLIP_DIFFERENCE = 0.1, 0.5
 """Largest difference that wheel slip can cause between motions by scan matching and by odometry: in m, and as a share
 of the motion by odometry. If both limits are exceeded, the scans show people who walk next to the robot."""
 KNOWN_STEP_STD_M = 0.012
-"""Standard deviation of a step above which odometry and not the scans determined it, as in a corridor that looks the
-same everywhere. The excess counts as a systematic error."""
+"""Maximum standard deviation of a motion by scan matching that the scans determine. If it is larger, as in a corridor
+that looks the same everywhere, odometry has determined the motion, and the excess counts as a systematic error."""
 NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Process noise 0 for `propagate_covariance`."""
+"""Process noise of zero for `propagate_covariance`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +37,7 @@ class ObservedMotion:
     """
 
     disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)
-    step: Step | None = None
+    step: MatchedMotion | None = None
     was_carried: bool | None = None
 
     @property
@@ -47,9 +50,9 @@ class ObservedMotion:
         return apart > MAX_SLIP_DIFFERENCE[1] * math.hypot(wheels.x, wheels.y)
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
-        """Return the systematic errors of this motion in m and rad: those with the same direction in many steps.
+        """Return the systematic errors of this motion in m and rad, which can add up over many motions.
 
-        `meters` is the distance driven by `scan_memory.traveled`.
+        `meters` is the distance driven by `scan_memory.distance_driven`.
         """
         if self.step is None:
             return ODOMETRY_DRIFT[0] * meters, ODOMETRY_DRIFT[1] * meters
@@ -83,7 +86,7 @@ class PosePrior:
     def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
         """Return the prior after `motion` from the pose `before` to the pose `base` in the drifting frame.
 
-        `meters` is the distance driven by `scan_memory.traveled`.
+        `meters` is the distance driven by `scan_memory.distance_driven`.
         """
         meter, rad = motion.systematic_error(meters)
         meter, rad = self.systematic_error[0] + meter, self.systematic_error[1] + rad
@@ -92,7 +95,7 @@ class PosePrior:
         return replace(self, covariance=covariance, systematic_error=(meter, rad))
 
     def expected(self, base: Pose2) -> Array:
-        """Return the pose (3,) in the map of a robot at `base` in the drifting frame, as if nothing had drifted."""
+        """Return the pose (3,) in the map frame, without drift, of a robot at `base` in the drifting frame."""
         return np.array(self.pose.compose(self.base.between(base)))
 
     def negative_log_likelihood(self, poses: Array, base: Pose2) -> Array:

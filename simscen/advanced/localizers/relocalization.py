@@ -1,7 +1,7 @@
 """Relocalization: detects that the particle filter is lost, and searches the map for the robot's pose.
 
-All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores are those of GlobalSearch.score. The lead of
-a pose is the difference between its score and the next best one.
+All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores of poses are from GlobalSearch.score. The
+lead of a pose is its score minus the next best score, its gain is its score minus the score of the current pose.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from simscen.advanced.localizers.global_search import MIN_SEPARATION, GlobalSearch, View
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD, ObservedMotion, PosePrior
-from simscen.advanced.localizers.scan_memory import ScanMemory, traveled
+from simscen.advanced.localizers.scan_memory import ScanMemory, distance_driven
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
@@ -20,26 +20,27 @@ from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.particles import pose_errors
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
-"""The robot may be lost if the mean share of fitting beams in this many scans is below MIN_FITTING_SHARE."""
+"""The robot may be lost if the mean share of fitting beams in the last RECENT_SCANS is below MIN_FITTING_SHARE."""
 MIN_MAPPED_SHARE = 0.6
 """Minimum share of the beams of a scan that end on the mapped area. With fewer, the fit of the scan is unknown."""
 SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 """Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
 MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
-"""Minimum distance driven and minimum lead of the pose that a robot without initial pose gets."""
+"""Minimum distance driven, and minimum lead of a pose, before a robot without initial pose gets this pose."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
-"""A pose replaces the current one if its score is above MIN_SCORE and exceeds that of the current pose by MIN_GAIN, its
-lead is MIN_LEAD, and two searches agree."""
+"""A pose replaces the current one if its score is above MIN_SCORE, its gain is above MIN_GAIN, its lead is above
+MIN_LEAD, and two searches agree."""
 CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
-"""Distance driven between two searches near the current pose. They are skipped if its score is above CERTAIN_SCORE."""
+"""Distance driven between two searches near the current pose. If the score of the current pose is above CERTAIN_SCORE,
+no search is necessary."""
 MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
-"""A nearby pose replaces the current one if its score is at least MIN_NEAR_SCORE, its lead is MIN_LEAD, and its gain is
-MIN_GAIN. CERTAIN_GAIN suffices if its score is above CERTAIN_SCORE."""
+"""A nearby pose replaces the current one if its score is at least MIN_NEAR_SCORE, its lead above MIN_LEAD, and its gain
+at least MIN_GAIN. If its score is above CERTAIN_SCORE, a gain of CERTAIN_GAIN suffices."""
 MAX_REDUCTION = 0.1
 """Maximum reduction of the score of a pose, if the drift from the last certain pose to this pose is unlikely."""
 MIN_LOG_RATIO = 3.0
-"""Minimum log-likelihood ratio of another pose to the current one in the first `settling` m of Relocalizer."""
-SAME_POSE = 0.7, 0.3
+"""Minimum log-likelihood ratio of another pose to the current one, while the robot drives the first `settling` m."""
+SAME_POSE_TOLERANCE = 0.7, 0.3
 """Maximum difference (m, rad) of the poses found by two searches that agree."""
 AGREEMENT_LENGTH_M = 2.0
 """Minimum distance driven between two searches that agree."""
@@ -49,14 +50,15 @@ in this search. They are higher because unmapped rooms often resemble mapped one
 SCORE_SCALE = 0.02
 """Difference of scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 UNOBSERVED_MOTION = ObservedMotion()
-"""The motion without scan matching."""
+"""Motion between two scans that were not matched."""
 
 
 class Relocalizer:
     """Compares scans with the map at the estimated pose, and searches the whole map if they do not fit.
 
-    The search uses the scans of the last meters together. A robot without initial pose has particles at all poses that
-    fit until one of them is clearly the best. A robot with a pose gets another one only if that is clearly better.
+    The search uses the scans of the last meters together. A robot without initial pose has particles at all fitting
+    poses until one of these poses is clearly the best. A robot with a pose gets another pose only if it is clearly
+    better.
     """
 
     def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
@@ -121,7 +123,7 @@ class Relocalizer:
                 self._initial = self._certain = PosePrior.at(np.array(self._estimate.pose), base, std)
             return
         self._knows_overlap = motion.was_carried is not None
-        distance = traveled(last, base)
+        distance = distance_driven(last, base)
         self._since_search += distance
         self._since_check += distance
         self._driven += distance
@@ -136,7 +138,8 @@ class Relocalizer:
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return the most likely pose, given the initial pose and all scans since; None if `current` is nearly as good.
 
-        If few beams end on the mapped area, many poses fit by chance, and only the expected pose is considered.
+        If few beams end on the mapped area, many poses fit by chance, and only the pose that odometry and scan matching
+        predict is considered.
         """
         if not self._memory.length:
             return None
@@ -194,7 +197,10 @@ class Relocalizer:
         return poses, np.ones(1)
 
     def _update_doubt(self) -> bool:
-        """Return whether recent scans do not fit. When this begins, forget older scans and search at once."""
+        """Return whether recent scans do not fit the map. If they fitted before, make the next search due at once.
+
+        Then also forget older scans, unless scan matching knows whether the robot was carried.
+        """
         is_in_doubt = (
             len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE
         )
@@ -207,7 +213,7 @@ class Relocalizer:
 
     @property
     def _is_unmapped(self) -> bool:
-        """Whether the estimated pose has been outside the mapped area for a long way."""
+        """Whether the robot has driven UNMAPPED_DISTANCE_M outside the mapped area, by the estimated pose."""
         return self._driven - self._mapped_at >= UNMAPPED_DISTANCE_M
 
     @property
@@ -216,7 +222,7 @@ class Relocalizer:
         return self._is_unmapped and self._certain is not None
 
     def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the poses that fit, and their shares. If the robot has a pose, two searches must agree on a pose."""
+        """Return the fitting poses and their shares. If the robot has a pose, two searches must agree on a new one."""
         poses, scores = self._search.search(view)
         last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
         if not len(poses):
@@ -250,6 +256,7 @@ def _leads(scores: Array, lead: float) -> bool:
 
 
 def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -> bool:
-    """Return whether the motion from `first_base` to `second_base` leads from `first` to `second` (SAME_POSE)."""
+    """Return whether the motion from `first_base` to `second_base` leads from the pose `first` to `second`."""
     difference = first.compose(first_base.between(second_base)).between(second)
-    return math.hypot(difference.x, difference.y) < SAME_POSE[0] and abs(difference.yaw) < SAME_POSE[1]
+    max_distance, max_turn = SAME_POSE_TOLERANCE
+    return math.hypot(difference.x, difference.y) < max_distance and abs(difference.yaw) < max_turn

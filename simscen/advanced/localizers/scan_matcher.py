@@ -20,9 +20,9 @@ from simscen.stack.localizers.particles import empty_poses, wrap_headings
 BASELINE_M = 0.15
 """Approximate length of the line between two neighbors of a point. The line determines the normal of the point."""
 MAX_BEND_M = 0.05
-"""Maximum distance of the point from this line."""
+"""Maximum distance of the point from the line between its neighbors."""
 MAX_LINE_M = 0.5
-"""Maximum length of this line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
+"""Maximum length of the line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
 MAX_RANGE_M = 20.0
 """Range beyond which points are ignored."""
 _NO_POINTS: Plane = np.empty(0, dtype=np.complex128)
@@ -35,7 +35,7 @@ class Surface:
     points: Plane
     normals: Plane
 
-    def placed(self, pose: Pose2) -> "Surface":
+    def to_parent_frame(self, pose: Pose2) -> "Surface":
         """Return the surface, transformed from the frame at `pose` to the parent frame."""
         turn = cmath.rect(1.0, pose.yaw)
         return Surface(self.points * turn + complex(pose.x, pose.y), self.normals * turn)
@@ -49,7 +49,7 @@ class Surface:
 
 
 def extract_surface(scan: Scan) -> Surface:
-    """Return the hits of a scan in the base frame, without those at edges of surfaces, which have no normal."""
+    """Return the hits of a scan in the base frame, without hits at edges of surfaces, which have no normal."""
     ranges = scan.ranges
     hit = ((ranges > scan.range_min) & (ranges < min(scan.range_max, MAX_RANGE_M))).nonzero()[0]
     if len(hit) < 3:
@@ -75,7 +75,8 @@ REFERENCE_POINTS, SCAN_POINTS = 120, 90
 GATES_M, MAX_ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
 """Maximum distances of a point from its nearest neighbor in successive iterations, and maximum number of iterations."""
 LAST_GATE_STEP, CONVERGED_STEP = (0.02, 0.01), (0.002, 0.001)
-"""Changes of the pose (m, rad) in an iteration below which the last of GATES_M is used next, and the match ends."""
+"""Change of the pose (m, rad) in an iteration below which the last of GATES_M is used next, and change below which the
+match ends."""
 OUTLIER_DISTANCE_M, OUTLIER_RATIO = 0.1, 1.5
 """Scale of the Geman-McClure weights: the larger one of OUTLIER_DISTANCE_M, and OUTLIER_RATIO times the root mean
 square of all distances. A point at this distance from its neighbor has a quarter of the full weight."""
@@ -90,7 +91,7 @@ GUESS_STD_PER_M, GUESS_STD_M = 0.15, 0.02
 GUESS_STD_PER_RAD, GUESS_STD_RAD = 0.15, 0.03
 """Standard deviation of the rotation of the guess: a part per radian of rotation, and a constant."""
 MAX_BEAM_ANGLE_RAD = 0.04
-"""Maximum angle between two beams. Scans with larger angles are not matched."""
+"""Maximum angle between neighboring beams. Scans with larger angles are not matched."""
 AGREEMENT_PER_M, AGREEMENT_M = 0.1, 0.03
 """Maximum difference between the translations by odometry and by an agreeing match: per meter, and a constant."""
 AGREEMENT_PER_RAD, AGREEMENT_RAD = 0.1, 0.03
@@ -100,7 +101,7 @@ MIN_OVERLAP = 0.3
 MAX_OVERLAP_STEP = 0.75, 0.75
 """Longest step between two scans (m, rad) after which little overlap means that the robot was carried elsewhere."""
 COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
-"""Factor on the covariance of the least-squares solution, and variances (m², m², rad²) that are added."""
+"""Factor on the covariance of the least-squares solution, and variances (m², m², rad²) that are added to it."""
 
 
 Symmetric = tuple[float, float, float, float, float, float]
@@ -159,14 +160,14 @@ class _ReferenceScans:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """Motion between two scans in the base frame of the first, with its covariance (3, 3)."""
+class MatchedMotion:
+    """Motion between two scans by scan matching, in the base frame of the first scan, with its covariance (3, 3)."""
 
     delta: Pose2
     covariance: Array
 
     def agrees(self, odometry: Pose2) -> bool:
-        """Return whether the motion by odometry is nearly the same."""
+        """Return whether the motion by `odometry` is nearly the same."""
         difference = odometry.between(self.delta)
         distance, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
         return (
@@ -175,9 +176,9 @@ class Step:
         )
 
 
-def sample_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
-    """Return `poses` (n, 3), each moved by its own random sample of a step."""
-    ahead, left, turn = np.dot(_root(step.covariance), rng.standard_normal((3, len(poses))))
+def sample_motion(poses: Array, step: MatchedMotion, rng: np.random.Generator) -> Array:
+    """Return `poses` (n, 3), each moved by its own random sample of a motion."""
+    ahead, left, turn = np.dot(_cholesky_factor(step.covariance), rng.standard_normal((3, len(poses))))
     ahead += step.delta.x
     left += step.delta.y
     turn += step.delta.yaw
@@ -207,7 +208,7 @@ class ScanMatcher:
         """Whether the robot was carried elsewhere, because the last scan hardly overlaps; None if unknown."""
         return None if self.overlap is None else self.overlap < MIN_OVERLAP
 
-    def step(self, scan: Scan, guess: Pose2) -> Step | None:
+    def step(self, scan: Scan, guess: Pose2) -> MatchedMotion | None:
         """Return the motion of the base since the last scan; None if the match fails.
 
         `guess` is the motion by odometry.
@@ -218,15 +219,15 @@ class ScanMatcher:
             return None
         seen = extract_surface(scan)
         is_possible = len(seen.points) and any(len(surface.points) for surface in self._surfaces)
-        found = self._matched(seen, guess) if is_possible else None
+        found = self._match(seen, guess) if is_possible else None
         if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
-        self._surfaces.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
-        return Step(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
+        self._surfaces.append(seen.thinned(REFERENCE_POINTS).to_parent_frame(self.pose))
+        return MatchedMotion(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
-    def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
-        """Return the pose in the frame of `self.pose`, and its covariance in units of POINT_STD_M²."""
+    def _match(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
+        """Return the pose in the frame of `self.pose`, and its covariance in units of POINT_STD_M²; None on failure."""
         guessed = pose = self.pose.compose(guess)
         reference, own = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
         (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
@@ -245,15 +246,15 @@ class ScanMatcher:
             turn = xa * right + ya * up + aa * around
             pose = Pose2(pose.x + dx, pose.y + dy, pose.yaw + turn)
             step = math.hypot(dx, dy), abs(turn)
-            if gate == last and _within(step, CONVERGED_STEP):
+            if gate == last and _is_within(step, CONVERGED_STEP):
                 break
-            gate = last if _within(step, LAST_GATE_STEP) else min(gate + 1, last)
+            gate = last if _is_within(step, LAST_GATE_STEP) else min(gate + 1, last)
         self.overlap = reference.overlap
         return None if self.overlap < MIN_OVERLAP else (pose, inverse)
 
 
 def _prior_information(guess: Pose2) -> tuple[float, float]:
-    """Return the inverse variances of x and y, and of the yaw, of the guess, in units of 1 / POINT_STD_M²."""
+    """Return the inverse variance of x and y, and of the yaw, of the guess, in units of 1 / POINT_STD_M²."""
     position_std = GUESS_STD_PER_M * math.hypot(guess.x, guess.y) + GUESS_STD_M
     yaw_std = GUESS_STD_PER_RAD * abs(guess.yaw) + GUESS_STD_RAD
     return (POINT_STD_M / position_std) ** 2, (POINT_STD_M / yaw_std) ** 2
@@ -269,7 +270,7 @@ def _inverse(matrix: Symmetric) -> Symmetric:
 
 
 def _step_covariance(yaw: float, inverse: Symmetric) -> Array:
-    """Return the covariance (3, 3) of a step in the frame of a base with heading `yaw`; `inverse` as in `_matched`."""
+    """Return the covariance (3, 3) of a motion in a base frame with heading `yaw`. `inverse` is from `_match`."""
     c, s, scale = math.cos(yaw), math.sin(yaw), COVARIANCE_SCALE * POINT_STD_M**2
     xx, xy, xa, yy, ya, aa = (scale * value for value in inverse)
     crossed = c * s * (yy - xx) + (c * c - s * s) * xy
@@ -281,7 +282,7 @@ def _step_covariance(yaw: float, inverse: Symmetric) -> Array:
     ))  # fmt: skip
 
 
-def _root(covariance: Array) -> Array:
+def _cholesky_factor(covariance: Array) -> Array:
     """Return the Cholesky factor (3, 3), lower triangle, of a covariance."""
     (xx, _, _), (xy, yy, _), (xa, ya, aa) = covariance.tolist()
     x = math.sqrt(xx)
@@ -291,5 +292,6 @@ def _root(covariance: Array) -> Array:
     return np.array(((x, 0.0, 0.0), (y_x, y, 0.0), (a_x, a_y, math.sqrt(aa - a_x * a_x - a_y * a_y))))
 
 
-def _within(step: tuple[float, float], limits: tuple[float, float]) -> bool:
+def _is_within(step: tuple[float, float], limits: tuple[float, float]) -> bool:
+    """Return whether the distance and the turn of a step are below both limits (m, rad)."""
     return step[0] < limits[0] and step[1] < limits[1]

@@ -8,7 +8,7 @@ from simscen.advanced.localizers.map_trust import MapResiduals, MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import UNOBSERVED_MOTION, Relocalizer
-from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion, ScanMatcher
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
@@ -18,13 +18,13 @@ from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import covariance_about
 
 CERTAIN_AFTER_UPDATES = 8
-"""Number of consecutive updates in which map, scan matching and odometry agreed, after which scans may be skipped."""
+"""Number of consecutive updates in which map, scan matching and odometry must agree before scans may be skipped."""
 
 
 class ScanMatchingAmclLocalizer(AmclLocalizer):
     """AMCL with scan matching as motion model, and with optional relocalization and covariance estimation.
 
-    `_correct` and `_propagated_covariance` are hooks of AmclLocalizer.
+    `_correct` and `_propagated_covariance` are hooks that AmclLocalizer calls.
     """
 
     _spec: ScanMatchingAmcl
@@ -38,7 +38,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         """Create the localizer.
 
         search:     arguments of Relocalizer; None if only random particles find a lost robot
-        residuals:  residuals for the covariance estimation; None if the covariance is that of the particles
+        residuals:  input of the CovarianceEstimator; None to use the covariance of the particles
         """
         self._search, self._residuals = search, residuals
         self._update_interval = spec.sure_update_interval if residuals is None else 1
@@ -64,7 +64,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._relocalize(self._relocalizer, scan, odometry)
 
     def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles, by scan matching if possible. Weigh them unless `sure_update_interval` skips the scan.
+        """Move the particles, by scan matching if possible. Weight them, unless `sure_update_interval` skips the scan.
 
         `delta` is the motion by odometry since the last update; None at the first one.
         """
@@ -73,7 +73,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
         agreed = False
         if delta is not None and matched is not None:
-            self._filter.follow(matched, delta)
+            self._filter.move_by_scan_matching(matched, delta)
             if not (agreed := matched.agrees(delta)):
                 self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
             if self._covariance_estimator is not None:
@@ -102,7 +102,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             consistent = agreed and estimate is not None and self._filter.is_certain
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
 
-    def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
+    def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> MatchedMotion | None:
         """Return the motion since the last update, from scans of the first lidar only; None if matching fails."""
         sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
@@ -128,7 +128,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
                 self._covariance_estimator.forget_poses()
 
     def _base(self, odometry: Pose2) -> Pose2:
-        """Return the robot's pose in the frame of the scan matcher, or `odometry` without scan matching."""
+        """Return the robot's pose in the drifting frame of the scan matcher, or `odometry` without scan matching."""
         if self._matcher is None or self._matched is None:
             return odometry
         return self._matcher.pose.compose(self._matched[1].between(odometry))

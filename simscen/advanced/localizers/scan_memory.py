@@ -1,4 +1,7 @@
-"""Memory of the scans of the last meters, combined by odometry."""
+"""Memory of the scans of the last meters, combined in the drifting frame of scan matching or odometry.
+
+`base` is always a pose of the robot's base in this frame.
+"""
 
 import cmath
 import math
@@ -13,25 +16,25 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
 
 MEMORY_LENGTH_M = 6.0
-"""Distance driven after which scans are forgotten, because odometry drifts."""
+"""Distance driven after which scans are forgotten, because the frame drifts."""
 BEAMS_PER_SCAN = 40
 """Maximum number of beams of a scan that are stored."""
 MIN_SPACING_M = 0.2
 """Minimum distance driven between two scans that are stored."""
 METERS_PER_RAD = 0.5
-"""Distance that a rotation by 1 rad counts as in `traveled` and `step_length`."""
+"""Distance in m that `distance_driven` and `step_length` add for a rotation by 1 rad."""
 _BEAM_SHARES = np.array([[share] for share in (*PASSED_SHARES, 1.0)])
 """Stored points along a beam, as shares of its length."""
 
 
 @dataclass(frozen=True, eq=False)
 class _StoredScan:
-    """A stored scan, taken at the pose `odometry` after `driven` m by `traveled`.
+    """A stored scan, taken at `base` after the distance `driven` in m since the first scan.
 
-    `points` (m, n) are points along n beams in the odometry frame. The last row contains the endpoints.
+    `points` (m, n) are points along n beams in the drifting frame. The last row contains the endpoints.
     """
 
-    odometry: Pose2
+    base: Pose2
     driven: float
     points: Plane
 
@@ -44,27 +47,25 @@ class ScanMemory:
 
     @property
     def length(self) -> float:
-        """Distance driven in m between the oldest and the newest scan, by `traveled`."""
+        """Distance driven in m between the oldest and the newest stored scan."""
         return self._scans[-1].driven - self._scans[0].driven if self._scans else 0.0
 
-    def add(self, scan: Scan, odometry: Pose2, min_range: float, max_range: float) -> Plane:
+    def add(self, scan: Scan, base: Pose2, min_range: float, max_range: float) -> Plane:
         """Add a scan unless the last one is closer than MIN_SPACING_M. Return the endpoints (n,) in the base frame.
 
-        Only ranges between the limits in m are used. `odometry` is the pose of the base in any slowly drifting frame.
+        Only ranges between the limits in m are used.
         """
         ends = endpoints_of(scan, min_range, max_range)
         if self._scans:
             last = self._scans[-1]
-            driven = last.driven + traveled(last.odometry, odometry)
+            driven = last.driven + distance_driven(last.base, base)
             if driven - last.driven < MIN_SPACING_M:
                 return ends
         else:
             driven = 0.0
         lidar = complex(scan.mount.x, scan.mount.y)
-        points = (_BEAM_SHARES * (ends - lidar) + lidar) * cmath.rect(1.0, odometry.yaw) + complex(
-            odometry.x, odometry.y
-        )
-        self._scans.append(_StoredScan(odometry, driven, points))
+        points = (_BEAM_SHARES * (ends - lidar) + lidar) * cmath.rect(1.0, base.yaw) + complex(base.x, base.y)
+        self._scans.append(_StoredScan(base, driven, points))
         while driven - self._scans[0].driven > MEMORY_LENGTH_M:
             self._scans.popleft()
         return ends
@@ -74,11 +75,11 @@ class ScanMemory:
         while len(self._scans) > keep:
             self._scans.popleft()
 
-    def view_from(self, odometry: Pose2) -> View:
-        """Return all stored scans (at least one) in the frame of a base at `odometry`."""
+    def view_from(self, base: Pose2) -> View:
+        """Return all stored scans (at least one) in the base frame of a robot at `base`."""
         points = np.concatenate([stored.points for stored in self._scans], axis=1)
-        points -= complex(odometry.x, odometry.y)
-        points *= cmath.rect(1.0, -odometry.yaw)
+        points -= complex(base.x, base.y)
+        points *= cmath.rect(1.0, -base.yaw)
         return View(points[-1], points[:-1].ravel())
 
 
@@ -87,8 +88,8 @@ def step_length(step: Pose2) -> float:
     return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)
 
 
-def traveled(before: Pose2, after: Pose2) -> float:
-    """Return the distance in m between two poses, with rotations as in `step_length`."""
+def distance_driven(before: Pose2, after: Pose2) -> float:
+    """Return the distance driven in m between two poses, with rotations as in `step_length`."""
     return before.distance(after) + METERS_PER_RAD * abs(wrap(after.yaw - before.yaw))
 
 

@@ -46,7 +46,7 @@ class ScanMatchingCorrection:
     def correction(self, scan: Scan) -> tuple[float, float]:
         """Return the translation (x, y) in m, in the map frame, that corrects dead reckoning since the last scan.
 
-        The result is 0 if scan matching fails or differs too much from dead reckoning (`Step.agrees`).
+        The result is 0 if scan matching fails or differs too much from dead reckoning (see `MatchedMotion.agrees`).
         """
         if not self._dead_reckoning:
             return 0.0, 0.0
@@ -149,7 +149,7 @@ class SlipEkfLocalizer:
         return Pose2(x, y, wrap(yaw))
 
     def _step(self, pose: Pose2, seconds: float) -> WheelStep:
-        """Return the step of the wheels by the motion `pose` in `seconds`, with the detected slip."""
+        """Return the step in which the wheels measure the motion `pose` in `seconds`, with the detected slip."""
         speed = math.hypot(pose.x, pose.y) / seconds
         without_slip = WheelStep(pose, seconds, speed)
         if not self._readings:
@@ -192,11 +192,11 @@ class SlipEkfLocalizer:
 
     @property
     def _gyro_noise(self) -> float:
-        """Variance of this mean in (rad/s)²."""
+        """Variance of `_turn_rate` in (rad/s)²."""
         return self._spec.gyro_noise**2 / len(self._readings)
 
     def _predict(self, model: StepModel, state: Array) -> None:
-        """Set the predicted `state` (7,), and predict the covariance by the model."""
+        """Set the predicted `state` (7,), and predict its covariance with the model."""
         self._filter.F, self._filter.Q = model.f, model.q
         self._filter.predict(state)
 

@@ -9,40 +9,42 @@ import numpy as np
 from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 
-GATE = 15.1
-"""Ratio of the squared innovation to its variance above which the wheels slip: the chi-square quantile of 99.99 %."""
-WINDOW_S, WINDOW_GATE = 0.5, 24.0
-"""Time over which innovations are summed to detect slow slip, and the gate of the sum (quantile of 99.9999 %)."""
-RELEASE_S, RELEASE_GATE = 0.15, 4.0
-"""Time over which innovations are summed to detect the end of slow slip, and the gate of the sum (quantile of 95 %)."""
+FAST_SLIP_GATE = 15.1
+"""Ratio of a squared innovation to its variance above which the wheels slip: the chi-square quantile of 99.99 %."""
+SLOW_SLIP_WINDOW_S, SLOW_SLIP_GATE = 0.5, 24.0
+"""The same ratio for the sum of the innovations in a time window, which detects slow slip (quantile of 99.9999 %)."""
+SLIP_END_WINDOW_S, SLIP_END_GATE = 0.15, 4.0
+"""The same for the end of slow slip: slow slip ends when the ratio is below the gate (quantile of 95 %)."""
 
 
 class SlipDetector:
-    """Detects wheel slip by the innovation: the turn rate of the gyroscope minus that of the wheels."""
+    """Detects wheel slip by the innovation: the turn rate of the gyroscope minus the turn rate of the wheels."""
 
     def __init__(self) -> None:
         self._recent: deque[tuple[float, float, float]] = deque()  # rad, rad², seconds of each step
         self._slips_slowly = self._slips = False
 
     def update(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the time in s that the wheels have slipped without being detected before; 0 without slip.
+        """Return the duration in s of slip that earlier calls have not returned; 0 without slip.
 
         innovation:  in rad/s
         noise:       variance of this step's innovation, in (rad/s)²
         bias:        variance of the gyroscope's bias, in (rad/s)², the same for all steps
-        seconds:     duration of the step
+        seconds:     duration of the step, which is the time since the last call
         """
         lasted, known = self._slow_slip(innovation * seconds, noise * seconds**2, bias, seconds), self._slips
         self._slips_slowly = lasted > 0.0
-        self._slips = self._slips_slowly or innovation**2 > GATE * (noise + bias)
+        self._slips = self._slips_slowly or innovation**2 > FAST_SLIP_GATE * (noise + bias)
         if not self._slips:
             return 0.0
         return seconds if known else max(seconds, lasted)
 
     def _slow_slip(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the time in s over which innovations are summed if their sum exceeds the gate, otherwise 0."""
+        """Return the length in s of the present window if the sum of its innovations exceeds the gate, else 0."""
         self._recent.append((innovation, noise, seconds))
-        window, gate = (RELEASE_S, RELEASE_GATE) if self._slips_slowly else (WINDOW_S, WINDOW_GATE)
+        window, gate = (
+            (SLIP_END_WINDOW_S, SLIP_END_GATE) if self._slips_slowly else (SLOW_SLIP_WINDOW_S, SLOW_SLIP_GATE)
+        )
         while len(self._recent) > 1 and sum(step[2] for step in self._recent) > window + 1e-9:
             self._recent.popleft()
         total, variance, lasted = map(sum, zip(*self._recent, strict=True))
@@ -74,7 +76,7 @@ class WheelStep:
     seconds:          duration
     speed:            possible speed: the highest plausible speed of the robot in m/s
     slips:            whether the wheels slip
-    undetected_slip:  time in s that the wheels have slipped without being detected before
+    undetected_slip:  duration in s of slip that earlier steps do not include, from SlipDetector.update
     """
 
     pose: Pose2
@@ -97,16 +99,16 @@ class StepModel:
     q: Array
 
 
-def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped: bool) -> StepModel:
+def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped_before: bool) -> StepModel:
     """Return the model of turn rate, bias and slip for a step.
 
-    `noise` is the variance of the turn rate of the wheels in (rad/s)². `slipped` states whether the wheels slipped in
-    the previous step.
+    `noise` is the variance of the turn rate of the wheels in (rad/s)². `slipped_before` states whether the wheels
+    slipped in the previous step.
     """
     f, q = np.eye(7), np.zeros((7, 7))
     f[RATE, RATE], q[RATE, RATE] = 0.0, UNKNOWN_RATE_STD_RAD_S**2 if step.slips else noise
     q[BIAS, BIAS] = spec.gyro_bias_walk**2 * step.seconds
-    if step.slips != slipped:
+    if step.slips != slipped_before:
         f[SLIP_X, SLIP_X] = f[SLIP_Y, SLIP_Y] = 0.0
         q[SLIP_X, SLIP_X], q[SLIP_Y, SLIP_Y] = (SLIP_STD**2, SLIP_STD**2) if step.slips else (spec.wheel_slip**2, 0.0)
     elif not step.slips:

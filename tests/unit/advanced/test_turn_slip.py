@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.spec import SlipEkf
-from simscen.advanced.stack import MAX_CURVATURE_PER_M, TurnSlipObserver
+from simscen.advanced.stack import MAX_TURN_SLIP_RAD_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
@@ -96,4 +96,4 @@ def test_slip_compensation_is_limited_for_broken_sensors() -> None:
     for _ in range(200):
         wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.0)), fused.compose(Pose2(0.02, 0.0, 1.0))
         slip.update(wheels, fused)
-    assert slip.compensate(Twist(1.0, 0.0, 0.0)).wz == -MAX_CURVATURE_PER_M
+    assert slip.compensate(Twist(1.0, 0.0, 0.0)).wz == -MAX_TURN_SLIP_RAD_PER_M

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.global_search import MAX_RESULTS, PASSED_SHARES, GlobalSearch, View, distinct
+from simscen.advanced.localizers.global_search import MAX_RESULTS, PASSED_SHARES, GlobalSearch, View, select_distinct
 from simscen.advanced.localizers.scan_memory import MEMORY_LENGTH_M, ScanMemory, endpoints_of
 from simscen.core.geometry import Pose2
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
@@ -53,7 +53,7 @@ def test_empty_scans_find_no_pose() -> None:
 
 def test_nearby_matches_are_merged() -> None:
     poses = np.array([[0, 0, 0.0], [0.3, 0, 0.1], [0.3, 0, 1.0], [2, 0, 0], [0.1, 0, 2 * np.pi - 0.05]])
-    kept, scores = distinct(poses, np.array([0.5, 0.9, 0.1, 0.2, 0.6]), 10)
+    kept, scores = select_distinct(poses, np.array([0.5, 0.9, 0.1, 0.2, 0.6]), 10)
     assert kept[:, 0].tolist() == [0.3, 2.0, 0.3]
     assert scores.tolist() == [0.9, 0.2, 0.1]
 

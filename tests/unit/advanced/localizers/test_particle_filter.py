@@ -5,7 +5,7 @@ import pytest
 
 from simscen.advanced.localizers.build import map_models
 from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatchingParticleFilter
-from simscen.advanced.localizers.scan_matcher import Step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
@@ -21,7 +21,7 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     pf = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
     pf.reset(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    pf.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
+    pf.move_by_scan_matching(MatchedMotion(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
     return pf.particles.poses
 
 

@@ -10,14 +10,14 @@ from simscen.advanced.localizers.pose_prior import (
     ObservedMotion,
     PosePrior,
 )
-from simscen.advanced.localizers.scan_matcher import Step, sample_step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion, sample_motion
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.particles import pose_errors
 
 START = Pose2(1.0, 2.0, np.pi / 2)
 PRIOR = PosePrior.at(np.array([5.0, 5.0, 0.0]), START)
 BASE = START.compose(Pose2(2.0, 1.0, 0.3))
-STEP = Step(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-5], [0.0, 1e-5, 2e-5]]))
+STEP = MatchedMotion(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-5], [0.0, 1e-5, 2e-5]]))
 
 
 def cost_of_error(prior: PosePrior, base: Pose2, error: Array) -> float:
@@ -35,7 +35,7 @@ def test_step_errors_accumulate_as_in_simulation(error: tuple[float, ...]) -> No
     prior = PosePrior.at(np.array([5.0, 5.0, 0.7]), START, (1e-6, 1e-6, 1e-6))
     robots = np.tile(np.array(prior.pose), (20_000, 1))
     for _ in range(20):
-        robots, before, base = sample_step(robots, STEP, rng), base, base.compose(STEP.delta)
+        robots, before, base = sample_motion(robots, STEP, rng), base, base.compose(STEP.delta)
         prior = prior.after(before, base, 0.3, ObservedMotion(step=STEP))
     errors = pose_errors(prior.expected(base), robots)
     delta, covariance = np.array(error), errors.T @ errors / len(robots)
@@ -47,9 +47,12 @@ def test_step_errors_accumulate_as_in_simulation(error: tuple[float, ...]) -> No
     ("motion", "drift"),
     [
         (ObservedMotion(), (10 * ODOMETRY_DRIFT[0], 10 * ODOMETRY_DRIFT[0], 10 * ODOMETRY_DRIFT[1])),
-        (ObservedMotion(disagreement=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
         (
-            ObservedMotion(step=Step(STEP.delta, np.diag([(4 * KNOWN_STEP_STD_M) ** 2, 0.0, 0.0]))),
+            ObservedMotion(disagreement=Pose2(0.3, -0.4, 0.2), step=MatchedMotion(STEP.delta, np.zeros((3, 3)))),
+            (0.5, 0.5, 0.2),
+        ),
+        (
+            ObservedMotion(step=MatchedMotion(STEP.delta, np.diag([(4 * KNOWN_STEP_STD_M) ** 2, 0.0, 0.0]))),
             (3 * KNOWN_STEP_STD_M, 3 * KNOWN_STEP_STD_M, 0.0),
         ),
     ],
@@ -75,7 +78,8 @@ def test_scan_difference_beyond_slip_indicates_moving_surroundings(
 ) -> None:
     assert (
         ObservedMotion(
-            disagreement=Pose2(disagreement, 0.0, 0.0), step=Step(Pose2(scan_motion, 0.0, 0.0), np.zeros((3, 3)))
+            disagreement=Pose2(disagreement, 0.0, 0.0),
+            step=MatchedMotion(Pose2(scan_motion, 0.0, 0.0), np.zeros((3, 3))),
         ).is_scene_moving
         is expected
     )

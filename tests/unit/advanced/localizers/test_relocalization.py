@@ -8,7 +8,7 @@ from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.particle_filter import unmapped_cells
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import Relocalizer
-from simscen.advanced.localizers.scan_matcher import Step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
@@ -105,7 +105,7 @@ def test_detected_kidnapping_clears_the_scan_memory(is_detected: bool, is_reloca
     trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
     finder, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), []
     target = Pose2(3.9, -0.2, 2.17)
-    step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
+    step = MatchedMotion(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
     for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
         base, is_moved = Pose2(driven, 0.0, 0.0), k >= 8
         pose = target.compose(Pose2(driven - 2.0, 0.0, 0.0)) if is_moved else START.compose(base)

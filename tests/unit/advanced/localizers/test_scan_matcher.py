@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step, sample_step
+from simscen.advanced.localizers.scan_matcher import MatchedMotion, ScanMatcher, sample_motion
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.testing.synthetic_room import BEAMS, cast, scan
@@ -17,7 +17,7 @@ def view(pose: Pose2, boxes: np.ndarray | None = None) -> Scan:
     return scan(cast(*arguments)[0])
 
 
-def match(guess: Pose2, before: Scan, after: Scan) -> Step | None:
+def match(guess: Pose2, before: Scan, after: Scan) -> MatchedMotion | None:
     matcher = ScanMatcher()
     matcher.step(before, Pose2(0, 0, 0))
     return matcher.step(after, guess)
@@ -84,8 +84,8 @@ def test_empty_scan_does_not_indicate_a_kidnapping(ranges: np.ndarray) -> None:
 
 
 def test_particles_follow_a_step_with_its_covariance() -> None:
-    step = Step(STEP, np.diag([0.01, 0.0004, 0.0001]))
-    poses = sample_step(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
+    step = MatchedMotion(STEP, np.diag([0.01, 0.0004, 0.0001]))
+    poses = sample_motion(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
     assert poses.mean(axis=0) == pytest.approx((1 - 0.02, 2.3, np.pi / 2 + 0.15), abs=0.003)
     assert poses.std(axis=0) == pytest.approx((0.02, 0.1, 0.01), rel=0.03)
 
@@ -101,7 +101,7 @@ def test_particle_spread_equals_the_covariance_of_the_step() -> None:
     for _ in range(20):
         root = rng.normal(size=(3, 3)) * 0.05
         covariance, delta = root @ root.T + np.diag((1e-6, 1e-6, 1e-6)), Pose2(0.3, 0.1, -0.2)
-        after = sample_step(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
+        after = sample_motion(np.zeros((3, 3)), MatchedMotion(delta, covariance), Ones(np.random.PCG64(1)))
         error = (after - np.array(delta)).T
         assert error @ error.T == pytest.approx(covariance, rel=1e-9, abs=1e-15)
 
