@@ -29,7 +29,7 @@ BLOCK_SIZE_M = 0.2
 
 
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
-    """Return the costmap with costs of at most MAX_NON_OBSTACLE in cells where the robot would meet moving obstacles.
+    """Return the costmap with costs, up to MAX_NON_OBSTACLE, in cells where the robot would meet moving obstacles.
 
     The robot drives to each cell in a straight line from the pose `robot` at `speed` m/s; its `radius` is in m. The
     obstacles are predicted for the time of its arrival.
@@ -88,7 +88,7 @@ def meets_moving_obstacle(
 
 
 MIN_PLAN_AGE_S = 0.5
-"""Age of a plan from which on it is checked for lost clearance."""
+"""Minimum age of a plan that is checked for lost clearance."""
 SHORTCUT_PERIOD_S = 2.0
 """Time between two checks for a shorter path after obstacles have disappeared."""
 MOVING_PERIOD_S = 0.5
@@ -96,9 +96,10 @@ MOVING_PERIOD_S = 0.5
 CAUTIOUS_CLEARANCES_M = (0.10, 0.05)
 """Clearances added to the robot's radius, tried in this order, after the controller could not follow a plan."""
 PREFERRED_CLEARANCE_M, MAX_DETOUR_RATIO = 0.15, 1.15
-"""Larger added clearance, and maximum length of a path with it, relative to the path with a cautious clearance."""
+"""A path with the added clearance PREFERRED_CLEARANCE_M is preferred if it is at most MAX_DETOUR_RATIO times as long as
+the path with a cautious clearance."""
 MAX_VARYING_CELLS = 8
-"""Number of obstacle cells that vary with lidar noise. If more disappear, a shorter path is searched."""
+"""Number of obstacle cells that vary with lidar noise. If more cells become free, a shorter path is searched."""
 MAX_LENGTH_RATIO, MIN_SAVING_M = 0.85, 0.5
 """Maximum length of a shorter path relative to the rest of the current plan, and minimum length that it saves."""
 LOST_CLEARANCE_M = 0.1
@@ -141,8 +142,8 @@ class AdvancedPlanManager(PlanManager):
     """Plan manager that plans around moving obstacles.
 
     With `replanning: on_invalid`, it replans if the plan is blocked, ends at the edge of a rolling costmap that moved,
-    meets a moving obstacle, has lost clearance, or may be unnecessarily long. Most private methods are hooks of
-    PlanManager.
+    meets a moving obstacle, has lost clearance, or may be unnecessarily long. Most private methods are hooks that
+    PlanManager calls.
     """
 
     plan: ClearancePlan | None
@@ -252,7 +253,7 @@ PROGRESS_M = 1.0
 
 
 class ClearingBackoff:
-    """Policy that clears the entire global costmap at increasing intervals, otherwise only the robot's surroundings."""
+    """Policy that clears the entire global costmap at increasing intervals, and otherwise only around the robot."""
 
     def __init__(self) -> None:
         self.reset()

@@ -46,14 +46,17 @@ class Trail:
         self.driven = np.concatenate(([0.0], np.cumsum(steps)))
 
     def footprint_distance(self, poses: Array, others: Array) -> Array:
-        """Return the distances (…,) in m between poses (…, 3), plus the turn in rad times the circumscribed radius."""
+        """Return how far (…,) in m the footprint moves between poses (…, 3).
+
+        This is the distance between the poses, plus the turn in rad times the circumscribed radius.
+        """
         turned = np.abs(wrap_array(poses[..., 2] - others[..., 2]))
         return np.asarray(
             np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._radius * turned
         )
 
     def _thinned(self, trail: Array) -> Array:
-        """Return poses between which the footprint moves by at least SPACING_M."""
+        """Return a subset of the poses that are at least SPACING_M apart."""
         indices = [0]
         for k in range(1, len(trail)):
             if self.footprint_distance(trail[k], trail[indices[-1]]) >= SPACING_M:
@@ -61,7 +64,7 @@ class Trail:
         return trail[indices]
 
     def _without_loops(self, trail: Array) -> Array:
-        """Return the poses without those on loops."""
+        """Return the poses without the poses on loops."""
         moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
         indices, k = [0], 0
         while k < len(trail) - 1:
@@ -90,7 +93,7 @@ HORIZON_S = 1.0
 TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
 """Times in s at which a candidate command is checked for collisions."""
 MIN_FREE_STEPS = 3
-"""Number of steps of TIMES that must be free of collisions if no command is free for the whole horizon."""
+"""Number of the first TIMES at which a command must be free of collisions, if no command is free at all TIMES."""
 SLACK_CELLS = 0.3
 """Distance in cells by which the robot may come closer to an obstacle than on its trail."""
 DEVIATION_WEIGHT = 2.0
@@ -98,20 +101,20 @@ DEVIATION_WEIGHT = 2.0
 MIN_GAIN_M = 0.01
 """Minimum score of a command, in m above the score of standing still."""
 WINDOW_M = 0.5
-"""Length of the part of the trail, from the robot's last position on, that is searched for its present position."""
+"""Length of the part of the trail after the robot's last position that is searched for its present position."""
 SPEED_RATIOS = (-1.0, -0.5, 0.0, 0.5)
 """Candidate speeds relative to the maximum. The robot also drives forward, because a trail can have cusps."""
-TURN_RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
+TURN_RATES_RAD_S = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
 """Candidate turn rates in rad/s."""
 LATERAL_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
 """Candidate lateral speeds relative to the maximum, for a holonomic base that has strafed along its trail."""
 
 
 class TrailFollower:
-    """Follows the trail of the robot backward; straight backward where there is no trail.
+    """Makes the robot drive back along its trail, or straight backward where there is no trail.
 
-    Each step simulates a few velocities on the local costmap. The best one has much progress along the trail and little
-    deviation from it.
+    Each step simulates a few velocities on the local costmap. The best velocity has much progress along the trail and
+    little deviation from it.
     """
 
     def __init__(self, setting: Setting, speed: float) -> None:
@@ -155,6 +158,7 @@ class TrailFollower:
         return float(self._trail.along[self._index])
 
     def _window(self) -> slice:
+        """Return the slice of the trail from the last position of the robot to WINDOW_M after it."""
         along = self._trail.along
         return slice(self._index, int(np.searchsorted(along, along[self._index] + WINDOW_M, side="right")))
 
@@ -189,7 +193,7 @@ class TrailFollower:
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide with obstacle cells.
 
-        Cells that are about as near to the current pose or to a pose of the trail are ignored as errors of the costmap.
+        A cell is ignored, as an error of the costmap, if the robot is or was about as near to it on its trail.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -223,7 +227,7 @@ def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
     """Return the combinations of candidate velocities that the robot can drive."""
     commands = list[Twist]()
     for speed_ratio, lateral_ratio, rate in product(
-        SPEED_RATIOS, LATERAL_RATIOS if robot.max_lateral > 0.0 else (0.0,), TURN_RATES
+        SPEED_RATIOS, LATERAL_RATIOS if robot.max_lateral > 0.0 else (0.0,), TURN_RATES_RAD_S
     ):
         max_rate = robot.max_angular
         if robot.turning_radius > 0.0:
@@ -273,4 +277,5 @@ class Retrace:
         return command
 
     def _can_turn(self, pose: Pose2, costmap: CostmapView) -> bool:
+        """Return whether the robot has room to turn in place."""
         return distance_at(costmap, pose.x, pose.y) > self._footprint.circumscribed + costmap.resolution

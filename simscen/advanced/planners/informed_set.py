@@ -1,7 +1,7 @@
 """Informed set: the region of near-shortest paths over a coarse grid, in which OMPL's planners sample.
 
-Source: Gammell et al., Informed RRT* (2014). Their informed set is an ellipse: the points whose straight distances from
-start and goal add up to at most a limit. Here, both distances are measured along paths over a coarse grid.
+Source: Gammell et al., Informed RRT* (2014). Their informed set is an ellipse: for its points, the sum of the straight
+distances from start and goal has a limit. Here, both distances are measured along paths over a coarse grid.
 
 A block of the grid consists of several costmap cells. Two blocks are connected if free cells touch across their border.
 A gap narrower than a block therefore stays open, and a wall thinner than a block stays closed.
@@ -23,7 +23,7 @@ from simscen.stack.protocols import CostmapView
 BLOCK_M, COST_BLOCK_M = 0.2, 0.15
 """Approximate side length of the blocks for shortest paths, and for cheapest paths (`by_cost`)."""
 MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
-"""Approximate maximum number of blocks for both. Larger maps get larger blocks, but at most as wide as the robot."""
+"""Approximate maximum numbers of blocks. Larger maps get larger blocks, but at most as wide as the robot."""
 PATH_SPACING_M = 0.45
 """Distance between the points of `InformedSet.path` where there is ample clearance."""
 MAX_LEG_M = 30.0
@@ -49,7 +49,7 @@ class InformedSet:
         end_blocks = [self._index(*start), self._index(*goal)]
         graph = costs.cache.get((self._factor, by_cost))
         if graph is None:
-            costs.cache[self._factor, by_cost] = graph = _graph(costs, self._factor, by_cost)
+            costs.cache[self._factor, by_cost] = graph = _move_graph(costs, self._factor, by_cost)
         lengths, self._before = dijkstra(graph, directed=False, indices=end_blocks, return_predecessors=True)
         distances: Array = lengths * self._size
         self._from_start, self._through, self._end = distances[0], distances[0] + distances[1], end_blocks[1]
@@ -59,8 +59,8 @@ class InformedSet:
     def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
         """Restrict the set to paths that are longer than the shortest path by at most the ratio `slack`.
 
-        Only points whose distances in m along the path are in the range `section` are kept. Replaces earlier
-        restrictions. The tolerance is two block diagonals.
+        `section` is the range of distances from the start in m to which the set is also restricted. The tolerance of
+        both limits is two block diagonals. Earlier restrictions no longer apply.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
         is_inside = self._through <= self.length * (1.0 + slack) + tolerance
@@ -118,7 +118,7 @@ class InformedSet:
         return (x, self._origin[1] + (row + 0.5) * costmap.resolution), along
 
     def _best_cell(self, costmap: CostmapView, row: int, column: int) -> tuple[float, int, int]:
-        """Return the most clearance in a block, and the row and the column of the cell that has it."""
+        """Return the largest clearance in m in a block, and the row and the column of its cell."""
         top, left = row * self._factor, column * self._factor
         part = costmap.distance[top : top + self._factor, left : left + self._factor]
         best, width = int(part.argmax()), part.shape[1]
@@ -154,11 +154,11 @@ def _as_blocks(free: Mask, factor: int) -> Mask:
     return np.asarray(padded.reshape(height // factor, factor, width // factor, factor).transpose(0, 2, 1, 3))
 
 
-def _steps(blocks: Mask) -> dict[tuple[int, int], Mask]:
+def _possible_moves(blocks: Mask) -> dict[tuple[int, int], Mask]:
     """Return, for 8 of the 16 moves (rows, columns), the mask of blocks from which the move is possible.
 
-    A move to an adjacent block is possible if free cells touch across the border. A diagonal move needs one way over
-    adjacent blocks, a knight's move needs both. The other 8 moves are the opposite ones.
+    A move to an adjacent block is possible if free cells touch across the border. A diagonal move is possible if one of
+    the two ways over adjacent blocks is, a knight's move if both are. The other 8 moves are the reverse moves.
     """
     right, up = np.zeros(blocks.shape[:2], dtype=bool), np.zeros(blocks.shape[:2], dtype=bool)
     right[:, :-1] = (blocks[:, :-1, :, -1] & blocks[:, 1:, :, 0]).any(axis=2)
@@ -187,11 +187,11 @@ def _shifted(mask: Mask, rows: int, columns: int) -> Mask:
     return moved
 
 
-def _graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
-    """Return the lengths in blocks of the moves between blocks, times the mean cost if `by_cost`."""
+def _move_graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
+    """Return the graph of moves between blocks. Its weights are lengths in blocks, times the mean cost if `by_cost`."""
     blocks = _as_blocks(costs.free, factor)
     height, width = blocks.shape[:2]
-    steps = _steps(blocks)
+    steps = _possible_moves(blocks)
     moves = sorted(steps, key=lambda move: move[0] * width + move[1])
     offsets = np.array([rows * width + columns for rows, columns in moves])
     lengths = np.array([math.hypot(*move) for move in moves])
@@ -210,7 +210,7 @@ def _graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
 def _block_costs(costs: TraversalCosts, factor: int) -> Array:
     """Return the cost per m (blocks,) of each block: the mean of the cheapest cell and the average of free cells.
 
-    The average alone would make a gap more expensive than its center.
+    The average alone would be too high for a block in a narrow gap, where the robot drives in the center.
     """
     finite = np.isfinite(costs.rates)
     minimum = pool_blocks(costs.rates, factor, np.minimum, np.inf)

@@ -1,8 +1,7 @@
 """Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path.
 
-The optimization divides the path by stations, and places several points to the left and right of each station.
-Viterbi's algorithm finds the cheapest path through one point per station. The path stays on the same side of each
-obstacle.
+The optimization places stations along the path, and several points to the left and right of each station. Viterbi's
+algorithm finds the cheapest path through one point per station. The path stays on the same side of each obstacle.
 """
 
 import math
@@ -108,7 +107,10 @@ def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, st
 
 
 def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
-    """Return the costs (n - 1, k, k) from each of the `points` (n, k, 2) of a station to each point of the next one."""
+    """Return the costs (n - 1, k, k) from each point of a station to each point of the next one.
+
+    `points` (n, k, 2) are the k points of n stations. Costs are sampled every `stride` m.
+    """
     before = ((points[:-1] - costs.origin) / costs.resolution).astype(np.float32)[:, :, None]
     step = ((points[1:] - costs.origin) / costs.resolution).astype(np.float32)[:, None] - before
     samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
@@ -127,7 +129,7 @@ MAX_CACHED_CELLS = 500_000
 
 
 def medial_axis_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Return the planner: in the plane, or over poses for cars and long hulls."""
+    """Return a MedialAxisPlanner or, for cars and long hulls, a ConfinedPosePlanner."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return MedialAxisPlanner(spec, setting.robot)
@@ -135,7 +137,7 @@ def medial_axis_planner(spec: PlannerSpec, setting: Setting) -> Planner:
 
 
 class MedialAxisPlanner:
-    """Plans in the plane for a disc of the robot's inscribed radius."""
+    """Plans positions without headings, for a disc with the robot's inscribed radius."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
@@ -172,7 +174,7 @@ class MedialAxisPlanner:
         return densify(np.vstack(((start.x, start.y), path)), SPACING_M)
 
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
-        """Return the path (n, 2) of the first search that finds one."""
+        """Return the path (n, 2) of the first search that finds one. Raises NavigationFailure if none does."""
         for spacing in (costs.stride, FINE_SPACING_CELLS * costs.resolution):
             costs.stride, was_rejected = spacing, False
             for number, legs in enumerate(searches(costs, ends, seed)):
@@ -193,6 +195,7 @@ class MedialAxisPlanner:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _solve(self, leg: Leg, seed: int) -> list[Point] | None:
+        """Return the points of a leg of the path; None if the search fails."""
         return leg.search(seed, self._spec.max_iterations).solve(simplify=False)
 
 
@@ -216,7 +219,7 @@ share of the iterations, and spacing of collision checks in m."""
 
 
 class ConfinedPosePlanner(PosePlanner):
-    """Plans over poses with RRT-Connect, only within the informed set."""
+    """Plans poses with RRT-Connect, only within the informed set."""
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         """Yield the ATTEMPTS."""
@@ -238,9 +241,10 @@ PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
 
 
 def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
-    """Return a straight path (n, 2). If there are costly cells near the start, `plan_part` plans a detour around them.
+    """Return a path (n, 2) that is straight, apart from a detour by `plan_part` around costly cells near the start.
 
-    Cells within `radius` m of an obstacle are costly. None if the path may cost too much.
+    A search of the entire costmap is then not necessary. None if such a path may cost too much. Cells are costly as in
+    `costly_distance`.
     """
     length = start.distance(goal)
     costly = costly_distance(costmap, start, goal, radius)

@@ -92,9 +92,9 @@ COST_SLACK = 0.15
 """Ratio by which paths in the first search may cost more than the cheapest path over the coarse grid."""
 MAX_SAMPLES = 3000
 """Maximum number of samples of the first search. BIT* takes about ten iterations for each."""
-REACH_M = 1.8
+FIRST_REACH_M = 1.8
 """Distance up to which BIT* connects samples in the first search."""
-FAR_REACH_M = 2.3
+LATER_REACH_M = 2.3
 """Distance up to which BIT* connects samples in later searches."""
 AMPLE_CLEARANCE_M = 0.15
 """Clearance beyond the robot's radius that suffices for straight motions between samples."""
@@ -109,7 +109,7 @@ class Leg:
 
     problem: Problem
     samples: Array | None = None
-    reach: float = FAR_REACH_M
+    reach: float = LATER_REACH_M
 
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
         """Return the search for this leg, which is started with `solve`."""
@@ -119,21 +119,21 @@ class Leg:
 
 
 def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iterator[Leg]]:
-    """Yield the searches. A search is an iterator of successive legs from start to goal.
+    """Yield the searches to try one after the other. A search is an iterator of successive legs from start to goal.
 
     The first search samples the region of near-cheapest paths over a coarse grid. If the entire costmap has more than
-    MAX_SAMPLES samples, searches in corridors of near-shortest paths follow. The last ones sample the entire costmap,
-    with increasing density.
+    MAX_SAMPLES samples, searches in corridors of near-shortest paths follow. The last searches sample the entire
+    costmap with increasing density.
     """
     problem, samples = make_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
-    yield iter((Leg(problem, _cheap_samples(costs, ends, samples), REACH_M),))
+    yield iter((Leg(problem, _cheap_samples(costs, ends, samples), FIRST_REACH_M),))
     if len(samples) > MAX_SAMPLES:
         informed = InformedSet(costs, ends.start, ends.goal)
         for slack in CORRIDOR_SLACKS:
             yield _corridor_legs(costs, ends, informed, slack)
     for density in DENSITIES:
         samples = medial_axis_samples(costs.costmap, ends.reachable, seed, density)
-        yield iter((Leg(problem, samples, FAR_REACH_M / density),))
+        yield iter((Leg(problem, samples, LATER_REACH_M / density),))
 
 
 def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Array:
@@ -176,7 +176,7 @@ CHECKS_BEFORE_FIRST_BATCH = 4
 
 
 class _SampledValidity(StateValidity):
-    """Validity check that also replaces each state that BIT* draws by the next sample.
+    """Validity check that also replaces each state that BIT* draws by the next of the given samples.
 
     OMPL's Python bindings (2.0.1) do not support custom state samplers.
     """

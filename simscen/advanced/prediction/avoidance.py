@@ -13,7 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, FollowedPath, Rollouts, TrajectorySampler, arc
+from simscen.advanced.prediction.rollouts import (
+    HORIZON_S,
+    TIMES,
+    FollowedPath,
+    Rollouts,
+    TrajectorySampler,
+    arc_rollouts,
+)
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
@@ -25,8 +32,8 @@ MIN_DISTANCE_M = 0.25
 """Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
 DECAY_TIME_S = 1.2
 """Time constant in s of the exponential decay of risk with the time ahead."""
-DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
-"""Weight of the risk at each of TIMES."""
+RISK_DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
+"""Weight of the risk at each of TIMES, from 1 now toward 0."""
 APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
 """Weights of the maximum nearness to moving obstacles (1 at contact), of a collision, and of the mean nearness."""
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
@@ -86,12 +93,18 @@ class Avoidance:
         if self._is_surely_safe(command, pose, twist, near, path):
             self._last = None
             return command
-        own = self._own_rollouts(command, pose, twist, path, SPEED_FRACTIONS[:1])
+        own = self._controller_rollouts(command, pose, twist, path, SPEED_FRACTIONS[:1])
         if self._risk(own, near)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK):
             self._last = None
             return command
         self._last = self._best_command(
-            self._own_rollouts(command, pose, twist, path, SPEED_FRACTIONS), pose, twist, near, costmap, path, home
+            self._controller_rollouts(command, pose, twist, path, SPEED_FRACTIONS),
+            pose,
+            twist,
+            near,
+            costmap,
+            path,
+            home,
         )
         return self._last
 
@@ -114,7 +127,7 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None,
     ) -> Twist:
-        """Return the first command of the trajectory with the lowest cost, among `own` and those of the sampler.
+        """Return the first command of the cheapest trajectory, among the controller's (`own`) and the sampled ones.
 
         Risk and static costs take long to compute. Sampled trajectories are therefore evaluated in the order of their
         other costs, until these alone exceed the lowest total cost. At equal costs, `own` comes first.
@@ -155,7 +168,7 @@ class Avoidance:
         min_clearance: float,
         extra: float,
     ) -> Array:
-        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles closer than `min_clearance` m count."""
+        """Return the costs (n,) of trajectories, plus `extra`. `min_clearance` is described in `_static_costs`."""
         cost = self._risk(rollouts, moving)
         progress = self._progress(rollouts.x[:, -1], rollouts.y[:, -1], pose, goal)
         cost += self._static_costs(rollouts, costmap, min_clearance) - PROGRESS_WEIGHT * progress
@@ -164,22 +177,22 @@ class Avoidance:
         cost += self._change_costs(rollouts.commands)
         return cost
 
-    def _own_rollouts(
+    def _controller_rollouts(
         self, command: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, fractions: tuple[float, ...]
     ) -> Rollouts:
         """Return the controller's trajectory at fractions of its speed."""
         if path is None or len(path) < 2 or command.vx == 0.0:
-            return arc(pose, command, fractions if command != STOP else (1.0,))
+            return arc_rollouts(pose, command, fractions if command != STOP else (1.0,))
         return path.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
 
     def _risk(self, rollouts: Rollouts, moving: MovingObstacles) -> Array:
         """Return the risk (n,) of trajectories: weighted nearness to moving obstacles and collisions with them."""
         nearness, touches = self._discs.nearness(moving, rollouts.x, rollouts.y, rollouts.yaw, TIMES, MIN_DISTANCE_M)
-        near = np.minimum(np.maximum(nearness, 0.0), 2.0) ** 2 * DECAY
+        near = np.minimum(np.maximum(nearness, 0.0), 2.0) ** 2 * RISK_DECAY
         risk: Array = (
             APPROACH_WEIGHT * near.max(axis=1)
             + MEAN_WEIGHT * near.mean(axis=1)
-            + COLLISION_WEIGHT * (touches * DECAY).max(axis=1)
+            + COLLISION_WEIGHT * (touches * RISK_DECAY).max(axis=1)
         )
         return risk
 
@@ -252,7 +265,7 @@ class StandPosition:
         self._home, self._is_away = None, False
 
     def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
-        """Return the stand position, which is set to `pose` when an obstacle first moves. None before that."""
+        """Return the stand position; None until an obstacle moves, when it is set to `pose`."""
         if self._home is None and has_moving_obstacles:
             self._home = pose
         return self._home
@@ -274,4 +287,5 @@ class StandPosition:
         return Twist(sign * speed, 0.0, self._turn_rate(deviation))
 
     def _turn_rate(self, angle: float) -> float:
+        """Return the turn rate in rad/s for turning by an angle in rad."""
         return math.copysign(min(self._max_turn_rate, 2.0 * abs(angle)), angle)

@@ -56,7 +56,7 @@ class Hits:
     def may_share_segment(self, indices: list[int], count: int) -> bool:
         """Return whether one segment may contain `count` of the hits with these ascending indices.
 
-        This is a fast check before the segments are computed. Only the result False is certain.
+        This is a fast check before the segments are computed. If it returns False, no segment contains so many.
         """
         linked = 1
         for one, other in pairwise(indices):
@@ -154,7 +154,7 @@ def find_clusters(segments: Segments, ranges: Array, start: float, step: float, 
 
 
 def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> bool:
-    """Return whether a cluster has a visible edge at `beam`, because the beam `neighbor` beyond it is longer."""
+    """Return whether a cluster has a visible edge at `beam`: the beam `neighbor` next to it has a longer range."""
     if not 0 <= neighbor < len(ranges):
         if not is_full_circle:
             return False

@@ -60,6 +60,7 @@ class GyroOdometry:
         return _pose(next((each for each in reversed(poses) if each[0] <= tick), poses[0]))
 
     def _integrate(self) -> None:
+        """Integrate the pending readings."""
         if not self._pending:
             return
         poses = self._poses
@@ -104,7 +105,7 @@ class MotionPrediction:
     """Moving obstacles around the robot, and commands that avoid them.
 
     While the robot drives, `steer` changes its commands. While the robot stands, `stand` lets it step aside and drive
-    back to its position, unless `hold` was called. `on_drive` ends standing.
+    back to its position, unless `hold` was called. `on_drive` must be called when the robot drives again.
     """
 
     def __init__(
@@ -148,7 +149,7 @@ class MotionPrediction:
             self._avoidance.reset()
 
     def with_moving_hits(self, scan: Scan) -> Scan:
-        """Return the scan with flags at hits on moving obstacles, which costmaps do not mark."""
+        """Return the scan with a mask of its hits on moving obstacles. Costmaps do not mark these hits."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.moving_hits is None or tracker.tick != scan.tick:
             return scan
@@ -163,6 +164,7 @@ class MotionPrediction:
         return self._predicted[1]
 
     def _predict(self, tick: int) -> MovingObstacles:
+        """Return the tracked obstacles of all lidars, predicted for a tick."""
         predicted = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._active]
         return MovingObstacles.of(
             [obstacle for each in predicted for obstacle in each.obstacles], self._spec.acceleration

@@ -88,7 +88,7 @@ class TrajectoryFan:
 
     vx (k, times):                speeds of the speed profiles
     yaw (m, times):               headings of the turn profiles
-    cosine, sine (m, times):      of the headings in the middle of each time step
+    cosine, sine (m, times):      cosine and sine of the headings in the middle of each time step
     speed_profile, turn_profile:  indices (n,) of the profiles of each trajectory
     commands (n, 2):              first command (vx, wz) of each trajectory
     """
@@ -170,7 +170,7 @@ class FollowedPath:
     ) -> Rollouts:
         """Return the trajectories of a controller that follows the path, at `fractions` of the commanded speed.
 
-        Headings are computed only `with_headings`; otherwise, they are 0.
+        Without `with_headings`, the headings are 0, which saves time.
         """
         nearest, along = self.nearest(pose), self._along
         scale = np.array(fractions)[:, None]
@@ -227,7 +227,7 @@ class FollowedPath:
         return yaw + math.pi if backward else yaw
 
 
-def arc(pose: Pose2, command: Twist, fractions: tuple[float, ...]) -> Rollouts:
+def arc_rollouts(pose: Pose2, command: Twist, fractions: tuple[float, ...]) -> Rollouts:
     """Return the trajectories of a constant command at `fractions` of its velocity, for a robot without a path."""
     scale = np.array(fractions)[:, None]
     vx, wz = scale * command.vx + 0.0 * TIMES, scale * command.wz + 0.0 * TIMES

@@ -1,7 +1,8 @@
 """Tracking of moving obstacles in the scans of one lidar.
 
-A cluster of hits that appears in formerly free space starts a track. Later clusters near the predicted position update
-the track. A track with a significant speed over some updates counts as moving.
+A cluster of hits that appears in formerly free space, through which beams of an earlier scan passed, starts a track.
+Later clusters near the predicted position update the track. A track with a significant speed over some updates counts
+as moving.
 """
 
 import math
@@ -38,7 +39,7 @@ GATE_M, GATE_SIGMAS = 0.25, 3.0
 MIN_START_RADIUS_M = 0.15
 """Minimum radius of a cluster that starts a track outside formerly free space."""
 MIN_HIDDEN_RADIUS_M = 0.3
-"""Radius that a new track has at least if its cluster is partly hidden: that of a person."""
+"""Minimum radius of a new track with a partly hidden cluster: the radius of a person."""
 RADIUS_GAIN = 0.3
 """Gain of the update of a track's radius by a completely visible cluster."""
 
@@ -91,7 +92,7 @@ def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
 
 
 def _is_last_cluster(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
-    """Return whether a static cluster is where the track was updated last. `hidden` is added to GATE_M."""
+    """Return whether a static cluster is near the last update of a track: within GATE_M plus `hidden` in m."""
     return abs(lidar.to_lidar(track.updates[-1].position) - center) <= GATE_M + hidden
 
 

@@ -1,4 +1,4 @@
-"""Tracks of obstacles as Kalman filters with a constant-velocity model, and rules for moving and ended tracks.
+"""Tracks of obstacles as Kalman filters with a constant-velocity model, and rules by which tracks move, stand, or end.
 
 The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). Because noise
 and measurements are isotropic, position and velocity are complex numbers, and three values replace the covariance
@@ -124,32 +124,32 @@ VISIBLE_TIMEOUT_S = 0.35
 """Time without an update after which a moving track ends if its position is visible."""
 HIDDEN_TIMEOUT_S = 2.5
 """Time without an update after which a moving track ends even if its position is hidden."""
-UNSEEN_STANDING_TIMEOUT_S = 0.8
-"""Time without an update after which a track ends that is not moving."""
+STANDING_TIMEOUT_S = 0.8
+"""Time without an update after which a track that is not moving ends."""
 MAX_POSITION_STD_M = 1.2
 """Standard deviation of the position above which a track ends."""
 MAX_SPEED_M_S = 4.0
 """Speed above which a track ends, because it has changed from one obstacle to another."""
 OCCLUDED_MIN_VISIBLE_UPDATES = 5
-"""Minimum number of updates with a completely visible cluster before a track counts as moving. The OCCLUDED constants
-apply if another moving obstacle may have hidden the formerly free space."""
+"""The OCCLUDED constants apply if another moving obstacle may have hidden the formerly free space. This is the minimum
+number of updates with a completely visible cluster before a track then counts as moving."""
 OCCLUDED_MIN_TRAVEL_M = 0.4
-"""Minimum distance from its oldest stored position before a track counts as moving."""
+"""Minimum distance from its oldest stored position before a track then counts as moving."""
 OCCLUDED_SPEED_RATIO = 1.6
-"""Minimum speed of a track that counts as moving, relative to the minimum speed of moving obstacles."""
+"""Minimum speed before a track then counts as moving, relative to the minimum speed of moving obstacles."""
 OCCLUDED_MAX_OCCUPIED_SHARE = 0.2
-"""Maximum share of the stored updates with `was_occupied` of a track that counts as moving."""
+"""Maximum share of the stored updates with `was_occupied` for a track that then counts as moving."""
 FAR_TRAVEL_M = 0.5
 """A partly hidden track counts as moving after traveling twice the largest radius plus this distance. The visible part
 of a wall at the edge of the field of view grows by less."""
 MAX_UPDATES_OUTSIDE_FREE_SPACE = 5
-"""Number of consecutive updates without `appeared` after which a track ends that has not moved."""
+"""Number of consecutive updates without `appeared` after which a track that has not moved ends."""
 STANDING_AFTER_S = 1.5
 """Time below the minimum speed after which a moving track counts as standing."""
 NEVER_MOVED_TIMEOUT_S = 0.5
-"""Time below the minimum speed after which a track ends that has never moved."""
+"""Time below the minimum speed after which a track that has never moved ends."""
 MOVED_TIMEOUT_S = 10.0
-"""Time below the minimum speed after which a standing track ends that has moved before."""
+"""Time below the minimum speed after which a standing track that has moved before ends."""
 
 
 class TrackLifecycle:
@@ -187,7 +187,7 @@ class TrackLifecycle:
         is_at_rest = (tick - track.last_fast_tick) / self._rate > timeout
         return (
             is_at_rest
-            or unseen_s > UNSEEN_STANDING_TIMEOUT_S
+            or unseen_s > STANDING_TIMEOUT_S
             or (not track.has_moved and (track.static_updates >= MIN_UPDATES or _is_sliding(track, tracks)))
         )
 
@@ -223,7 +223,7 @@ class TrackLifecycle:
 
 
 def _is_sliding(track: Track, tracks: list[Track]) -> bool:
-    """Return whether a track is a wall of which different parts become visible, so that it only seems to move."""
+    """Return whether a track only seems to move, because different parts of a wall become visible."""
     return track.updates_outside_free_space >= MAX_UPDATES_OUTSIDE_FREE_SPACE and not any(
         each.is_moving for each in tracks
     )

@@ -24,8 +24,8 @@ MARGIN_M, MARGIN_RATIO = 0.25, 0.02
 SLIP_RATIOS = (0.05, 0.1, 0.15)
 """Assumed ratios of wheel slip between two scans. New points must have been free for each ratio. Otherwise, posts next
 to a fast robot would seem to jump to the next post."""
-REMAINING_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
-"""Ratios of the really driven to the measured distance, for each of SLIP_RATIOS."""
+DISTANCE_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
+"""Ratio of the distance that the robot has driven to the measured distance, for each of SLIP_RATIOS."""
 PREFERRED_AGE_S, MIN_AGE_S = 0.9, 0.2
 """Preferred and minimum age of the earlier scan. At 0.25 m/s, an obstacle moves by about MARGIN_M in 0.9 s."""
 MIN_INTERVAL_S = 0.19
@@ -33,7 +33,7 @@ MIN_INTERVAL_S = 0.19
 MIN_BEAMS = 3
 """Minimum number of beams of a stored scan."""
 HEADING_ERROR_RAD = 0.02
-"""Angle to both sides of a free point within which earlier beams must have passed, too."""
+"""Angle on each side of a free point within which the earlier beams must also have passed beyond it."""
 SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
 """Maximum difference of the distances of the same obstacle in two scans: a constant, and a share of the range."""
 MAX_SCANS = 64
@@ -173,12 +173,12 @@ class BeamComparison:
         has_appeared: Mask = free.copy()
         if len(indices):
             has_appeared[indices] = earlier.passed_beyond(
-                *earlier.beams_toward(self.rotated[indices] + REMAINING_RATIOS * self.displacement)
+                *earlier.beams_toward(self.rotated[indices] + DISTANCE_RATIOS * self.displacement)
             ).all(axis=0)
         return has_appeared
 
     def was_occupied(self) -> Mask:
-        """Return at which points the earlier scan hit something."""
+        """Return at which of the points the earlier scan hit something."""
         difference = self.earlier.padded_ranges.take(self.beam + self.earlier.geometry.neighbor_offsets)
         difference -= self.distance
         closest = np.abs(difference, out=difference).min(axis=0)
@@ -283,6 +283,7 @@ class CurrentScan:
         return end if end is not None and abs(end - point) <= reach < abs(end - current) else None
 
     def _beam_toward(self, point: complex) -> int | None:
+        """Return the index of the beam toward a point in the lidar frame; None outside the field of view."""
         scan = self.scan
         beam = round((cmath.phase(point) - scan.angle_min) % (2 * math.pi) / scan.angle_increment)
         return beam if beam < len(scan.ranges) else None
