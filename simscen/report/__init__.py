@@ -1,1 +1,1 @@
-"""Reports of a session: console lines, JUnit, JSON, Parquet, pictures, and HTML pages."""
+"""Reports of sessions and runs: console output, JUnit, JSON, Parquet, pictures, and HTML pages."""

@@ -14,7 +14,7 @@ from simscen.judge.significance import PASS_RATE
 from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_FLIPS = 10
-"""Maximum number of listed flips: pairs of runs with the same scenario and seed of which only one passed."""
+"""Maximum number of listed flips: pairs of runs with the same scenario and seed in which only one run passed."""
 MAX_CHANGES = 10
 """Maximum number of listed scenarios with a significant change of a metric or of the pass rate."""
 MIN_NAME_COLUMNS = 24
@@ -24,14 +24,15 @@ MAX_STACK_NAME_COLUMNS = 16
 
 
 Links = Mapping[tuple[str, str, int], str]
-"""For a failed run (stack or session name, scenario ID, seed): path of its replay or log, or command to repeat it."""
+"""Path of the replay or log of each failed run, or command to repeat it, by stack or session, scenario ID, and seed."""
 NO_LINKS: Links = {}
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
     """Yield a table of outcomes by scenario and stack, then the comparison of each stack with the first one.
 
-    `prefix` is removed from scenario IDs. Scenario IDs are shortened to a terminal of width `columns`; None: no limit.
+    `prefix` is removed from scenario IDs. Long scenario IDs are shortened so that a line has at most `columns`
+    characters; None: no limit.
     """
     yield ()
     yield from _outcome_table(comparison, prefix, columns)
@@ -42,9 +43,9 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 
 
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
-    """Yield the comparison of one session with the baseline, a table of changed outcomes, and the verdict.
+    """Yield the comparison of one session with the baseline, a table of changed outcomes, and a verdict.
 
-    The verdict is `is_worse`: whether the session is significantly worse than the baseline.
+    `is_worse` states whether the session is significantly worse than the baseline.
     """
     (against,) = comparison.against
     yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
@@ -63,7 +64,7 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
 
 
 def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
-    """Return whether a session is significantly worse than the baseline, and how many runs newly fail, as text."""
+    """Return a sentence: whether a session is significantly worse than the baseline, and how many runs newly fail."""
     newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
@@ -79,7 +80,7 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
 
 
 def excluded_text(against: BaselineComparison) -> str:
-    """Return the numbers of runs that are not compared, with the reasons; "" if all runs are compared."""
+    """Return the numbers of runs without a comparison, with the reasons; "" if all runs are compared."""
     parts = []
     if against.error_pairs:
         parts.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
@@ -123,19 +124,19 @@ def change_text(change: ScenarioChange, prefix: str = "") -> str:
 
 
 def change_verdict(change: ScenarioChange) -> str:
-    """Return "worse" or "better", or "other" for a metric that is neither better if larger nor better if smaller."""
+    """Return "worse" or "better", or "other" if no direction of the metric is better."""
     return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
 
 
 def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str]:
-    """Return the baseline's mean, the other stack's mean, the difference, and its 95 % interval ("" if unknown)."""
+    """Return as text: mean of the baseline, mean of the other stack, difference, its 95 % interval ("" if unknown)."""
     digits = 3 if metric.unit and max(abs(metric.baseline), abs(metric.value)) < 1 else 2
     interval = "" if metric.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in metric.interval)
     return f"{metric.baseline:.{digits}f}", f"{metric.value:.{digits}f}", f"{metric.difference:+.{digits}f}", interval
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
-    """Return the outcomes by scenario ID and stack. `changed_only`: only scenarios whose outcomes differ by stack."""
+    """Return the outcomes by scenario ID and stack; with `changed_only`, only if they differ between the stacks."""
     return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
 
 

@@ -1,6 +1,6 @@
 """Comparison of stacks or sessions as a section of an HTML page, and as Markdown for GitHub.
 
-A flip is a pair of runs (same scenario and seed) of which only one passed. `Links` has a link for each failed run.
+A flip is a pair of runs with the same scenario and seed in which only one run passed.
 """
 
 from dataclasses import replace
@@ -29,7 +29,7 @@ EXPLANATION = (
     "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
     "test for metrics, for significant changes with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
 )
-"""Explanation of the columns of the tables, printed next to them."""
+"""Explanation of the tables, which is shown next to them."""
 _HEADINGS = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
 """Headings of the table of metrics. {0} is the name of the baseline, {1} the name of the other stack."""
 

@@ -1,4 +1,4 @@
-"""Choice of the reporter for the console (with live progress, with color, or plain), and printing of single lines."""
+"""Choice of the console reporter (live progress, color, or plain), and printing of lines outside of a session."""
 
 import os
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""Text for terminals, XML, HTML, and CI logs: escaping, paths, and lines with styled parts."""
+"""Preparation of text for terminals, XML, HTML, and CI logs: escaping, paths, and wrapping of styled lines."""
 
 import base64
 import hashlib
@@ -20,7 +20,7 @@ _ASCII_REPLACEMENTS = str.maketrans(
 
 
 def relative_path(path: str, folder: str) -> str:
-    """Return a path relative to `folder`, or the path itself if it is outside of the folder."""
+    """Return a path relative to `folder`, or the unchanged path if it is outside of the folder."""
     is_inside = folder and PurePath(path).is_relative_to(folder)
     return PurePath(path).relative_to(folder).as_posix() if is_inside else PurePath(path).as_posix()
 
@@ -44,7 +44,7 @@ def html_text(text: str) -> str:
 
 
 def csp_hash(text: str) -> str:
-    """Return the hash of a script or style as a source of a content security policy: "sha256-…"."""
+    """Return the hash "sha256-…" that allows a script or style in a content security policy."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
 
 
@@ -54,7 +54,7 @@ def number_with_noun(number: int, noun: str) -> str:
 
 
 def shell_command_text(text: str) -> str:
-    """Return a command from shlex.join on one line for bash or zsh: a line break becomes `$'\\n'`, a tab `$'\\t'`."""
+    """Return a command from shlex.join on one line for bash or zsh: line breaks as `$'\\n'`, tabs as `$'\\t'`."""
     return escape_control(text.replace("\n", "'$'\\n''").replace("\t", "'$'\\t''"))
 
 
@@ -79,7 +79,7 @@ def escape_ci_markers(text: str) -> str:
 
 
 def escape_ci_markers_in_json(document: str) -> str:
-    """Escape CI commands in the text of a JSON document without changing the data."""
+    """Escape the CI commands in a JSON document. The parsed data does not change."""
     return document.replace("##", "#\\u0023")
 
 
@@ -111,15 +111,15 @@ def relative_to_cwd(file: str, folder: str) -> str:
 
 
 Role = Literal["plain", "name", "good", "bad", "warning", "quiet"]
-"""Meaning of a text, from which a reporter chooses its color and weight."""
+"""Meaning of a text. The reporter chooses the color and weight of the text by its role."""
 
 
 @dataclass(frozen=True)
 class StyledText:
     """Part of a line with a role.
 
-    `file` is the path that the text links to; "" for no link. If `is_shell` is true, the text is a shell command, which
-    is wrapped with a backslash at the end of the line.
+    `file` is the path that the text links to; "" for no link. `is_shell` marks a shell command. If it is wrapped, each
+    line except the last ends with a backslash.
     """
 
     text: str
@@ -175,6 +175,7 @@ class _LineWrapper:
         self._used_columns = 0
 
     def wrap(self, line: StyledLine) -> list[StyledLine]:
+        """Return the wrapped lines."""
         for number, part in enumerate(line):
             punctuation = number + 1 < len(line) and re.match(r"[^\s\w]+", line[number + 1].text)
             self._add_part(part, display_width(punctuation[0]) if punctuation else 0)

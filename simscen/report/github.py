@@ -71,15 +71,15 @@ def annotations(run: RunFinished) -> list[str]:
     name = short_run_name(run.key)
     if excuse := reason_without_failure(run):
         line = next((each.line for each in reported_violations(run) if not each.is_warning), 0)
-        return [_command("notice", run, line, name, excuse)]
+        return [_workflow_command("notice", run, line, name, excuse)]
     lines = [
-        _command(
+        _workflow_command(
             "warning" if each.is_warning else "error", run, each.line, name, "\n".join((each.message, *each.detail))
         )
         for each in reported_violations(run)
     ]
     if run.outcome is Outcome.ERROR:
-        lines.append(_command("error", run, 0, name, error_summary(run)))
+        lines.append(_workflow_command("error", run, 0, name, error_summary(run)))
     return lines
 
 
@@ -135,7 +135,7 @@ def _reason_cell(run: RunFinished) -> str:
     return "<br>".join(messages) if messages or not tightest else f"tightest: {markdown_cell(tightest)}"
 
 
-def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
+def _workflow_command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
     """Return a workflow command. `level` is error, warning, or notice. `line` 0 (unknown) becomes line 1."""
     file = relative_to_checkout(scenario_file(run))
     properties = f"file={_escape_property(file)},line={max(line or 1, 1)},title={_escape_property(title)}"

@@ -27,7 +27,7 @@ from simscen.report.journal_reader import (
 )
 
 BLOCK_BYTES = 1 << 20
-"""Number of bytes to read at a time when searching for the last line break of a journal."""
+"""Size of the blocks in which the last line break of a journal is searched."""
 
 
 class Journal:
@@ -140,7 +140,7 @@ def _truncate_to_complete_lines(file: int) -> int:
     return size
 
 
-def require_free(folder: Path) -> None:
+def require_unlocked(folder: Path) -> None:
     """Raise UsageError if another process has locked the journal in `folder`."""
     if (folder / JOURNAL_FILE).is_file():
         file = os.open(folder / JOURNAL_FILE, os.O_RDONLY)

@@ -116,7 +116,7 @@ def finished_run_from_data(data: dict[str, Any], folder: Path) -> RunFinished:
     )
 
 
-Run = TypeVar("Run", PlannedRun, RunFinished)
+AnyRun = TypeVar("AnyRun", PlannedRun, RunFinished)
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,11 @@ class JournaledSession:
         version: Version of simscen that wrote the journal.
         workers: Number of worker processes.
         shard: (i, n): the session ran part i of n of the selected scenarios; (1, 1) for all of them.
-        planned: All runs of the session.
+        planned: All runs of the session in order.
         finished: Finished runs by key.
         started: Keys of runs that started, whether or not they finished.
         wall: Wall time in s from the start of the session to its end, or to the last line if it did not end.
-        interrupted: Whether the session ended before all runs were finished.
+        interrupted: Whether the session was interrupted, or has runs that are not finished.
         study: Plan of the study, for a session of `simscen study`; None for other sessions.
     """
 
@@ -261,7 +261,7 @@ class _SessionReader:
         )
 
 
-def _relocate(run: Run, cwd: str) -> Run:
+def _relocate(run: AnyRun, cwd: str) -> AnyRun:
     """Return the run with its path `file` relative to the current working folder instead of the folder `cwd`."""
     return replace(run, file=intern(relative_to_cwd(run.file, cwd)))
 

@@ -1,4 +1,7 @@
-"""Console lines of `simscen judge`: details of one log, a line per log, or a table of margins for several logs."""
+"""Console lines of `simscen judge`: full result of one log, one line per log, or a table of margins of all logs.
+
+A margin is the distance between a value and its limit. It is negative if the limit is violated.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -37,7 +40,7 @@ def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine
     `runs` are pairs of the name of a log and its result.
     """
     ids = list(dict.fromkeys(verdict.id for _, run in runs for verdict in run.result.verdicts))
-    rows = [[one_line(name), *(_cell(run.result, verdict_id) for verdict_id in ids)] for name, run in runs]
+    rows = [[one_line(name), *(_margin_cell(run.result, verdict_id) for verdict_id in ids)] for name, run in runs]
     columns = list(zip(["log", *ids], *rows, strict=True))
     widths = [max(len(text) for text in column) for column in columns]
 
@@ -72,7 +75,7 @@ def _outcome_and_length(result: RunResult, name: str) -> tuple[StyledText, ...]:
     )
 
 
-def _cell(result: RunResult, verdict_id: str) -> str:
+def _margin_cell(result: RunResult, verdict_id: str) -> str:
     """Return the margin of a verdict as text. Without a margin, return "holds", "fails", "?", "error", or "-".
 
     "?" is an inconclusive verdict, "-" a missing one.
@@ -90,14 +93,14 @@ def _cell(result: RunResult, verdict_id: str) -> str:
 
 
 def _margin_text(margin: float, unit: str) -> str:
-    """Format a margin with its sign: counts as integers, other margins so that only an exact zero is shown as zero."""
+    """Format a margin with its sign. Counts become integers; other margins are shown as zero only if they are zero."""
     if not unit and margin == round(margin):
         return f"{margin:+.0f}"
     return f"{margin:+.2f} {unit}".rstrip() if margin == 0 or abs(margin) >= 0.005 else f"{margin:+.1g} {unit}".rstrip()
 
 
 def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
-    """Yield the different reasons of undecided criteria, then for each log that could not be judged its error."""
+    """Yield the distinct reasons of undecided criteria, and then the error of each log that could not be judged."""
     reasons = Counter(
         reason for _, run in runs for verdict in run.result.verdicts for reason in _undecided_reason(verdict)
     )

@@ -26,7 +26,7 @@ from simscen.report.violations import (
 )
 
 Family = Literal["simscen", "xunit2"]
-"""Variant of the format. "xunit2" omits `file`, `line`, and `properties`, which junit-10.xsd of Jenkins forbids."""
+"""Dialect of the format. "xunit2" omits `file`, `line`, and `properties`, which junit-10.xsd of Jenkins forbids."""
 MAX_CLAIM_FAILURES = 100
 """Maximum number of failed runs in the testcase of a claim."""
 
@@ -36,8 +36,8 @@ def xml_parts(
 ) -> Iterator[bytes]:
     """Yield the document in UTF-8 in consecutive parts, to save memory. Runs are sorted by file, scenario, and seed.
 
-    `name` is the name of `testsuites`. A `study` can have a claim (a minimum pass rate to show). The document then has
-    one testcase for the claim, and one for each run that could not be completed.
+    `name` is the name of `testsuites`. For a `study` with a claim (a minimum pass rate to show), the document has one
+    testcase for the claim, and one for each run that could not be completed.
     """
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = in_order(runs)
@@ -112,7 +112,7 @@ def _counts_by_file(runs: Iterable[RunFinished]) -> dict[str, SuiteCounts]:
 
 
 def _opening_tag(element: Element) -> bytes:
-    """Return the start tag of an element without content."""
+    """Return the start tag of an element that has no content yet."""
     text: bytes = ElementTree.tostring(element, encoding="utf-8")
     return text.removesuffix(b" />") + b">"
 

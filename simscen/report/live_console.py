@@ -40,7 +40,7 @@ class ProgressEstimate:
         self._total, self._finished, self._executed = 0, 0, 0
 
     def __call__(self, event: SessionEvent) -> None:
-        """Count the runs of one event."""
+        """Count the run that started or finished in this event."""
         match event:
             case SessionStarted():
                 self._total = event.total
@@ -71,7 +71,7 @@ class ProgressEstimate:
 
 
 def _round_duration(seconds: float) -> str:
-    """Format a duration, rounded to 5 s, 1 min, or 0.1 h."""
+    """Return a duration as text, rounded to 5 s, 1 min, or 0.1 h, depending on its length."""
     if seconds < 90:
         return f"{max(5, 5 * round(seconds / 5))} s"
     minutes = round(seconds / 60)

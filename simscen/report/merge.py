@@ -29,11 +29,11 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
     for folder, session in sessions.items():
         if session.version != first.version:
             message = f"it was written by simscen {session.version}, the first shard by {first.version}"
-            problems.append(_problem(folder, message))
+            problems.append(_shard_problem(folder, message))
         for run in session.planned:
             if folders_by_key.setdefault(run.key, folder) != folder:
                 message = f"{run.key.test}, seed {run.key.seed} is in {folders_by_key[run.key]} as well"
-                problems.append(_problem(folder, message))
+                problems.append(_shard_problem(folder, message))
     if problems:
         raise InvalidInput(problems)
     return sessions
@@ -46,18 +46,18 @@ def _missing_shards(sessions: dict[Path, JournaledSession]) -> list[Problem]:
     folder = next(folder for folder, session in sessions.items() if session.shard[1] == count)
     hint = "add its output folder, or use --allow-missing if it had no scenarios"
     missing = sorted(set(range(1, count + 1)) - present)
-    return [_problem(folder, f"shard {number}/{count} is missing", hint) for number in missing]
+    return [_shard_problem(folder, f"shard {number}/{count} is missing", hint) for number in missing]
 
 
-def _problem(folder: Path, message: str, hint: str = "") -> Problem:
+def _shard_problem(folder: Path, message: str, hint: str = "") -> Problem:
     return Problem(str(folder), 0, 0, "SC812", message, hint)
 
 
 def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:
     """Write one journal for all shards to `folder`, and copy the files of their runs. Raises OSError.
 
-    `runs_folder` is the name of the subfolder of an output folder with the files of the runs. Files are hard-linked if
-    the file system supports it. The wall time of the merged session is the wall time of the longest shard.
+    `runs_folder` is the name of the subfolder with the files of runs in each output folder. Files are hard-linked if the
+    file system supports it. The wall time of the merged session is the wall time of the longest shard.
     """
     planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)
     journal = Journal(folder, sync=False)

@@ -1,4 +1,4 @@
-"""Writer of results.json: the numbers of outcomes, session statistics, and the result of each run.
+"""Writer of results.json: numbers of outcomes, statistics of the session, and the result of each run.
 
 The document contains no wall times, so that equal sessions give equal documents.
 """
@@ -20,7 +20,7 @@ from simscen.judge.study import study_data
 from simscen.report.display_text import escape_ci_markers_in_json, relative_path
 
 FORMAT = 1
-"""Version of the format, which is a key of the document."""
+"""Version of the format, which the document contains as `format`."""
 
 
 def json_parts(

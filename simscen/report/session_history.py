@@ -40,9 +40,9 @@ class PastSession:
 
 
 def past_sessions(folder: Path) -> list[PastSession]:
-    """Return at most MAX_SHOWN_SESSIONS sessions that are older than that in `folder`, newest first.
+    """Return the sessions in the parent folder of `folder` that are older than the session in `folder`, newest first.
 
-    They are in the same parent folder.
+    At most MAX_SHOWN_SESSIONS are returned.
     """
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
@@ -85,7 +85,7 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 MAX_SEARCHED_SESSIONS = 50
 """Maximum number of sessions to search for failures."""
 UNFINISHED_KINDS = frozenset({"interrupted", "not-run"})
-"""Error kinds of runs that were not finished. For these runs, the outcome in an earlier session counts."""
+"""Error kinds of runs that were not finished. `last_failed` uses the outcome of such a run in an earlier session."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def sessions_in(folder: Path) -> list[Path]:
 
 
 def last_failed(folder: Path) -> LastFailed | None:
-    """Return the runs whose latest outcome in the sessions in `folder` is bad; None if there are no sessions."""
+    """Return the runs whose latest outcome is bad, from the sessions in `folder`; None if there are no sessions."""
     sessions = sessions_in(folder)
     if not sessions:
         return None

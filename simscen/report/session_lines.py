@@ -22,7 +22,7 @@ from simscen.report.violations import (
 ERROR_TAIL_LINES = 12
 """Number of last lines of a worker's output that are printed below an error."""
 FIXED_COLUMNS = 33
-"""Width of the line of a run without the name. Names are padded to at most the remaining width of the terminal."""
+"""Width of the line of a run without its name. Names are padded to at most the remaining width of the terminal."""
 MIN_NAME_COLUMNS = 16
 """Minimum width to which names are padded in a narrow terminal."""
 MAX_DISTURBANCES = 8
@@ -38,7 +38,7 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
 
 @dataclass(frozen=True)
 class RunNaming:
-    """Rule for short unique names of runs: with the seed if `has_seeds`, without `prefix`, padded to `width`."""
+    """Rule for short unique names of runs: with the seed if `has_seeds`, without the `prefix`, padded to `width`."""
 
     has_seeds: bool = False
     prefix: str = ""
@@ -222,11 +222,11 @@ MAX_DETAILED_FAILURES = 20
 NONDETERMINISTIC = "nondeterministic"
 """Kind of the error of a run whose log differs from that of its repetition."""
 
-Name = Callable[[RunKey], str]
-"""Function that returns the name of a run in lists."""
+NameOfRun = Callable[[RunKey], str]
+"""Function that returns the name of a run for a list of runs."""
 
 
-def failure_lines(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]:
+def failure_lines(runs: Sequence[RunFinished], name: NameOfRun) -> Iterator[StyledLine]:
     """Yield each failed run with its first violation or error, artifacts, and repeat command.
 
     Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
@@ -247,7 +247,7 @@ def failure_lines(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLin
             yield from artifact_lines(run)
 
 
-def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: Name) -> Iterator[StyledLine]:
+def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: NameOfRun) -> Iterator[StyledLine]:
     """Yield the runs with the longest wall times, the longest first; `max_count` 0 lists all."""
     ordered = nsmallest(max_count or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
     yield (StyledText("slowest:", "quiet"),)
@@ -258,7 +258,7 @@ def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: Name) -
 
 
 def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield whether the logs of the runs that --check-determinism repeated are equal; nothing without such runs."""
+    """Yield whether the logs of the runs that --check-determinism repeated are equal; nothing if none was repeated."""
     if not any(run.key.is_repetition for run in runs):
         return
     first_runs = {run.key: run for run in runs if not run.key.is_repetition}
@@ -278,7 +278,7 @@ def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
 
 
 def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return how much the two runs of the pairs differ: verdicts, time to the goal, and path length."""
+    """Return how much the runs of a pair differ over all pairs: verdicts, time to the goal, and path length."""
     equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
     parts = [f"verdicts equal in {equal} of {len(pairs)}"]
     for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):

@@ -27,7 +27,7 @@ def study_lines(study: Study) -> Iterator[StyledLine]:
     """Yield pass rates by parameter, effects of parameters on margins, smallest margins, pass rate, and claim."""
     yield from _rate_table(study.rates)
     yield from _effect_table(study)
-    yield from _worst_margins(study)
+    yield from _smallest_margins(study)
     yield ()
     yield (StyledText(pass_rate_text(study)),)
     for text in pass_rate_notes(study):
@@ -80,14 +80,14 @@ def claim_text(claim: ClaimResult) -> str:
 
 
 def undecided_hint(claim: ClaimResult) -> str:
-    """Return how an undecided claim can be decided: by more runs."""
+    """Return the number of runs that an undecided claim still needs, or the advice to add runs."""
     if claim.runs < claim.max_runs:
         return f"{claim.max_runs} are needed"
     return "more `runs` may decide it"
 
 
 def limits_text(claim: ClaimResult) -> str:
-    """Return the confidence limits of a claim, such as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
+    """Return the confidence limits of a claim, as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
     if claim.limits is None:
         return ""
     low, high = claim.limits
@@ -100,7 +100,7 @@ def interval_text(limits: tuple[float, float] | None) -> str:
 
 
 def effect_text(effect: ParameterEffect) -> str:
-    """Return whether a larger value of a parameter raises or lowers the margin, if the values have an order."""
+    """Return in words how a parameter affects a margin: its direction if the values of the parameter have an order."""
     if not effect.is_ordered:
         return "the margin depends on the value"
     return "a larger value lowers the margin" if effect.effect < 0 else "a larger value raises the margin"
@@ -150,7 +150,7 @@ def _effect_table(study: Study) -> Iterator[StyledLine]:
         )
 
 
-def _worst_margins(study: Study) -> Iterator[StyledLine]:
+def _smallest_margins(study: Study) -> Iterator[StyledLine]:
     """Yield the smallest margin of each criterion, and the run in which it occurred."""
     if not study.worst:
         return

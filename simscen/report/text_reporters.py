@@ -40,7 +40,7 @@ from simscen.report.session_lines import (
 from simscen.report.study import study_lines
 
 INTERRUPTED, NOT_RUN = "interrupted", "not-run"
-"""Error kinds of runs that were not finished. These runs are not printed, but counted at the end."""
+"""Error kinds of runs that were not finished. These runs are not printed, only counted at the end."""
 
 
 class SessionFormatter:
@@ -105,6 +105,7 @@ class SessionFormatter:
 
 
 def _error_kind(run: RunFinished) -> str:
+    """Return the kind of the error of a run; "" without an error."""
     return run.result.error.kind if run.result.error else ""
 
 

@@ -1,4 +1,4 @@
-"""Layouts for Foxglove, Lichtblick, and RViz, with which these programs show the MCAP log of a run."""
+"""Layouts with which Foxglove, Lichtblick, and RViz show the MCAP log of a run."""
 
 import copy
 import json

@@ -1,4 +1,4 @@
-"""Texts about a finished run for all reporters: violations, errors, names, and locations in the scenario file."""
+"""Texts about a finished run that all reporters use: violations, errors, names, and places in the scenario file."""
 
 from dataclasses import dataclass
 
@@ -107,5 +107,5 @@ def _violation(run: RunFinished, verdict: Verdict, line: int, finding: Finding) 
 
 
 def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return an error finding for a verdict without findings, whose criterion checked nothing; otherwise ()."""
+    """Return an error finding if the criterion of a verdict checked nothing and has no findings; otherwise ()."""
     return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)

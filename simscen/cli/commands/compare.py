@@ -17,7 +17,7 @@ from simscen.judge.significance import Significance
 from simscen.report.comparison import Links, session_comparison_lines
 from simscen.report.comparison_markup import session_comparison_markdown
 from simscen.report.console_reporter import print_lines
-from simscen.report.journal import require_free
+from simscen.report.journal import require_unlocked
 from simscen.report.journal_reader import JournaledSession, read_journal
 
 BASELINE, CANDIDATE = "baseline", "candidate"
@@ -73,7 +73,7 @@ def command(
     folders = {BASELINE: baseline, CANDIDATE: candidate}
     sessions = {name: read_journal(folder) for name, folder in folders.items()}
     for folder in folders.values():
-        require_free(folder)
+        require_unlocked(folder)
     _check_scenarios(sessions, candidate, changed_scenarios)
     comparison = compare_sessions(
         {name: [run.result for run in session.runs] for name, session in sessions.items()},

@@ -10,7 +10,7 @@ from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Rep
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.shared_options import JunitOption
 from simscen.core.errors import UsageError
-from simscen.report.journal import require_free
+from simscen.report.journal import require_unlocked
 from simscen.report.journal_reader import read_journal
 from simscen.report.merge import merge_shards, read_shards
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
@@ -43,7 +43,7 @@ def _merge(shards: list[Path], allow_missing: bool, out: Path) -> Path:
     """Write the journal and the run folders of all shards to a new folder. Raises UsageError and InvalidInput."""
     sessions = read_shards(shards, allow_missing)
     for shard in shards:
-        require_free(shard)
+        require_unlocked(shard)
     folder = create_output_folder(out)
     try:
         merge_shards(sessions, folder, RUNS_FOLDER)

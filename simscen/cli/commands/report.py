@@ -13,7 +13,7 @@ from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line
 from simscen.judge.study import evaluate_study
-from simscen.report.journal import require_free
+from simscen.report.journal import require_unlocked
 from simscen.report.journal_reader import JournaledSession, read_journal
 from simscen.report.parquet import write_parquet
 from simscen.report.results_json import summaries_by_stack
@@ -37,7 +37,7 @@ def command(
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
     run was not completed.
     """
-    require_free(folder)
+    require_unlocked(folder)
     past = read_journal(folder)
     if parquet is not None:
         _write_tables(past, parquet)

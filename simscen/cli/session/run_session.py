@@ -21,7 +21,7 @@ from simscen.core.records.session_events import Listener, SessionEvent
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.report.journal import Journal, require_free
+from simscen.report.journal import Journal, require_unlocked
 from simscen.report.journal_reader import read_journal
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
@@ -158,7 +158,7 @@ def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Jou
     if resume is not None:
         read_journal(resume)
     elif out is not None:
-        require_free(out)
+        require_unlocked(out)
     folder = resume or create_output_folder(out)
     try:
         return folder, Journal(folder, resume=resume is not None)

@@ -1,4 +1,4 @@
-"""HTML elements of report.html: links, outcome symbols, line charts, and pictures. Text in the elements is escaped."""
+"""HTML elements of report.html: links, outcome symbols, line charts, and pictures. The functions escape text."""
 
 import base64
 import re

@@ -12,7 +12,7 @@ from simscen.report.suite.run_entry import full_run_name
 
 MAX_CHANGES = 20
 """Maximum number of listed runs whose outcome has changed."""
-_GOOD = tuple(outcome for outcome in Outcome if outcome.good)
+_GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.good)
 
 
 def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
@@ -30,10 +30,11 @@ def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> st
 
 
 def _session_row(session: PastSession) -> str:
+    """Return the table row of a session: link, numbers of outcomes, and simulated time."""
     simulated = sum(run.simulated for run in session.runs.values())
     return (
         f'<tr><th scope="row"><a href="../{quote(session.name)}/report.html">{html_text(session.name)}</a></th>'
-        f"<td>{session.count(*_GOOD)} of {len(session.runs)}</td>"
+        f"<td>{session.count(*_GOOD_OUTCOMES)} of {len(session.runs)}</td>"
         f"<td>{session.count(Outcome.FAILED)}</td><td>{session.count(Outcome.ERROR)}</td>"
         f"<td>{simulated:.0f} s</td></tr>"
     )
@@ -41,7 +42,7 @@ def _session_row(session: PastSession) -> str:
 
 def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return a line chart of the fraction of good outcomes in the earlier sessions and in this session."""
-    shares = [session.count(*_GOOD) / max(1, len(session.runs)) for session in reversed(past)]
+    shares = [session.count(*_GOOD_OUTCOMES) / max(1, len(session.runs)) for session in reversed(past)]
     shares.append(sum(run.outcome.good for run in runs) / max(1, len(runs)))
     values = ", ".join(f"{share:.0%}" for share in shares)
     return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)

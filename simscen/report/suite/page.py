@@ -18,16 +18,17 @@ from simscen.report.session_history import PastSession, outcome_change, past_out
 from simscen.report.suite import elements
 from simscen.report.suite.elements import OUTCOME_SYMBOLS, outcome_symbols
 from simscen.report.suite.history_section import history_html
-from simscen.report.suite.run_entry import full_run_name, run_element, theme
+from simscen.report.suite.run_entry import full_run_name, run_element, scenario_folder
 from simscen.report.suite.study_section import study_html
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
-"""Order of runs on the page, by outcome."""
+"""Outcomes in the order in which the page lists the runs."""
 MAX_SYMBOLS = 200
 """Maximum number of runs of a scenario whose outcomes the heading shows as symbols."""
 MAX_LISTED_RUNS = 2000
 """Maximum number of runs on the page."""
-_FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
+_LINKED_FILES = ("junit.xml", "results.json", "run.json", "console.txt")
+"""Files in the output folder to which the headline links."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
 
 
 def _headline(report: SessionReport, totals: Totals, counts: str, listed: int) -> str:
-    links = " · ".join(f'<a href="{name}">{name}</a>' for name in _FILES[1:] if name in report.files)
+    links = " · ".join(f'<a href="{name}">{name}</a>' for name in _LINKED_FILES if name in report.files)
     facts = [
         number_with_noun(len(report.runs), "run"),
         f"{totals.simulated_s:.0f} s simulated",
@@ -192,6 +193,7 @@ def _group_element(group: list[RunFinished], report: SessionReport, totals: Tota
 
 
 def _severity_order(run: RunFinished) -> tuple[int, RunKey]:
+    """Return the sort key of a run: index of its outcome in ORDER, then its key."""
     return ORDER.index(run.outcome), run.key
 
 
@@ -206,6 +208,7 @@ def _outcome_counts(totals: Totals) -> str:
 
 @cache
 def _asset(name: str) -> str:
+    """Return the text of a style or script that simscen ships."""
     return files("simscen").joinpath("data").joinpath("suite").joinpath(name).read_text("utf-8")
 
 
@@ -232,10 +235,10 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
     if changed:
         statuses += f'<label><input type="checkbox" name="changed"> only changed ({changed})</label>'
     lists = [
-        _select("theme", Counter(theme(run.key) for run in runs)),
-        _select("tag", Counter(tag for run in runs for tag in set(run.tags))),
-        _select("stack", Counter(run.key.stack_name for run in runs)),
-        _select("variation", Counter(run.key.variation for run in runs)),
+        _filter_select("theme", Counter(scenario_folder(run.key) for run in runs)),
+        _filter_select("tag", Counter(tag for run in runs for tag in set(run.tags))),
+        _filter_select("stack", Counter(run.key.stack_name for run in runs)),
+        _filter_select("variation", Counter(run.key.variation for run in runs)),
     ]
     sorts = "".join(f'<option value="{value}">{label}</option>' for value, label in _ORDERS.items())
     return (
@@ -250,8 +253,8 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
     )
 
 
-def _select(name: str, counts: Counter[str]) -> str:
-    """Return a filter for a property. `counts` is the number of runs by value. Return "" if there is only one value."""
+def _filter_select(name: str, counts: Counter[str]) -> str:
+    """Return a filter for a property of runs; "" if it has only one value. `counts` is the number of runs by value."""
     named = sorted(value for value in counts if value)
     if not named or len(counts) < 2:
         return ""

@@ -29,6 +29,7 @@ from simscen.report.violations import (
 )
 
 _OTHER_FILES = (("scenario.yaml", "scenario"), ("worker.log", "worker's log"), ("stack.log", "stack's log"))
+"""Further files of a run to which its entry links, with the text of the link."""
 
 
 def full_run_name(key: RunKey) -> str:
@@ -67,7 +68,7 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
     values = {
         "status": run.outcome.value,
         "tags": " ".join(run.tags),
-        "theme": theme(run.key),
+        "theme": scenario_folder(run.key),
         "stack": run.key.stack_name,
         "variation": run.key.variation,
         "simulated": f"{run.result.simulated:.3f}",
@@ -78,8 +79,8 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
     return " ".join(f'data-{name}="{html_text(value)}"' for name, value in values.items() if value)
 
 
-def theme(key: RunKey) -> str:
-    """Return the folder of a scenario, by which the page filters: "faults" for "scenarios/faults/lidar_off"."""
+def scenario_folder(key: RunKey) -> str:
+    """Return the name of the folder of a scenario: "faults" for "scenarios/faults/lidar_off"."""
     return key.scenario.rpartition("/")[0].rpartition("/")[2]
 
 
@@ -93,6 +94,7 @@ def smallest_margin(run: RunFinished) -> float | None:
 
 
 def _relative_margin(finding: Finding) -> float | None:
+    """Return the margin of a finding as a fraction of the limit; None without a margin or a unit."""
     if finding.margin is None or finding.value is None or not finding.unit:
         return None
     return relative_margin(finding)

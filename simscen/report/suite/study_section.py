@@ -27,7 +27,7 @@ WIDTH, HEIGHT, MARGIN = 420, 220, 44
 
 
 def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return the section. Each point of a plot is a run and links to the replay or log in the output `folder`."""
+    """Return the section. Each point of a plot is a run, with a link to its replay or log in the output `folder`."""
     remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in pass_rate_notes(study))
     claim = ""
     if study.claim is not None:
@@ -72,7 +72,7 @@ def _effect_table(study: Study) -> str:
 
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return for each parameter a plot of the margin that depends on it most."""
+    """Return one plot per parameter: the margin that depends most on the parameter."""
     criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
     order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
     plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
@@ -80,7 +80,7 @@ def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
 
 
 def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return a plot of the margin of a criterion against the parameter at `path`; "" without points."""
+    """Return a plot of the smallest margin of a criterion against the parameter at `path`; "" without points."""
     points = []
     for run in sorted(runs, key=lambda run: (run.outcome.good, run.key))[:MAX_POINTS]:
         value = si_number(study.values.get(run.key, {}).get(path))

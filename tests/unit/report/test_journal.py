@@ -8,7 +8,7 @@ import pytest
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunStarted, SessionFinished
-from simscen.report.journal import Journal, require_free
+from simscen.report.journal import Journal, require_unlocked
 from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.report.junit import xml_parts
 from simscen.report.results_json import json_parts
@@ -95,11 +95,11 @@ def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
     journal = Journal(tmp_path)
     journal.plan(planned(runs), "0.1.0", 2)
     with pytest.raises(UsageError, match=r"is in use by pid \d+"):
-        require_free(tmp_path)
+        require_unlocked(tmp_path)
     with pytest.raises(UsageError, match="is in use by pid"):
         Journal(tmp_path, resume=True)
     journal.close()
-    require_free(tmp_path)
+    require_unlocked(tmp_path)
     with pytest.raises(UsageError, match="already contains a session"):
         Journal(tmp_path)
 

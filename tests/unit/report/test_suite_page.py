@@ -14,7 +14,7 @@ from simscen.report.results_json import json_parts
 from simscen.report.session_history import past_sessions
 from simscen.report.suite import RunningSession, SessionReport, elements, to_html
 from simscen.report.suite.elements import anchor
-from simscen.report.suite.run_entry import smallest_margin, theme
+from simscen.report.suite.run_entry import scenario_folder, smallest_margin
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
 
@@ -139,8 +139,8 @@ def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
 def test_the_least_margin_is_a_share_of_its_limit(passed, failed):
     assert smallest_margin(passed) == pytest.approx(0.014)
     assert smallest_margin(failed) == pytest.approx(-0.68)
-    assert theme(RunKey("navigation/goal", 1)) == "navigation"
-    assert theme(RunKey("goal", 1)) == ""
+    assert scenario_folder(RunKey("navigation/goal", 1)) == "navigation"
+    assert scenario_folder(RunKey("goal", 1)) == ""
 
 
 def test_every_run_has_an_anchor_of_its_own(passed):
