@@ -1,7 +1,7 @@
-"""Outcomes of disturbances (events and faults of a scenario), and verdicts on disturbances that had no effect.
+"""Outcomes of disturbances (events and faults of a scenario), and verdicts on disturbances that did not happen.
 
-A disturbance can have no effect although its trigger fired. For example, an action finds no object to act on, or a
-fault ends before its sensor sends a message.
+A disturbance does not happen if its trigger never fires or if it has no effect. For example, an action finds no object
+to act on, or a fault ends before its sensor sends a message.
 """
 
 from collections import Counter
@@ -16,7 +16,7 @@ from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
 FINDING_NAME = "disturbance did not happen"
-"""`Finding.what` for a missing disturbance."""
+"""`Finding.what` for a disturbance that did not happen."""
 
 
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
@@ -35,7 +35,7 @@ def missing_disturbances(
     """Return a verdict for each required disturbance that did not happen, with the line of the disturbance.
 
     The verdict is inconclusive if the log is truncated. Only the first missing step of a sequence gets a verdict. The
-    ID is the name of the disturbance, with a number if another verdict (also of `others`) has this ID.
+    verdict has the name of the disturbance as ID, with a number if another verdict (also one of `others`) has this ID.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
     seen = Counter(verdict.id for verdict in others)
@@ -49,7 +49,7 @@ def missing_disturbances(
 
 
 def _is_reported_earlier(outcome: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
-    """Return whether the disturbance is a step of a sequence of which an earlier step did not happen."""
+    """Return whether the disturbance did not happen because an earlier step of its sequence did not happen."""
     after = outcome.disturbance.after
     if after is None or outcome.fired:
         return False
@@ -58,7 +58,7 @@ def _is_reported_earlier(outcome: DisturbanceOutcome, outcomes: Sequence[Disturb
 
 
 def _enumerate_by_kind(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Yield each disturbance after its index among the events or faults, which the log contains as `entry`."""
+    """Yield each disturbance with its index. Events and faults are counted separately, as in `entry` in the log."""
     counts = {"event": 0, "fault": 0}
     for one in disturbances:
         yield counts[one.kind], one
@@ -102,7 +102,7 @@ def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: in
 
 
 def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
-    """Return text on when a step of a sequence was due, or which earlier step was missing; "" for other events."""
+    """Return when a step of a sequence was due or which earlier step was missing, as text; "" for other events."""
     if disturbance.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
@@ -116,7 +116,7 @@ def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:
-    """Return for each action of an event whether it took effect, and a text on its effect or the reason for none."""
+    """Return for each action of an event whether it had an effect, and the effect or the reason for none as text."""
     effects = ended.data.get("effects")
     assert isinstance(effects, list)
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]

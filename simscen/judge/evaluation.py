@@ -1,4 +1,4 @@
-"""Evaluation of the criteria of a run."""
+"""Evaluation of the criteria of a run: one verdict for each criterion."""
 
 import math
 from collections.abc import Sequence, Set
@@ -28,9 +28,9 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    A criterion that raises an exception gets the verdict error. A verdict is inconclusive if the log lacks the evidence
-    that the criterion needs. A pass becomes inconclusive if the log is truncated or empty, or if the evidence covers
-    only a part of the run.
+    `coverage` states which evidence the log contains, and for which part of the run. A criterion that raises an
+    exception gets the verdict error. A verdict is inconclusive if the log lacks required evidence. A pass becomes
+    inconclusive if the log is truncated or empty, or if the evidence covers only a part of the run.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -45,7 +45,7 @@ def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
 
 
 def missing_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
-    """Return a text on the required evidence that the log lacks; "" if nothing is missing."""
+    """Return as text which required evidence the log lacks; "" if nothing is missing."""
     missing = coverage.lacking(required)
     return f"the log lacks {' and '.join(evidence.value for evidence in missing)}" if missing else ""
 
@@ -91,7 +91,7 @@ def _error(entry: AnyCriterion, what: str) -> Finding:
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """Return the findings with inconclusive instead of pass, and the reason `because` after the measured value."""
+    """Return the findings; each pass becomes inconclusive, with the reason `because` after its measured value."""
     return tuple(
         replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
         if finding.status is Status.PASS

@@ -1,4 +1,4 @@
-"""Likely causes of failed findings, found in the trace of the run and added to the findings as lines of text.
+"""Search for likely causes of failed findings in the trace of the run. Causes are added to findings as lines of text.
 
 Lines with "why" state a cause that follows from geometry or physics, such as an object that blocks the path. Lines with
 "meanwhile" list faults and events that were active at the time of the failure.
@@ -85,6 +85,7 @@ def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
 
 
 def _end_tick(trace: Trace, start: Event) -> int | None:
+    """Return the tick at which the fault with this start event ended, or None."""
     ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
     return next((end for end in ends if end > start.tick), None)
 
@@ -112,7 +113,7 @@ OBJECT_SPEED_WINDOW_S = 0.25
 
 
 def diagnose_collision(trace: Trace, tick: int) -> Diagnosis:
-    """Return sentences on the movable objects that the robot began to touch at `tick`, and their events."""
+    """Return sentences on the movable objects that the robot began to touch at `tick`, and names of their events."""
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
     touched = [each for each in movable_objects(trace, tick) if each.name in hits]
     described = [(each, _describe_hit(trace, each, hits[each.name])) for each in touched]
@@ -137,7 +138,7 @@ def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
 
 
 def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
-    """Return the distance in m between the spawned object and the robot's center at that time."""
+    """Return the distance in m between an object and the robot's center when the object was spawned."""
     return float(spawned.distance(np.array([trace.place(spawned.since)]))[0])
 
 
@@ -152,9 +153,9 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Faults whose error remains in the odometry after the end of the fault."""
+"""Kinds of faults whose odometry error remains after the end of the fault."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
-"""Kinds of targets of ODOMETRY_FAULTS."""
+"""Kinds of targets of these faults."""
 LOST_DISTANCE_M = 0.5
 """Localization error from which a robot counts as lost."""
 
@@ -162,7 +163,7 @@ LOST_DISTANCE_M = 0.5
 def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> Diagnosis:
     """Return sentences on a large localization error and its causes, and the disturbances that caused it.
 
-    With `error_is_reported`, there is no sentence on the error itself, because the failed finding states it.
+    If `error_is_reported`, the failed finding states the error, so that no sentence repeats it.
     """
     error = _position_error(trace, tick)
     if not error >= LOST_DISTANCE_M:  # also for nan: unknown
@@ -181,7 +182,7 @@ def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> D
             ago = trace.seconds(tick - event.tick)
             lines.append(f"event `{current_event}` had moved the robot elsewhere {ago:.2f} s before")
             named.add(current_event)
-        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified(trace, event.name)):
+        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified_quantity(trace, event.name)):
             lines.append(f"{event.name} falsified {what} from t = {trace.seconds(event.tick):.2f} s on")
             named.add(event.name)
     return lines, named
@@ -196,7 +197,7 @@ def _position_error(trace: Trace, tick: int) -> float:
     return float(np.hypot(bx - x, by - y))
 
 
-def _falsified(trace: Trace, label: str) -> str:
+def _falsified_quantity(trace: Trace, label: str) -> str:
     """Return the quantity that a fault falsified: "its belief", "its odometry", or "" for other quantities."""
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
     if not starts:

@@ -9,12 +9,12 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
 """Criterion name of verdicts on missing events and faults. The ID is the name of the event or fault."""
-ARRIVAL = "goals_reached"
-"""Name of the criterion on the distance from goals."""
+GOALS_REACHED = "goals_reached"
+"""Name of the criterion that checks the true pose of the robot at its goals."""
 MAX_TIMES_SHOWN = 5
 """Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
-"""Relations of the measured value to a limit that holds and to a limit that is violated, by the start of the limit."""
+"""Signs between a measured value and its limit, by the start of the limit: if the limit is kept, and if not."""
 
 
 def comparison(finding: Finding) -> str:
@@ -69,14 +69,14 @@ def disturbance_line(outcome: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the findings that are not a pass, in order."""
+    """Return the findings of a verdict that did not pass, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
     """Return the smallest relative margin of a pass, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Values without a unit are left out, and so are the distance from a goal and the waiting time there.
+    Values without a unit, the distance from a goal, and the waiting time at a goal are left out.
     """
     # Robots always stop near the limit of the distance from a goal.
     tightest = _tightest_finding(verdicts)
@@ -88,9 +88,9 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 
 
 def run_margin(result: RunResult) -> float:
-    """Return the smallest relative margin of a run, limited to at least 0 if the run passed.
+    """Return the smallest relative margin of a run: at least 0 for a passed run, otherwise negative and at least -1.
 
-    For other runs, the margin is negative and at least -1. Without a margin, returns 1 for a pass and otherwise -1.
+    If no finding has a margin, return 1 for a passed run, otherwise -1.
     """
     if result.outcome is Outcome.PASSED:
         tightest = _tightest_finding(result.verdicts)
@@ -101,6 +101,7 @@ def run_margin(result: RunResult) -> float:
 
 
 def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | None:
+    """Return the passed finding with the smallest relative margin, with its verdict; see `tightest_margin`."""
     findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _is_about_arrival(v, f)]
     measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
     return min(measured, key=lambda pair: relative_margin(pair[1]), default=None)
@@ -108,11 +109,11 @@ def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | 
 
 def _is_about_arrival(verdict: Verdict, finding: Finding) -> bool:
     """Return whether the finding is on the distance from a goal or on the waiting time there."""
-    return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
+    return verdict.criterion == GOALS_REACHED and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 
 def relative_margin(finding: Finding) -> float:
-    """Return the margin relative to the limit, or the margin itself if the limit is 0 or unknown."""
+    """Return the margin divided by the limit, or the margin itself if the limit is 0 or unknown."""
     margin, limit = finding.margin or 0.0, _limit(finding)
     return margin / abs(limit) if limit else margin
 

@@ -1,4 +1,4 @@
-"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot."""
+"""Search for the causes of a missed goal, such as a blocked passage, an occupied goal, or an object near the robot."""
 
 import math
 from collections import Counter
@@ -17,7 +17,7 @@ from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 
 Diagnosis = tuple[list[str], set[str]]
-"""Sentences on causes, and names of the disturbances in these sentences ("" for an object from the start)."""
+"""Sentences on causes, and names of the disturbances that they mention ("" for an object that no event moved)."""
 
 
 @dataclass(frozen=True)
@@ -112,25 +112,26 @@ NEAR_ROBOT_M = 0.3
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
-    """Return why the robot does not reach its current goal at `tick`. Both parts are empty without a current goal."""
+    """Return why the robot has not reached its current goal at `tick`. Without a current goal, nothing is returned."""
     outcome = _current_goal(trace, case, tick)
     if outcome is None:
         return [], set()
     goal, objects = outcome.goal, movable_objects(trace, tick)
-    lines, named = [*_unreachable(case, goal), *_stopped(trace, tick), *_touching(trace, tick)], set[str]()
+    lines = [*_unreachable_goal(case, goal), *_robot_hold(trace, tick), *_touched_objects(trace, tick)]
+    named: set[str] = set()
     for sentences, events in (
-        _occupied(trace, case, goal, objects),
+        _occupied_goal(trace, case, goal, objects),
         diagnose_blocked_path(trace, case, goal.name, tick, objects),
-        _nearby(trace, case, tick, objects),
+        _nearby_object(trace, case, tick, objects),
     ):
         if "" in events or not events <= named:  # one sentence for each event is enough
             lines += sentences
             named |= events
-    return [*(lines or _gave_up(trace, outcome, tick)), *_failed_recoveries(trace, outcome, tick)], named
+    return [*(lines or _reported_failure(trace, outcome, tick)), *_failed_recoveries(trace, outcome, tick)], named
 
 
 def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """Return the outcome of the last goal that was accepted until `tick`; None without a goal or if it is over."""
+    """Return the outcome of the last goal that was accepted until `tick`; None if there is none or if it is over."""
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     return started[-1] if started and not _is_over(started[-1], tick) else None
 
@@ -142,7 +143,7 @@ def _is_over(outcome: GoalOutcome, tick: int) -> bool:
     return outcome.end is not None and outcome.end.kind == EventKind.GOAL_CANCELED and outcome.end.tick < tick
 
 
-def _unreachable(case: Case, goal: Goal) -> list[str]:
+def _unreachable_goal(case: Case, goal: Goal) -> list[str]:
     """Return a sentence if the static world has no path to the goal."""
     if case.shortest.get(goal.name) != math.inf:
         return []
@@ -152,7 +153,7 @@ def _unreachable(case: Case, goal: Goal) -> list[str]:
     return [f"the world has no path to goal {goal.name} for a robot {needed:.2f} m wide{where}"]
 
 
-def _stopped(trace: Trace, tick: int) -> list[str]:
+def _robot_hold(trace: Trace, tick: int) -> list[str]:
     """Return a sentence with the reported reason if the stack holds the robot at `tick`."""
     last = [
         event
@@ -167,7 +168,7 @@ def _stopped(trace: Trace, tick: int) -> list[str]:
     ]
 
 
-def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
+def _reported_failure(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """Return a sentence with the stack's message if it gave up the goal, and with the recoveries before."""
     end = outcome.end
     if end is None or end.tick > tick or error_code_name(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
@@ -187,7 +188,7 @@ def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[st
     return [f"recoveries failed: {', '.join(counted)}"] if failed else []
 
 
-def _touching(trace: Trace, tick: int) -> list[str]:
+def _touched_objects(trace: Trace, tick: int) -> list[str]:
     """Return sentences on the objects that the robot touches at `tick`."""
     since: dict[str, int] = {}
     for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
@@ -198,7 +199,7 @@ def _touching(trace: Trace, tick: int) -> list[str]:
     return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
 
 
-def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> Diagnosis:
+def _occupied_goal(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> Diagnosis:
     """Return a sentence on an object that occupies the goal."""
     place = np.array([[goal.pose.x, goal.pose.y]])
     for each in objects:
@@ -209,7 +210,7 @@ def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]
     return [], set()
 
 
-def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> Diagnosis:
+def _nearby_object(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> Diagnosis:
     """Return a sentence on the object nearest to the robot, if it is within NEAR_ROBOT_M."""
     if not objects or not len(trace.truth):
         return [], set()
@@ -222,17 +223,17 @@ def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -
 
 
 SEARCH_STEP_M = 0.005
-"""Distance between the sample points of the free width of a passage."""
+"""Distance between the points of a passage at which its free width is computed."""
 NEGLIGIBLE_WIDTH_M = 0.02
 """Smaller widths and changes of widths are ignored."""
 ON_PATH_DISTANCE_M = 0.5
-"""Maximum distance between the nearest passage and a robot on the path."""
+"""Maximum distance from the nearest passage up to which a robot counts as on the path."""
 
 
 def diagnose_blocked_path(
     trace: Trace, case: Case, goal: str, tick: int, objects: Sequence[MovableObject]
 ) -> Diagnosis:
-    """Return a sentence on the narrowest passage of the shortest path to `goal` that objects close or narrow.
+    """Return a sentence on the passage of the shortest path to `goal` that objects narrow the most.
 
     A passage is closed if the inscribed circle of the robot cannot pass. It is narrowed if the robot cannot turn there.
     """

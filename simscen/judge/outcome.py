@@ -29,7 +29,8 @@ def apply_expectation(
 ) -> tuple[Outcome, Verdict | None]:
     """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
 
-    Returns `outcome` and None if nothing is expected, if `outcome` is an error, or if the log is not complete.
+    If nothing is expected, if `outcome` is an error, or if the log is not complete, `outcome` remains unchanged and
+    there is no verdict.
 
     As with pytest's `xfail(strict=True)`, the run fails if no criterion fails. If the expectation lists criteria, the
     run also fails if one of them passes or if another criterion does not pass. A missing disturbance is only expected
@@ -45,7 +46,7 @@ def apply_expectation(
     limit = f"a failure: {expected.reason}"
     name = EXPECTED if all(verdict.id != EXPECTED for verdict in verdicts) else f"{EXPECTED}#2"
     if unexpected or not failed:
-        measured = f"{_names(unexpected)} passed" if unexpected else _nothing_failed(covered)
+        measured = f"{_names(unexpected)} passed" if unexpected else _describe_no_failure(covered)
         return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
     others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
     verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))
@@ -56,7 +57,8 @@ def _is_expected_to_fail(verdict: Verdict, expected: ExpectedFailure) -> bool:
     return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
 
 
-def _nothing_failed(verdicts: Sequence[Verdict]) -> str:
+def _describe_no_failure(verdicts: Sequence[Verdict]) -> str:
+    """Return text for a run that was expected to fail, but in which no criterion failed."""
     undecided_verdicts = [verdict for verdict in verdicts if verdict.status is not Status.PASS]
     return f"nothing failed, {_names(undecided_verdicts)} undecided" if undecided_verdicts else "everything passed"
 

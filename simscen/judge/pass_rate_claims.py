@@ -43,7 +43,7 @@ def is_counted(result: RunResult) -> bool:
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
-    """Return the number of runs after which the claim is decided (all runs if undecided), and the decision.
+    """Return the number of runs after which the claim is decided, and the decision. If it is undecided, all runs count.
 
     `outcomes` are True for passed runs, in order, and at most `claim.max_runs`.
     """

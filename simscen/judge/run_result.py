@@ -1,4 +1,4 @@
-"""Judgment of the run of one robot: verdicts, outcomes of disturbances, and metrics."""
+"""Judgment of the run of one robot: computes verdicts, outcomes of disturbances, metrics, and the outcome."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def judge_run(
 
     path:      scenario file
     lines:     line of each criterion in the scenario file; () if the criteria come from another file
-    coverage:  evidence that the log contains
+    coverage:  evidence that the log contains, and for which part of the run
     metrics:   additional metrics of plugins
     expected:  expected failure of the run; None to expect success
     """

@@ -1,4 +1,4 @@
-"""Combination of the results of several robots of a run to one result."""
+"""Combination of the results of the robots of one run into a single result."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ from simscen.judge.outcome import apply_expectation
 
 T = TypeVar("T")
 SUCCESS = "success"
-"""Metric of each robot and of the run."""
+"""Name of the success metric (1 or 0), which the run and each robot have."""
 WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
-"""Prefixes of kinds of events that the traces of all robots contain."""
+"""Prefixes of the kinds of events of the world, which the trace of each robot contains."""
 
 
 def combine_robots(
@@ -26,7 +26,7 @@ def combine_robots(
     """Return the result of a run from the results and traces of its robots, by name of the robot.
 
     The run passes if all robots pass. Verdicts, metrics, and faults of a robot get the name `robot/name`. Events of the
-    world and verdicts on them are listed once. The metric `success` of the run is the smallest of its robots.
+    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots.
     `expected` is the expected failure of the run; None to expect success.
     """
     first = next(iter(results.values()))

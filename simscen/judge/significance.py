@@ -7,12 +7,12 @@ from simscen.core.records.comparison import ScenarioChange
 from simscen.core.statistics import holm, sign_test
 
 PASS_RATE = "pass rate"
-"""`PairedSample.what` for values of 1 for a passed and 0 for a failed run."""
+"""`PairedSample.what` for the outcome of runs: the values are 1 for a passed and 0 for a failed run."""
 
 
 @dataclass(frozen=True)
 class Significance:
-    """Conditions under which a change is significant.
+    """Conditions under which a change counts as significant.
 
     alpha:       largest p-value, after Holm's correction for the number of tests
     min_effect:  smallest change of the mean, relative to the mean of the baseline
@@ -47,7 +47,7 @@ class PairedSample:
 def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
     """Return the changes that are significant and large enough, with p-values adjusted by Holm's correction.
 
-    Samples without any difference do not count in the correction.
+    Samples in which all pairs are equal do not count in the correction.
     """
     tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
     found = []

@@ -15,11 +15,11 @@ from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
-"""Minimum number of runs for which effects of parameters are computed."""
+"""Minimum number of runs from which effects of parameters are computed."""
 RANGE_COUNT = 4
 """Number of ranges for a parameter with many different numbers. Ranges have about the same number of runs."""
 MAX_LISTED_VALUES = 10
-"""Maximum number of different values of a parameter without ranges."""
+"""Maximum number of different values of a parameter that are listed one by one, not as ranges."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class StudyPlan:
         claim: Claim about the pass rate; None if the scenario has no `acceptance`.
         values: Values of the varied parameters, by run and by path of the parameter in the scenario.
         is_designed_in_pairs: True for pairwise testing: all pairs of values of two parameters occur.
-        drawn: Number of random draws until all runs met the condition `require`; 0 without `require`.
+        drawn: Number of random draws of values that were needed to meet the condition `require`; 0 without `require`.
         stops_early: True if the study ends when it has found enough failures.
     """
 
@@ -96,7 +96,7 @@ def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
 
 
 def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[str, tuple[RunKey, float, str]]:
-    """Return for each criterion the run with the smallest margin, this margin, and its unit."""
+    """Return the run with the smallest margin, this margin, and its unit, by verdict ID."""
     worst: dict[str, tuple[RunKey, float, str]] = {}
     for key, own in margins.items():
         for criterion, (margin, unit) in own.items():
@@ -123,7 +123,7 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
 
 
 def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
-    """Return a key function that sorts labels by their smallest value, and texts after numbers."""
+    """Return a sort key for labels: by their smallest number, and texts after numbers."""
     least: dict[str, tuple[int, float, str]] = {}
     for label, result in zip(labels, results, strict=True):
         value = si_number(plan.values.get(result.key, {}).get(path))

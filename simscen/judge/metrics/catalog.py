@@ -1,4 +1,4 @@
-"""Catalog of the metrics of every run: names, units, and definitions."""
+"""Catalog of the metrics that are computed for every run: names, units, definitions, and required evidence."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -28,15 +28,15 @@ _GOALS = frozenset({Evidence.NAVIGATION})
 _SUCCESS = POSITION | _GOALS | {Evidence.CONTACTS}
 _BELIEF = POSITION | {Evidence.BELIEF}
 _PEOPLE = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT}
-"""Evidence that several metrics need."""
+"""Sets of evidence that several metrics need."""
 
-_ERRORS = {
+_ERROR_STATISTICS = {
     "rmse": "root mean square",
     "mean": "mean",
     "median": "median",
     "max": "largest",
 }
-"""Statistics of pose errors: suffix of the metric's name, and text."""
+"""Statistics of pose errors: text by suffix of the metric's name."""
 
 METRICS: dict[str, Metric] = {
     "success": Metric(
@@ -139,14 +139,14 @@ METRICS: dict[str, Metric] = {
             "evo",
             evidence=_BELIEF,
         )
-        for name, text in _ERRORS.items()
+        for name, text in _ERROR_STATISTICS.items()
     },
     "ape_trans_final": Metric("m", "Final distance between belief and truth.", evidence=_BELIEF),
     **{
         f"ape_rot_{name}": Metric(
             "rad", f"Absolute pose error, heading: {text} angle between belief and truth.", "evo", evidence=_BELIEF
         )
-        for name, text in _ERRORS.items()
+        for name, text in _ERROR_STATISTICS.items()
     },
     **{
         f"rpe_trans_{name}": Metric(
@@ -155,7 +155,7 @@ METRICS: dict[str, Metric] = {
             "evo, delta 1 m, pairs from reference",
             evidence=frozenset({Evidence.TRUTH, Evidence.BELIEF}),
         )
-        for name, text in _ERRORS.items()
+        for name, text in _ERROR_STATISTICS.items()
     },
     **{
         f"rpe_rot_{name}": Metric(
@@ -164,7 +164,7 @@ METRICS: dict[str, Metric] = {
             "evo",
             evidence=frozenset({Evidence.TRUTH, Evidence.BELIEF}),
         )
-        for name, text in _ERRORS.items()
+        for name, text in _ERROR_STATISTICS.items()
     },
     "nees": Metric(
         "",
@@ -177,4 +177,4 @@ METRICS: dict[str, Metric] = {
 """Metrics by name, in the order of the reference page."""
 
 ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.metrics.compute:compute_metrics")
-"""Module and function that computes each metric."""
+"""Module and function that computes the metric, by name of the metric."""

@@ -1,4 +1,4 @@
-"""Paired comparison of stacks or sessions on the same scenarios and seeds."""
+"""Paired comparison of stacks or sessions: outcomes and metrics of runs with the same scenario and seed."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,13 +21,13 @@ COMPARED_METRICS = (
 )
 """Metrics that are compared, in the order of the table. Metrics of plugins follow."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
-"""Compared metrics for which a higher value is better. For the other COMPARED_METRICS, a lower value is better."""
-OUTCOME_INDEPENDENT = frozenset({"collisions"})
-"""Metrics that are compared in all pairs of runs. Other metrics are only compared if both runs reach the same goals."""
+"""Compared metrics of which higher values are better. Lower values of the other COMPARED_METRICS are better."""
+METRICS_OF_ALL_PAIRS = frozenset({"collisions"})
+"""Metrics that are compared in all pairs of runs. Others need pairs in which the same robots reach their last goals."""
 ALL_SCENARIOS = "all scenarios"
-"""Scenario name of changes over all scenarios."""
+"""Name that stands for all scenarios together."""
 _SEED = 1
-"""Seed of the bootstrap."""
+"""Seed of the bootstrap confidence intervals."""
 
 Pair = tuple[RunResult, RunResult]
 """Results of the baseline and of the other stack or session for the same scenario and seed."""
@@ -71,19 +71,21 @@ def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significan
     baseline, *others = stacks
     return Comparison(
         stacks,
-        {test: _row(test, stacks, runs) for test in sorted({key.test for key in runs})},
+        {scenario: _outcomes_by_stack(scenario, stacks, runs) for scenario in sorted({key.test for key in runs})},
         tuple(_compare_with_baseline(runs, baseline, other, significance) for other in others),
     )
 
 
-def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, OutcomeCounts]:
+def _outcomes_by_stack(
+    scenario: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]
+) -> dict[str, OutcomeCounts]:
     """Return the numbers of outcomes of a scenario or variation, by stack."""
-    own = [run for key, run in runs.items() if key.test == test]
+    own = [run for key, run in runs.items() if key.test == scenario]
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
 def _own_outcome(run: RunResult) -> Outcome:
-    """Return the outcome of the run without its expected failure."""
+    """Return the outcome that the run would have if no failure were expected."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
@@ -137,7 +139,7 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
     """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric by scenario.
 
-    `completed` are the pairs without errors. `same_arrival` are the pairs in which the same robots reached their goals.
+    `completed` are the pairs without errors, and `same_arrival` those in which the same robots reach their last goals.
     """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:
@@ -156,12 +158,12 @@ def _passed(run: RunResult) -> float:
 
 
 def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
-    """Return the pairs in which a metric can be compared: `completed` for OUTCOME_INDEPENDENT metrics."""
-    return completed if _kind(name) in OUTCOME_INDEPENDENT else same_arrival
+    """Return the pairs in which a metric can be compared: `completed` or `same_arrival`, see METRICS_OF_ALL_PAIRS."""
+    return completed if _kind(name) in METRICS_OF_ALL_PAIRS else same_arrival
 
 
 def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
-    """Return the values of a metric in the pairs of runs that both have the metric."""
+    """Return the values of a metric in the pairs in which both runs have the metric."""
     both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
     return [(one, two) for one, two in both if one is not None and two is not None]
 
@@ -187,7 +189,7 @@ def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
 
 
 def _arrived(run: RunResult) -> set[str]:
-    """Return the robots that reached their last goals. A single robot has the name ""."""
+    """Return the names of the robots that reached their last goals. A single robot has the name ""."""
     times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
@@ -202,6 +204,7 @@ def _flip(pair: Pair) -> Flip | None:
 
 
 def _first_violation(run: RunResult) -> str:
+    """Return the first violation of a run as text, or why the run ended if there is none."""
     sentences = [
         sentence(verdict, finding, run.tick_rate)
         for verdict in run.verdicts

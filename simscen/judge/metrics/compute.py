@@ -1,4 +1,4 @@
-"""Computation of the metrics of a run: all metrics of the catalog, and metrics of plugins that a scenario requests."""
+"""Computation of the metrics of a run: all metrics of the catalog, and the plugin metrics that a scenario requests."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +32,7 @@ STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 """Speed and absolute turn rate below which a robot stands still."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""Speed of the optimal time in the BARN score."""
+"""Mean speed of a robot that needs the optimal time of the BARN score."""
 
 ZONES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
@@ -41,14 +41,14 @@ ZONES = {
 }
 """Hall's zones around a person: smallest and largest distance in m."""
 
-_SHORTEST = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
-_NAVIGATION = ("success", "path_length", "time_to_goal", *_SHORTEST)
-_SMOOTHNESS = ("sparc", "ldlj")
-_MOTION = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS)
-_CLEARANCE = ("min_clearance", "mean_clearance")
-_PEOPLE = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
-_EVENTS = ("collisions", "contact_time", "replans", "recoveries")
-"""Groups of metrics that are computed together."""
+_SHORTEST_PATH_METRICS = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
+_NAVIGATION_METRICS = ("success", "path_length", "time_to_goal", *_SHORTEST_PATH_METRICS)
+_SMOOTHNESS_METRICS = ("sparc", "ldlj")
+_MOTION_METRICS = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS_METRICS)
+_CLEARANCE_METRICS = ("min_clearance", "mean_clearance")
+_PEOPLE_METRICS = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
+_EVENT_METRICS = ("collisions", "contact_time", "replans", "recoveries")
+"""Names of metrics that are computed together."""
 
 
 @dataclass(frozen=True)
@@ -66,17 +66,17 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
-        (_NAVIGATION, lambda: _navigation(trace, case, path().length)),
+        (_NAVIGATION_METRICS, lambda: _navigation(trace, case, path().length)),
         (PATH_METRICS, lambda: path_metrics(trace, path())),
-        (_MOTION, lambda: _motion(trace, case)),
-        (_CLEARANCE, lambda: _clearance(trace)),
-        (_PEOPLE, lambda: person_metrics(trace, case)),
-        (_EVENTS, lambda: _events(trace)),
+        (_MOTION_METRICS, lambda: _motion(trace, case)),
+        (_CLEARANCE_METRICS, lambda: _clearance(trace)),
+        (_PEOPLE_METRICS, lambda: person_metrics(trace, case)),
+        (_EVENT_METRICS, lambda: _events(trace)),
         (POSE_METRICS, lambda: pose_metrics(trace)),
     )
     found: Values = {}
     for names, compute in groups:
-        found |= _or_reason(names, compute)
+        found |= _compute_or_explain(names, compute)
     found |= {name: reason for name in METRICS if (reason := _missing_evidence(name, coverage))}
     return MetricValues(
         {name: None if isinstance(found[name], str) else found[name] for name in METRICS},  # type: ignore[misc]
@@ -84,8 +84,8 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     )
 
 
-def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
-    """Return the metrics that `compute` returns, or the reason why they cannot be computed for each of `names`."""
+def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> Values:
+    """Return the metrics `names` from `compute`, or for each of them the reason why it cannot be computed."""
     try:
         return compute()
     except (InvalidTrace, MissingEvidence, SignalUnavailable) as reason:
@@ -93,7 +93,7 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
 
 
 def _missing_evidence(name: str, coverage: LogCoverage) -> str:
-    """Return a text on the evidence of a metric that the log lacks; "" if the log has all of it."""
+    """Return as text which evidence of a metric the log lacks for a part of the run; "" if it has all."""
     required = METRICS[name].evidence
     return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
@@ -115,7 +115,7 @@ def _navigation(trace: Trace, case: Case, length: float) -> Values:
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
     found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}
     if unknown_reason:
-        return {**found, **dict.fromkeys(_SHORTEST, unknown_reason)}
+        return {**found, **dict.fromkeys(_SHORTEST_PATH_METRICS, unknown_reason)}
     return {
         **found,
         "barn_score": _barn_score(case, success, seconds, shortest),
@@ -127,6 +127,7 @@ def _navigation(trace: Trace, case: Case, length: float) -> Values:
 
 
 def _success(trace: Trace, case: Case) -> bool:
+    """Return whether the robot truly reached all goals and touched nothing."""
     findings = GoalsReached().judge(trace, case)
     touched = trace.of_kind(EventKind.COLLISION_STARTED)
     return all(finding.status is Status.PASS for finding in findings) and not touched
@@ -159,15 +160,15 @@ def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float
 def _motion(trace: Trace, case: Case) -> Values:
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):
-        return dict.fromkeys(_MOTION, "the true velocity was not recorded")
+        return dict.fromkeys(_MOTION_METRICS, "the true velocity was not recorded")
     speeds = linear.values[:, 0]
     is_standing = (speeds < STANDING_SPEED_M_S) & (turning.values[:, 0] < STANDING_TURN_RATE_RAD_S)
     durations = np.diff(np.append(linear.ticks, trace.end)) / trace.tick_rate
     return {
         "max_speed": float(speeds.max()),
         "time_not_moving": float(durations[is_standing].sum()),
-        **_or_reason(("mean_jerk", "max_jerk"), lambda: _jerk(trace, case)),
-        **_or_reason(_SMOOTHNESS, lambda: _smoothness(trace, speeds)),
+        **_compute_or_explain(("mean_jerk", "max_jerk"), lambda: _jerk(trace, case)),
+        **_compute_or_explain(_SMOOTHNESS_METRICS, lambda: _smoothness(trace, speeds)),
     }
 
 
@@ -178,7 +179,7 @@ def _jerk(trace: Trace, case: Case) -> Values:
 
 def _smoothness(trace: Trace, speeds: Array) -> Values:
     if speeds.max() < MIN_MOVING_SPEED_M_S:
-        return dict.fromkeys(_SMOOTHNESS, "the robot never moved")
+        return dict.fromkeys(_SMOOTHNESS_METRICS, "the robot never moved")
     even_speeds, rate = evenly_sampled_speed(trace)
     spectral, jerk = sparc(even_speeds, rate), ldlj(even_speeds, rate)
     return {
@@ -190,7 +191,7 @@ def _smoothness(trace: Trace, speeds: Array) -> Values:
 def _clearance(trace: Trace) -> Values:
     distances = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE_M)
     if not len(distances):
-        return dict.fromkeys(_CLEARANCE, "the clearance was not recorded")
+        return dict.fromkeys(_CLEARANCE_METRICS, "the clearance was not recorded")
     return {"min_clearance": float(distances.min()), "mean_clearance": float(distances.mean())}
 
 
@@ -218,7 +219,7 @@ def person_metrics(trace: Trace, case: Case) -> Values:
     shares = [float(durations[(low <= gaps) & (gaps < high)].sum()) / total for low, high in ZONES.values()]
     nearest = float(gaps.min())
     least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was present at any sample of the truth"
-    return dict(zip(_PEOPLE, (least, *shares), strict=True))
+    return dict(zip(_PEOPLE_METRICS, (least, *shares), strict=True))
 
 
 def add_plugin_metrics(

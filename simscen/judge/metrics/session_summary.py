@@ -1,4 +1,4 @@
-"""Statistics of all runs of a session, as in navigation benchmarks: success rate, SPL, collisions."""
+"""Statistics over all runs of a session, as in navigation benchmarks: success rate, SPL, and collisions."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -47,7 +47,7 @@ class SessionSummary:
 
 
 class SessionSummaryBuilder:
-    """Collects the RunNumbers of each run for a SessionSummary."""
+    """Computes a SessionSummary from runs that are added one by one."""
 
     def __init__(self) -> None:
         self._runs: list[tuple[tuple[str, str, int, str], RunNumbers | None]] = []
@@ -81,10 +81,10 @@ class SessionSummaryBuilder:
 
 
 class RunNumbers(NamedTuple):
-    """Numbers of one run for the statistics of a session.
+    """Numbers of one run that the statistics of a session need.
 
-    Tuples have one value for each robot that has the metric. `robot_seconds` is the sum of the simulated times of all
-    robots.
+    Tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots
+    together.
     """
 
     success: bool
@@ -96,7 +96,7 @@ class RunNumbers(NamedTuple):
 
     @classmethod
     def from_result(cls, run: RunResult) -> "RunNumbers":
-        """Return the numbers from the metrics of a run."""
+        """Return the numbers of a run from its metrics."""
         robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
         return cls(
             run.metrics.get("success") == 1.0,

@@ -1,4 +1,4 @@
-"""Metrics of trajectories: turns and curvature of the driven path, and errors of the estimated pose."""
+"""Metrics of the driven path (turns and curvature), and of the errors of the estimated pose."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ Values = dict[str, float | str]
 
 _CURVATURE = ("norm_curvature", "max_curvature")
 PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
-"""Metrics that `path_metrics` returns."""
+"""Metrics that `path_metrics` returns. `aol` is the angle over length."""
 
 
 def path_metrics(trace: Trace, path: DrivenPath) -> Values:
@@ -48,7 +48,7 @@ def heading_change(trace: Trace) -> float:
 
 
 def _irregularity(trace: Trace, total_turn: float) -> float | str:
-    """Return `total_turn` minus the turns of the first plan to each goal in rad, or why the metric is undefined."""
+    """Return `total_turn` minus the turns of the first plan to each goal in rad, or why this is undefined."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
@@ -127,7 +127,7 @@ def _statistics(name: str, errors: Array) -> Values:
 def _relative_errors(trace: Trace) -> Values:
     """Return the RPE metrics: statistics of (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with true poses Q and estimated poses P.
 
-    The robot drives RPE_DELTA_M between the samples i and j.
+    Between the samples i and j, the robot drove RPE_DELTA_M.
     """
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
@@ -146,7 +146,7 @@ def _relative_errors(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return the first and second indices of pairs of samples that are RPE_DELTA_M of driving apart.
+    """Return the first and the second index of pairs of samples between which the robot drove RPE_DELTA_M.
 
     `steps` are the distances in m between consecutive samples.
     """
@@ -167,7 +167,7 @@ def _between(origin: Array, poses: Array) -> Array:
 
 
 def _truth_at_beliefs(trace: Trace) -> Array:
-    """Return the true poses (n, 3) at the ticks of the estimated poses, by interpolation."""
+    """Return the true poses (n, 3), interpolated at the ticks of the estimated poses."""
     poses, ticks = truth(trace), trace.belief.ticks
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     return np.column_stack((x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))))

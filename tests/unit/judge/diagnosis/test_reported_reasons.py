@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.criteria.goal_outcomes import goal_outcomes
-from simscen.judge.goal_failure_causes import _failed_recoveries, _gave_up, _stopped
+from simscen.judge.goal_failure_causes import _failed_recoveries, _reported_failure, _robot_hold
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SECOND = 240
@@ -31,7 +31,7 @@ HELD = [3, "robot.held", "collision_monitor", {"message": "scans are late"}]
 )
 def test_robot_is_held_from_the_report_until_after_its_release(events, at, is_held):
     trace, _ = recorded(*events)
-    assert bool(_stopped(trace, round(at * SECOND))) == is_held
+    assert bool(_robot_hold(trace, round(at * SECOND))) == is_held
 
 
 def test_report_of_a_failed_goal_counts_from_its_tick_on():
@@ -42,8 +42,8 @@ def test_report_of_a_failed_goal_counts_from_its_tick_on():
         [6, "goal.failed", "study", {"message": "no valid path", "error_name": "NO_VALID_PATH"}],
         [7, "recovery.started", "backup"],
     )
-    assert _gave_up(trace, outcome, 6 * SECOND - 1) == []
-    assert _gave_up(trace, outcome, 6 * SECOND) == [
+    assert _reported_failure(trace, outcome, 6 * SECOND - 1) == []
+    assert _reported_failure(trace, outcome, 6 * SECOND) == [
         "it gave up and reported: no valid path; clear, spin had not helped"
     ]
 
