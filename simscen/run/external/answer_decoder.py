@@ -1,6 +1,7 @@
 """Decode and validate the ROS messages in an answer of an external stack.
 
-Values on a topic NAME/exact have full precision, and replace the values on the topic NAME.
+Values on a topic NAME/exact have full precision, and replace the values on the topic NAME. Decoders raise
+ProtocolViolation for invalid values, such as nan.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ if TYPE_CHECKING:
     from simscen.peer.wire import Messages
 
 MAX_PARTICLES = 1_000_000
+"""Largest number of particles in a message."""
 _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 """Indices of the covariance over x, y, yaw in the 36 numbers of a ROS covariance."""
 _PLANAR_DIAGONAL = (0, 7, 35)
 """Indices of the variances of x, y, yaw in the 36 numbers of a ROS covariance."""
 ODOMETRY_COLUMNS = 19
-"""Numbers per reading of exact odometry: tick, pose (3), twist (3), twist variances (3), pose covariance (9)."""
+"""Numbers of an exact odometry reading: tick, pose (3), twist (3), twist variances (3), pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
@@ -47,7 +49,7 @@ MessagesByTopic = dict[str, list[bytes]]
 T = TypeVar("T")
 
 MAX_QUATERNION_COMPONENT = 1.01
-"""Largest valid component of a unit quaternion, with a margin for rounding."""
+"""Largest accepted component of a unit quaternion, with a margin for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +221,7 @@ def _twist(data: bytes) -> Twist:
 
 
 def _belief_pose(data: bytes) -> StampedPose:
+    """Return the estimated pose in a PoseWithCovarianceStamped, which must be in the map frame."""
     message = decode_checked(decode.pose_with_covariance_stamped, data)
     if message.frame not in (frame_names.MAP, ""):
         raise ProtocolViolation(
@@ -276,6 +279,7 @@ def _table(data: bytes, width: int) -> Array:
 
 
 def _event_data(data: bytes) -> dict[str, Any]:
+    """Return the event in a String message with JSON."""
     return wire.from_json(MessageReader(data).string().encode())
 
 

@@ -1,7 +1,7 @@
 """Track the goals of an external stack from the events that the stack reports.
 
-A stack reports that it accepts a goal, and that a goal ends. The tracker checks these reports, and adds the events of
-preemption and of the end of the task.
+A stack reports when it accepts a goal and when a goal ends. The tracker checks the order of these reports, and adds
+events for preempted goals and for the end of the task.
 """
 
 from typing import Any
@@ -27,7 +27,7 @@ class GoalTracker:
     """Goals of a robot, and their states as reported by its stack. Collects the events for the log."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
-        """If `stop_on_failure` is true, a failed goal ends the task. `mode` is the Nav2 action that sends goals."""
+        """If `stop_on_failure`, a failed goal ends the task. `mode` is the Nav2 action that receives the goals."""
         self._events: list[Event] = []
         self._task = Task(stop_on_failure, clock=Clock(tick_rate), mode=mode)
         self._rate = tick_rate
@@ -81,7 +81,7 @@ class GoalTracker:
         self._events += self._task.end_wait(tick)
 
     def fail_if_timed_out(self, tick: int) -> bool:
-        """Fail the current goal if its timeout has passed; return whether it has passed."""
+        """Fail the current goal if its timeout has passed; return whether this is the case."""
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
@@ -112,6 +112,7 @@ class GoalTracker:
         self._events += self._task.accept_next(tick)
 
     def _require_current(self, kind: str, name: str) -> None:
+        """Raise ProtocolViolation unless a report names the current goal, or no goal."""
         goal = self._task.goal
         if goal is None or name not in ("", goal.name):
             active = "no goal is active" if goal is None else f"the current goal is `{goal.name}`"
@@ -127,7 +128,7 @@ class GoalTracker:
 
 
 def _to_error_code(value: Any) -> ErrorCode | int:
-    """Return Nav2's error code for a number or name, or the same number if it is unknown. Raises ProtocolViolation."""
+    """Return Nav2's error code for a number or name; an unknown number is returned as is. Raises ProtocolViolation."""
     if value is None:
         return ErrorCode.NAVIGATE_UNKNOWN
     if isinstance(value, str) and value in ErrorCode.__members__:

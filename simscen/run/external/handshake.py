@@ -20,7 +20,7 @@ from simscen.stack.protocols import RobotModel, Surroundings
 
 @dataclass(frozen=True)
 class RunParameters:
-    """Parameters of a run that a stack receives besides its surroundings.
+    """Parameters of a run that a stack receives besides its surroundings (robot model, map, and zones).
 
     Attributes:
         control_period: Ticks between two commands.
@@ -29,7 +29,7 @@ class RunParameters:
         rates: Readings per second by sensor name; sensors without a known rate are missing.
         robot_description: URDF of the robot.
         stop_on_failure: Whether the stack must stop after a failed goal, instead of driving to the next goal.
-        mode: Nav2 action that sends goals.
+        mode: Nav2 action that receives the goals.
         robot_name: Name of the robot; "" for a single robot.
         switchable_zones: Zones that events can switch.
     """
@@ -158,7 +158,7 @@ def _polygon(corners: Any) -> list[list[float]]:
 
 MAX_NAME_LENGTH = 200
 MAX_ABOUT_LENGTH = 1 << 20
-"""Largest numbers of characters: of `name` and `version`, and of `about`."""
+"""Largest numbers of characters of `name` or `version`, and of `about`."""
 MAX_FIRST_ANSWER_S = 3700
 """Largest value of `first_answer_limit` and `first_answer_until` in s."""
 
@@ -171,7 +171,7 @@ class Welcome:
         name: Name of the stack.
         version: Version of the stack.
         topics: Names of the topics to send to the stack.
-        every_beat: Whether the stack requests a step at each tick with messages, not only when a command is due.
+        every_beat: Whether the stack must answer at each tick with messages, not only when a command is due.
         about: Additional information from the stack for the log.
         first_answer_limit: Wall time in s for the first answer. It applies if it is longer than `answer_limit`.
         first_answer_until: Simulated time in s until which `first_answer_limit` applies to all answers.

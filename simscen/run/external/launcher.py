@@ -1,8 +1,8 @@
 """Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
 A worker process starts this internal program with three file descriptors. The launcher reads the command of the stack
-from CONTROL, starts the stack, which inherits SOCKET, and writes the exit code of the stack to REPORT. After another
-byte from CONTROL, or when the worker dies, the launcher kills the stack and all of its descendants.
+from CONTROL and starts the stack, which inherits SOCKET. It writes the exit code of the stack to REPORT. After one more
+byte from CONTROL, or when the worker dies, it kills the stack and all descendants of the stack.
 """
 
 import errno
@@ -94,6 +94,7 @@ def _end(process: "subprocess.Popen[bytes]", grace: float) -> None:
 
 
 def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
+    """Wait until the process exits, for at most `seconds`."""
     end = time.monotonic() + seconds
     while process.poll() is None and time.monotonic() < end:
         select.select([], [], [], 0.005)

@@ -1,7 +1,7 @@
 """Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
-ROS messages lose precision: headings become quaternions, and ranges become float32. A topic `NAME/exact` has the values
-of the topic `NAME` in full precision. In one STEP or ANSWER, its n-th message belongs to the n-th on `NAME`.
+ROS messages lose precision: headings become quaternions, and ranges become float32. Therefore, a topic `NAME/exact` has
+the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages of both belong together.
 """
 
 from collections.abc import Iterable, Mapping
@@ -38,14 +38,14 @@ STACK_TOPICS = (
 
 @dataclass(frozen=True)
 class TopicTable:
-    """Topics of one run by name: `sent` to the stack, and `accepted` from the stack. Both are numbered from 1."""
+    """Topics of one run by name: `sent` to the stack, and `accepted` from it. Each of the two is numbered from 1."""
 
     sent: Mapping[str, Topic]
     accepted: Mapping[str, Topic]
 
     @classmethod
     def build(cls, sent: Iterable[Topic]) -> "TopicTable":
-        """Return the table with the topics `sent` to the stack, and STACK_TOPICS from the stack."""
+        """Return the table with the topics `sent` to the stack. The stack may publish on STACK_TOPICS."""
         return cls({topic.name: topic for topic in sent}, {topic.name: topic for topic in STACK_TOPICS})
 
     @property

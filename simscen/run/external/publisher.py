@@ -31,7 +31,7 @@ _FIRST_STAMP = (0, 0)
 
 
 class StepPublisher:
-    """Collects the messages that the next frame STEP will send to a stack. Implements MessageSink."""
+    """Queue of the messages for the next frame STEP to a stack. Implements MessageSink, to which encoders write."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
         """`sensors` are the reading types, such as "Scan", and `mounts` the poses in the base frame, by sensor name."""
@@ -46,7 +46,7 @@ class StepPublisher:
         """Pairs of a sensor name and a topic with readings of that sensor."""
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish a map or mask once, with the first step (None: publish nothing)."""
+        """Publish a map or mask once, with the first step. Does nothing for None."""
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
@@ -72,7 +72,7 @@ class StepPublisher:
         return TopicTable.build([*sent, topics.TF, *known])
 
     def subscribe(self, topic_table: TopicTable, names: Collection[str]) -> None:
-        """Select the topics `names` that the stack requests, and queue the latched messages.
+        """Publish only the topics `names` from now on, and queue the latched messages on them.
 
         `topic_table` is the result of `topic_table()`.
         """
@@ -97,11 +97,11 @@ class StepPublisher:
 
     @property
     def has_messages(self) -> bool:
-        """Whether there are messages to send."""
+        """Whether there are messages in the queue."""
         return bool(self._queue)
 
     def drain(self) -> Messages:
-        """Return the messages since the last call."""
+        """Return all queued messages, and empty the queue."""
         messages, self._queue = self._queue, []
         return messages
 

@@ -35,6 +35,7 @@ from simscen.stack.build import build_stack
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 
 _EMPTY_IMAGE = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32))
+"""Reading of each camera. The stack ignores images without a field of view."""
 
 
 class ReferenceStackPeer(Peer):
@@ -52,7 +53,7 @@ class ReferenceStackPeer(Peer):
         self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
 
     def serve(self) -> None:
-        """Answer steps until the run is over."""
+        """Answer each STEP until the run is over."""
         for step in self:
             stack = self._stack or self._start_stack(step)
             for kind, content in self._requests:
@@ -64,7 +65,7 @@ class ReferenceStackPeer(Peer):
             self._send_decision(step, stack.decide(step.tick, tuple(self._readings(step.messages))), stack)
 
     def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
-        """Store the goals (GOAL) or a request (PREEMPT, CANCEL) until the next step."""
+        """Keep the goals (GOAL) or a request (PREEMPT, CANCEL) for the next step."""
         if kind == wire.GOAL:
             self._goal_content = content
         else:
@@ -186,6 +187,7 @@ def _goal(goal: Goal) -> CoreGoal:
 
 
 def _grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> OccupancyGrid | None:
+    """Return a grid with the cells of a message, and with the exact resolution and origin in HELLO (`facts`)."""
     if facts is None or grid is None:
         return None
     cells = np.array(grid.data, dtype=np.int8).reshape(grid.height, grid.width)

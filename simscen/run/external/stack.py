@@ -1,4 +1,4 @@
-"""Stack in another process: implements simscen.stack.protocols.Stack by exchanging frames over a socket."""
+"""Stack in another process: implements the protocol Stack by exchanging frames over a socket."""
 
 import sys
 from collections.abc import Callable
@@ -173,8 +173,8 @@ class ExternalStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Send the readings and return the stack's decision.
 
-        If no command is due, returns the last command, and sends the readings later. After `preempt` and `cancel`, and
-        for a stack that has requested every beat with messages, the stack always decides.
+        If no command is due, returns the last command, and sends the readings later. The stack nevertheless decides
+        after `preempt` and `cancel`, or if it has requested `every_beat`.
         """
         self._publisher.publish_readings(tick, readings)
         self._odometry = next(
@@ -245,7 +245,7 @@ class ExternalStack:
         return answer
 
     def _to_decision(self, tick: int, answer: Answer, due: bool) -> Decision:
-        """Return the decision in an answer, with the events of goals."""
+        """Return the decision in an answer, with the goal events of the GoalTracker."""
         self._goals.advance(tick)
         if due and self._goals.fail_if_timed_out(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._parameters.stop_on_failure, "reason": "timeout"})
@@ -271,7 +271,7 @@ class ExternalStack:
             self._process.send(wire.json_frame(kind, content))
 
     def _checked(self, what: str, function: Callable[[], T]) -> T:
-        """Call a function, and convert errors in the frame `what` to RunError."""
+        """Call a function that decodes the frame `what`, and convert its errors to RunError."""
         assert self._process is not None
         try:
             return function()

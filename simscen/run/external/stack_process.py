@@ -21,7 +21,7 @@ from simscen.run.external import protocol
 from simscen.run.process.isolation import READ_BYTES, TAIL_BYTES, CappedLog, clean_environment, output_tail
 
 EXIT_TIMEOUT_S = 2.0
-"""Time to wait for the exit of a stack that has closed its socket."""
+"""Time to wait until a stack that has closed its socket exits."""
 CLEANUP_TIMEOUT_S = 5.0
 """Time to wait until the launcher (see StackProcess) has ended the stack and all of its descendants."""
 MAX_MESSAGE_LENGTH = 2000
@@ -135,7 +135,7 @@ class StackProcess:
             self._control = -1
 
     def close(self) -> None:
-        """End the stack and its descendants, wait for their end, and free all resources. Includes `release`."""
+        """Call `release`, wait until the stack and its descendants have ended, and free all resources."""
         self.release()
         self._pump(lambda: self._output not in self._readers and self._report not in self._readers, CLEANUP_TIMEOUT_S)
         self._launcher.kill()
@@ -164,6 +164,7 @@ class StackProcess:
                 return
 
     def _serve(self, descriptor: int, events: int) -> None:
+        """Write to or read from a descriptor with these poll events, and stop watching it at its end."""
         if events & select.POLLOUT:
             self._flush()
         if events & ~select.POLLOUT and not self._readers[descriptor]():

@@ -1,4 +1,4 @@
-"""Draw the zones of a scenario into masks of Nav2's costmap filters, for stacks that do not support polygons.
+"""Draw keepout and speed zones (polygons) into masks of Nav2's costmap filters, for stacks without support of polygons.
 
 Each filter (keepout, speed) has one mask with the enabled zones and the mask file of the stack.
 """
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 CELL_M = 0.05
 """Cell size of masks for robots without a map."""
 SPEED_STEP_M_S = 0.01
-"""Smallest difference between two speed limits in a mask, for stacks without a mask file."""
+"""Smallest step between the speed limits in a mask, if the stack has no mask file."""
 
 
 def switchable_zones(prepared: PreparedScenario) -> Zones:
@@ -91,7 +91,7 @@ class ZoneMasks:
 
 
 class _SpeedMask:
-    """Mask of speed limits. `grid` defines its cells (None: there are no limits)."""
+    """Mask of speed limits in the cells of `grid` (None: there are no limits)."""
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
 
 
 def _cells_of(mask: OccupancyGrid | None, grid: OccupancyGrid) -> npt.NDArray[np.int8]:
-    """Return the values of a mask in the cells of `grid`; FREE outside of the mask, and if `mask` is None."""
+    """Return the values of a mask at the cells of `grid`; FREE outside of the mask, and without a mask."""
     if mask is None:
         return np.full(grid.shape, FREE, dtype=np.int8)
     if mask is grid:
