@@ -14,13 +14,13 @@ from simscen.stack.moving_obstacles import MAX_INFLATION_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Factors by which a command is multiplied, in the order of attempts, until it avoids moving obstacles."""
+"""Factors that are tried in this order on a command that would hit a moving obstacle."""
 MAX_TIME_STEP_S = 0.1
-"""Largest time between two checks of moving obstacles."""
+"""Maximum time between two poses that are checked for collisions with moving obstacles."""
 UNCERTAINTY_SIGMAS = 0.5
-"""Number of standard deviations of their position by which moving obstacles are inflated."""
+"""Moving obstacles are inflated by this number of standard deviations of their position."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Decrease of the distance to a moving obstacle above which the robot approaches the obstacle."""
+"""Decrease of the distance to a moving obstacle that counts as an approach. Only approaching counts as a collision."""
 
 
 class CollisionChecker:
@@ -47,9 +47,9 @@ class CollisionChecker:
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
 
     def slow_down_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
-        """Return the command times the largest of SPEED_FACTORS that avoids moving obstacles for `horizon` s.
+        """Return the command, multiplied by the largest of SPEED_FACTORS that avoids moving obstacles for `horizon` s.
 
-        If no factor avoids them, the factor with the latest collision is used.
+        If no factor avoids them, use the one with the latest collision.
         """
         if not costmap.moving.obstacles or command == STOP:
             return command
@@ -79,13 +79,13 @@ BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
 
 
 class RotationClearance:
-    """Checks whether a robot has room to rotate in place, and otherwise finds a command to back up."""
+    """Checks whether a robot has room to rotate in place, and finds a command to back up if it has not."""
 
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Return whether a rotation by `angle` rad keeps the required clearance, or a smaller current clearance."""
+        """Return whether a rotation by `angle` rad keeps the required clearance, or the current one if smaller."""
         radius = self._footprint.rotation_radius
         if radius == 0.0 or distance_at(costmap, pose.x, pose.y) > radius + 2.0 * costmap.resolution:
             return True
@@ -96,7 +96,7 @@ class RotationClearance:
         return bool((clearance >= required).all())
 
     def backup_command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the command to back up as straight as possible; None if all turn rates lead to a collision."""
+        """Return the command to back up, with the first turn rate that is free of collisions; None if there is none."""
         for turn_rate in BACKUP_TURN_RATES_RAD_S:
             command = Twist(-BACKUP_SPEED_M_S, 0.0, turn_rate)
             if time_to_collision(self._footprint, costmap, pose, command, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S:

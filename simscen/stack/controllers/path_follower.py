@@ -1,4 +1,4 @@
-"""Base class of the controllers, and rotation in place to the heading of the goal."""
+"""Base class of the controllers, and arrival at the goal: rotation in place to its heading."""
 
 import math
 
@@ -11,8 +11,8 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 
 DEFAULT_SPEED_M_S = 0.5
 """Nav2's default of desired_linear_vel and of MPPI's vx_max."""
-SAME_GOAL_M = 0.1
-"""Maximum distance between the ends of two successive paths to the same goal."""
+MAX_SAME_GOAL_DISTANCE_M = 0.1
+"""Maximum distance between the ends of two successive paths that count as paths to the same goal."""
 
 
 class PathFollower:
@@ -27,11 +27,11 @@ class PathFollower:
         self._end: Pose2 | None = None
 
     def set_path(self, path: Path) -> None:
-        """Follow this path from now on. Raises INVALID_PATH if it has no points."""
+        """Follow this path from now on. Raises NavigationFailure with INVALID_PATH if it has no points."""
         if not len(path.points):
             raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
         end = Pose2(*path.points[-1].tolist())
-        if self._end is None or end.distance(self._end) > SAME_GOAL_M:
+        if self._end is None or end.distance(self._end) > MAX_SAME_GOAL_DISTANCE_M:
             self.reset_for_goal()
         self._end, self._tracker = end, PathTracker(path, self._search_distance)
 
@@ -58,25 +58,23 @@ class PathFollower:
         return self._speed / self._full_speed
 
     def _locate(self, pose: Pose2) -> PathTracker:
-        """Return the path tracker, updated to the pose of the robot. Raises INVALID_PATH if there is no path."""
+        """Return the path tracker, updated to the pose. Raises NavigationFailure (INVALID_PATH) if there is no path."""
         if self._tracker is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
         self._tracker.locate(pose)
         return self._tracker
 
 
-PASSED_TOLERANCE_RATIO = 0.8
-"""Fraction of its tolerance within which a goal behind the robot is reached."""
-PASSED_PATH_LENGTH_M = 0.1
-"""Remaining length of the path below which a goal behind the robot can be reached."""
+PASSED_TOLERANCE_RATIO, PASSED_PATH_LENGTH_M = 0.8, 0.1
+"""A goal behind the robot is reached within this fraction of its tolerance if less than this length of path remains."""
 STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
-"""Speed and remaining length of the path below which the goal is reached within its full tolerance."""
+"""A goal is reached within its full tolerance if speed and remaining length of the path are below these values."""
 CAR_PATH_END_M = 0.03
 """Remaining length of the path below which a car has reached the goal."""
 SETTLING_PERIODS = 2.0
-"""Minimum number of control periods for the remaining rotation. With fewer, the heading would oscillate."""
+"""Minimum number of control periods for the remaining rotation, so that the heading does not oscillate."""
 BRAKING_FACTOR = 1.6
-"""Factor in the speed limit before a stop, sqrt(factor · deceleration · distance): 2 without a reserve."""
+"""Factor in the speed from which the robot can stop, sqrt(factor · deceleration · distance): 2 without a reserve."""
 
 
 class GoalRotation:
@@ -100,7 +98,7 @@ class GoalRotation:
         self._is_reached = False
 
     def is_position_reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
-        """Return whether the robot should stop driving and rotate. `remaining` is the remaining path length in m.
+        """Return whether the position of the goal is reached. `remaining` is the remaining path length in m.
 
         The result stays True until the robot leaves the position tolerance.
         """

@@ -1,4 +1,4 @@
-"""Path handler: tracks the position of the robot on its path, and returns the part of the path ahead of it."""
+"""Path handler: tracks the position of the robot on its path, and returns the part of the path ahead."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -16,7 +16,7 @@ from simscen.stack.kinematics import direction_changes, forward_steps
 SEARCH_AHEAD_M = 1.5
 """Default length of path beyond the last position that is searched for the nearest point."""
 CUSP_REACHED_M = 0.03
-"""Length of path before a cusp at which the cusp counts as reached."""
+"""Length of path to a cusp below which the cusp counts as reached."""
 CURVATURE_SPAN_M = 0.3
 """Length of path to both sides of a point over which the curvature is measured."""
 CARROT_SEARCH_MARGIN_M = 0.5
@@ -26,10 +26,10 @@ LENGTH_TOLERANCE_M = 1e-9
 
 
 class PathTracker:
-    """Path with the position of the robot on it, which only moves toward the end of the path.
+    """A path and the position of the robot on it. The position only moves toward the end of the path.
 
-    The driving direction of a path may change at cusps, which divide it into segments. Points beyond the next cusp are
-    ignored until the robot has reached the cusp.
+    Cusps (changes of the driving direction) divide the path into segments. Points beyond the next cusp are ignored
+    until the robot has reached the cusp.
     """
 
     def __init__(self, path: Path, search_distance: float = SEARCH_AHEAD_M) -> None:
@@ -76,6 +76,7 @@ class PathTracker:
             self._find_nearest(pose)
 
     def _find_nearest(self, pose: Pose2) -> None:
+        """Move the position to the nearest point ahead in the current segment, within the search distance."""
         points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
         index = nearest = self.index
         end, search_end, shortest = self._segment_ends[0], along[index] + self._search_distance, math.inf
@@ -141,8 +142,8 @@ class PathTracker:
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Return the carrot (x, y): where the segment leaves the circle of radius `distance` m around the robot.
 
-        If the segment ends inside the circle, return its end. With `beyond`, extend it straight to the circle instead
-        (RPP's interpolate_curvature_after_goal).
+        If the segment ends inside the circle, return its end. With `beyond`, return instead the point where a straight
+        extension of the segment leaves the circle (RPP's interpolate_curvature_after_goal).
         """
         search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
         outside = self._first_outside(pose, distance, search_end)

@@ -18,11 +18,11 @@ from simscen.stack.setting import Setting
 MIN_SQUARED_CHORD_M2 = 0.001
 """Squared distance of the carrot below which the arc is a straight line (Nav2's calculateCurvature)."""
 CAR_LOOKAHEAD_RATIO = 0.4
-"""Maximum lookahead distance of a car relative to its turning radius. A farther carrot would cut S-bends."""
+"""Maximum lookahead distance of a car relative to its turning radius. With more, the car would cut S-bends."""
 MIN_ROTATION_RAD = 0.1
 """Angle to the carrot below which a rotation in place does not help."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
-"""Factors on the lookahead distance, in the order of attempts to find a free arc (as nav2_graceful_controller does)."""
+"""Factors on the lookahead distance that are tried in this order until an arc is free, as nav2_graceful_controller."""
 
 
 class Carrot(NamedTuple):
@@ -43,7 +43,7 @@ class Carrot(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A command, the time in s for which it is free of collisions, and the required time `horizon` in s."""
+    """A command, the time in s for which it is free of collisions, and the time `horizon` in s for which it must be."""
 
     command: Twist
     free_time: float
@@ -143,7 +143,7 @@ class RegulatedPurePursuit(PathFollower):
         return arc.free_time >= arc.horizon
 
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
-        """Return the distance in m that must be free: to the carrot, or for a car to a nearer cusp."""
+        """Return the distance in m that must be free: to the carrot, or to the next cusp if a car reaches it before."""
         if not self._is_car:
             return carrot.distance
         return min(carrot.distance, max(CUSP_REACHED_M, tracker.remaining_in_segment()))
@@ -158,6 +158,7 @@ class RegulatedPurePursuit(PathFollower):
         return command
 
     def _lookahead_distance(self, speed: float) -> float:
+        """Return the lookahead distance in m at this speed."""
         spec = self._spec
         if not spec.use_velocity_scaled_lookahead_dist:
             return spec.lookahead_dist
@@ -167,6 +168,7 @@ class RegulatedPurePursuit(PathFollower):
         return distance
 
     def _should_rotate(self, carrot: Carrot, backward: bool) -> bool:
+        """Return whether the angle to the carrot requires a rotation in place."""
         if not self._spec.use_rotate_to_heading or self._is_car:
             return False
         return abs(carrot.bearing(backward)) > self._spec.rotate_to_heading_min_angle
@@ -195,7 +197,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, self._approach_speed(tracker, regulated, pose))
 
     def _approach_speed(self, tracker: PathTracker, speed: float, pose: Pose2) -> float:
-        """Return the speed near the end of the segment, at most `speed`: scaled as in Nav2, and low enough to brake."""
+        """Return `speed`, near the end of the segment reduced: scaled as in Nav2, and low enough to stop in time."""
         remaining, spec = tracker.remaining_in_segment(), self._spec
         if remaining < spec.approach_velocity_scaling_dist:
             distance = _to_robot_frame(pose, *tracker.segment_end).distance
@@ -206,7 +208,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
     def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> Arc:
-        """Return the command with its free time, and the required time to drive `distance` m (limited as in Nav2)."""
+        """Return the command as an Arc. Its horizon is the time to drive `distance` m, limited as in Nav2."""
         max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:
             return Arc(command, max_time, max_time)
@@ -220,7 +222,7 @@ class RegulatedPurePursuit(PathFollower):
 
 
 def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
-    """Return the carrot of the path at `distance` m; with `beyond`, also beyond the end of the path."""
+    """Return the carrot at `distance` m in the base frame; with `beyond`, also beyond the end of the path."""
     return _to_robot_frame(pose, *tracker.carrot(pose, distance, beyond=beyond))
 
 
@@ -230,7 +232,7 @@ def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
 
 
 DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
-"""Fraction of the maximum deceleration that is planned for braking, and delay before braking starts."""
+"""Assumptions about braking: fraction of the maximum deceleration, and delay before braking starts."""
 SAMPLE_SPACING_M = 0.1
 """Distance between the points of the path ahead for which a speed is determined."""
 SPEED_PER_CLEARANCE_1_S = 10.0
@@ -245,7 +247,7 @@ class SpeedRegulation:
         self._doubled_deceleration = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
 
     def for_distance(self, speed: float, distance: float) -> float:
-        """Return the speed with an obstacle `distance` m from the base; with `slow_down_ahead`, lower than in Nav2."""
+        """Return the speed if an obstacle is `distance` m from the base. With `slow_down_ahead`, lower than in Nav2."""
         spec = self._spec
         if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
             return speed
@@ -261,7 +263,7 @@ class SpeedRegulation:
         return speed / ratio if self._spec.use_regulated_linear_velocity_scaling and ratio > 1.0 else speed
 
     def for_path_ahead(self, speed: float, regulated: float, tracker: PathTracker, costmap: CostmapView) -> float:
-        """Return the speed, at most `regulated`, from which the robot can brake in time for the path ahead.
+        """Return `regulated`, reduced so that the robot can brake in time for bends and narrow passages ahead.
 
         `speed` is the speed without regulation.
         """

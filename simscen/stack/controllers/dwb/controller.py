@@ -23,7 +23,7 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 PLAN_LENGTH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
-"""Length of the plan that the critics get: 1.2 times the distance that the robot drives in `sim_time`, plus 0.5 m."""
+"""Minimum length of the plan for critics: 1.2 times the distance that the robot drives in `sim_time`, plus 0.5 m."""
 
 
 class DynamicWindowController(PathFollower):

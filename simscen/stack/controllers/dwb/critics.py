@@ -1,4 +1,4 @@
-"""Critics of DWB, which score and reject trajectories (dwb_critics). Lower scores are better.
+"""Critics of DWB, which score trajectories and reject illegal ones (dwb_critics). Lower scores are better.
 
 Raw scores are in cells, costs, rad, or rad/s. They are multiplied by the scale of the critic. As in Nav2, the scales of
 critics that count cells are also multiplied by half the resolution.
@@ -29,7 +29,7 @@ BATCH_TRAJECTORIES = 50
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of n trajectories: raw scores (n,) and scale of each critic by name. `legal` (n,): not rejected."""
+    """Scores of n trajectories: `raw` scores (n,) and `scale` by critic. `legal` (n,): which are not rejected."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -96,7 +96,7 @@ def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
 
 
 def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
-    """Return the cells (m, 2) of the first part of the plan (n, 2) on known cells of the costmap."""
+    """Return the cells (m, 2) of the first uninterrupted part of the plan (n, 2) on known cells of the costmap."""
     cells, on_map = cells_of(costmap, plan)
     known = on_map.copy()
     known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != NO_INFORMATION
@@ -119,7 +119,7 @@ def manhattan_distances(cells: Cells, sources: Cells) -> Array:
 
 
 class RotateToGoalCritic:
-    """Critic at the goal: the robot must slow down to a stop, and then rotate in place. Scores the heading error."""
+    """Critic at the goal, which scores the heading error. The robot must slow down to a stop, then rotate in place."""
 
     def __init__(self, stopped_velocity: float, slowing_factor: float) -> None:
         """Take Nav2's trans_stopped_velocity in m/s and slowing_factor."""
@@ -131,7 +131,7 @@ class RotateToGoalCritic:
         self._is_rotating = False
 
     def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
-        """Return the scores (n,) of velocities (n, 3) with final headings (n,), and which of them are legal.
+        """Return the scores (n,) of velocities (n, 3) that lead to the headings `end_yaws` (n,), and which are legal.
 
         `now` is the current velocity.
         """
@@ -156,9 +156,9 @@ class ObstacleCritic:
     ) -> int | None:
         """Return the index of the best free trajectory among those in `order` (k,); None if none is free.
 
-        A trajectory is better if it keeps the preferred clearance; if that is equal, if it meets no moving obstacle or
-        meets one later; and then if it is earlier in `order`. If the robot is in collision, a trajectory is free if it
-        leads out.
+        Trajectories with the preferred clearance are best. Among equal ones, later or no contact with moving obstacles
+        is better, then an earlier position in `order`. If the robot is in collision, a trajectory that leads out is
+        free.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
@@ -189,7 +189,7 @@ class ObstacleCritic:
 
 
 class DirectionHistory:
-    """Last direction of one velocity component, and its allowed direction since the last reversal."""
+    """Last direction of one velocity component, and the direction that is allowed since its last reversal."""
 
     def __init__(self) -> None:
         self.reset()
@@ -213,7 +213,7 @@ class DirectionHistory:
 
 
 class OscillationCritic:
-    """Rejects a second reversal of the direction until the robot has moved or rotated far enough."""
+    """Critic that rejects a second reversal of the direction until the robot has moved or rotated far enough."""
 
     def __init__(self, reset_distance: float, reset_angle: float, x_only_threshold: float) -> None:
         """Take Nav2's oscillation_reset_dist (m), oscillation_reset_angle (rad), and x_only_threshold (m/s)."""
@@ -247,5 +247,6 @@ class OscillationCritic:
             self.reset()
 
     def _has_moved(self, pose: Pose2) -> bool:
+        """Return whether the robot has moved or rotated far enough since the last reversal."""
         angle = abs(wrap(pose.yaw - self._reversed_at.yaw))
         return pose.distance(self._reversed_at) > self._reset_distance or angle > self._reset_angle

@@ -1,4 +1,4 @@
-"""Trajectory generator of DWB (StandardTrajectoryGenerator of dwb_plugins): samples velocities and predicts poses."""
+"""Trajectory generator of DWB (dwb_plugins' StandardTrajectoryGenerator): samples velocities, and predicts poses."""
 
 import math
 from dataclasses import dataclass, replace
@@ -20,18 +20,21 @@ SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
 
 @dataclass(frozen=True)
 class KinematicParameters(VelocityLimits):
-    """Velocity limits of each axis, limits of the speed in any direction in m/s, and minimum turn rate in rad/s."""
+    """Velocity limits of each axis, limits of the speed in the plane in m/s, and minimum turn rate in rad/s.
+
+    Velocities are invalid only if both speed and turn rate are below their minimum.
+    """
 
     min_speed_xy: float
     max_speed_xy: float
     min_speed_theta: float
 
     def scaled(self, ratio: float) -> "KinematicParameters":
-        """Return limits with velocities, also backward, multiplied by `ratio`; unchanged if that is at least 1."""
+        """Return limits with maximum velocities multiplied by `ratio`; unchanged if `ratio` is at least 1."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
-        """Return the velocities (m, 3) out of `velocities` (n, 3) that are within the limits and not zero."""
+        """Return the valid ones (m, 3) of the `velocities` (n, 3): within the limits, and not zero."""
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
         turn_rate = np.abs(velocities[:, 2])
         is_slow = (squared_speed + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
@@ -75,7 +78,7 @@ def project_velocity(now: float, acceleration: float, deceleration: float, secon
 def velocity_samples(
     now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """Return `count` velocities of one axis that can be reached within `seconds`, and 0 if it is between two."""
+    """Return `count` evenly spaced velocities of one axis that can be reached within `seconds`, and 0 if in between."""
     now = min(max(now, low), high)
     highest = project_velocity(now, acceleration, deceleration, seconds, high)
     lowest = project_velocity(now, acceleration, deceleration, seconds, low)
@@ -93,7 +96,7 @@ def velocity_samples(
 
 
 def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
-    """Return velocities (n, 3) that can be reached within `seconds`. `counts` are the numbers of samples per axis."""
+    """Return valid velocities (n, 3) that can be reached within `seconds`. `counts` are the samples per axis."""
     axes = [
         velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
         for velocity, low, high, acceleration, deceleration, count in zip(
@@ -138,9 +141,10 @@ def generate_trajectories(
     max_step_m: float,
     max_step_rad: float,
 ) -> Trajectories:
-    """Return trajectories of `seconds` in which the base accelerates from `now` to each of the velocities (n, 3).
+    """Return trajectories of `seconds` from `pose`, in which the base accelerates from `now` to the velocities (n, 3).
 
-    Trajectories with fewer steps than others are padded with their final pose. The heading is constant within a step.
+    Steps are at most `max_step_m` and `max_step_rad` long. The heading is constant within a step. Trajectories with
+    fewer steps than others are padded with their final pose.
     """
     distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / max_step_m
     turn_steps = np.abs(velocities[:, 2]) * seconds / max_step_rad

@@ -23,7 +23,7 @@ from simscen.stack.controllers.mppi.rollouts import (
     Floats,
     Rollouts,
     apply_model_delay,
-    axis_order,
+    in_sequence_order,
     integrate_velocities,
     mppi_limits,
     predict_velocities,
@@ -40,9 +40,9 @@ SMOOTHING_KERNELS = {
 }
 """Savitzky-Golay filters of nine points by the order of their polynomial (Savitzky and Golay 1964)."""
 MIN_SMOOTHED_STEPS = 21
-"""Shorter control sequences are not smoothed."""
+"""Minimum length of a control sequence to be smoothed."""
 PAST_COMMANDS = 4
-"""Number of previous commands that a filter of nine points needs before the first step."""
+"""Number of previous commands that a filter of nine points needs to smooth the first step."""
 
 
 def sample_weights(
@@ -50,8 +50,8 @@ def sample_weights(
 ) -> Floats:
     """Return the weights (n,) of samples with these costs (n,), proportional to exp(-cost / temperature).
 
-    `noise` (axes, steps, n) was added to the sequence, and `deviations` are its standard deviations by axis. `gamma`
-    weights the control cost: the product of sequence and noise, divided by the variance of the noise.
+    `noise` (axes, steps, n) was added to the sequence. `deviations` are the standard deviations of the noise by axis.
+    The control cost is added to each cost: `gamma` times the product of sequence and noise, divided by their variance.
     """
     total = costs.copy()
     for axis, deviation in enumerate(deviations):
@@ -80,9 +80,9 @@ def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: floa
 
     Modifies `sequence`. `dt` is the time step in s.
     """
-    low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
-    increase = (axis_order(limits.acceleration) * dt).tolist()
-    decrease = (axis_order(limits.deceleration) * dt).tolist()
+    low, high = in_sequence_order(limits.low).tolist(), in_sequence_order(limits.high).tolist()
+    increase = (in_sequence_order(limits.acceleration) * dt).tolist()
+    decrease = (in_sequence_order(limits.deceleration) * dt).tolist()
     _limit_curvature(sequence, limits)
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):
@@ -121,13 +121,13 @@ def shift_sequence(sequence: Floats, steps: float) -> Floats:
 
 
 PLAN_MARGIN_M = 1.0
-"""Length of path that the critics get beyond the reach of the rollouts."""
+"""Length of the plan for the critics, in addition to the distance that the robot can drive within the horizon."""
 SPEED_STD_RATIO = 0.5
 """Default standard deviation of the sampled speeds, relative to the maximum speed."""
 
 
 class MppiController(PathFollower):
-    """Controller that optimizes a control sequence in each control period, starting from the previous sequence."""
+    """Controller that optimizes a control sequence in each control period, starting from the previous one."""
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
@@ -164,6 +164,7 @@ class MppiController(PathFollower):
         self._pose, self._optimal_from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
 
     def _draw_noise(self) -> None:
+        """Draw the noise (axes, steps, samples)."""
         shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
         self._noise = self._rng.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
@@ -173,6 +174,7 @@ class MppiController(PathFollower):
 
     @property
     def _limits(self) -> VelocityLimits:
+        """The velocity limits under the current speed limit."""
         return self._full_limits.scaled(self._speed_ratio)
 
     @property
@@ -194,13 +196,14 @@ class MppiController(PathFollower):
         return self._collision_checker.slow_down(command, free_time, required, required)
 
     def _critic_data(self, rollouts: Rollouts, plan: UpcomingPath, costmap: CostmapView, goal: Goal) -> CriticData:
+        """Return the input of the critics for these rollouts."""
         return CriticData(
             rollouts, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
             goal.xy_tolerance,
         )  # fmt: skip
 
     def _optimize(self, twist: Twist, critic_data: Callable[[Rollouts], CriticData]) -> Twist:
-        """Optimize the sequence, and return its first command. If it collides, reset the sequence and retry.
+        """Optimize the sequence, and return its first command. If the result collides, reset the sequence and retry.
 
         `critic_data` returns the input of the critics for rollouts.
         """
@@ -226,8 +229,8 @@ class MppiController(PathFollower):
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        lowest = measured + (axis_order(limits.deceleration) * self._period)[: self._axes]
-        highest = measured + (axis_order(limits.acceleration) * self._period)[: self._axes]
+        lowest = measured + (in_sequence_order(limits.deceleration) * self._period)[: self._axes]
+        highest = measured + (in_sequence_order(limits.acceleration) * self._period)[: self._axes]
         reachable = np.clip(sent, lowest, highest)
         return reachable.astype(np.float32)
 

@@ -19,11 +19,11 @@ from simscen.stack.protocols import CostmapView
 Mask = npt.NDArray[np.bool_]
 
 MOVING_CLEARANCE_M = 0.25
-"""Clearance that rollouts should keep from moving obstacles, plus one standard deviation of the predicted position."""
+"""Preferred clearance from moving obstacles, in addition to one standard deviation of their predicted position."""
 COLLISION_DECAY_S = 1.2
 """Time constant of the exponential decay of the weight of predicted collisions with moving obstacles."""
 ESCAPE_TOLERANCE_M = 0.01
-"""Distance by which a robot that is already in collision may come closer to the obstacle."""
+"""Distance by which a robot that is already in collision may get deeper into the obstacle."""
 
 
 class CellLookup(NamedTuple):
@@ -66,7 +66,8 @@ class CriticData:
     def furthest_point(self) -> int:
         """Index of the furthest point of the plan that any rollout reaches (Nav2's findPathFurthestReachedPoint).
 
-        A rollout reaches the point nearest to its end, but not farther along the plan than the rollout is long.
+        A rollout reaches the point nearest to its end. Points farther along the plan than the rollout is long are
+        ignored.
         """
         x, y, _ = self.path
         length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
@@ -105,9 +106,10 @@ class CriticData:
 
     @cached_property
     def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
-        """For each rollout (n,): mean squared nearness to moving obstacles, and weight of the first contact; 0 without.
+        """Two costs of each rollout (n,): nearness to moving obstacles, and contact with a moving obstacle.
 
-        The nearness is 1 at contact and 0 at MOVING_CLEARANCE_M. Weights decay exponentially with time.
+        The first is the weighted mean of the squared nearness, which is 1 at contact and 0 at MOVING_CLEARANCE_M. The
+        second is the weight of the first contact; 0 without contact. Weights decay exponentially with time.
         """
         rollouts, times = self.rollouts, self.times.astype(np.float32)[:, None]
         nearness, touches = self.footprint.discs.nearness(
@@ -167,10 +169,10 @@ class CriticData:
         return float(inscribed[0, 0]), float(footprint[0, 0])
 
     def clearance(self, points: CellLookup, yaw: Floats, consider_footprint: bool) -> Floats:
-        """Return distances (…,) in m from the robot at points to the nearest obstacle; negative in collision.
+        """Return distances (…,) in m from the robot, at points with headings `yaw`, to the nearest obstacle.
 
-        The robot is approximated by its inscribed circle or, with `consider_footprint`, by discs that cover its
-        footprint. Off the costmap, the distance is inf.
+        Distances are negative in collision, and inf off the costmap. The robot is approximated by its inscribed circle
+        or, with `consider_footprint`, by discs that cover its footprint.
         """
         discs: CoveringDiscs = self.footprint.discs
         if not consider_footprint:

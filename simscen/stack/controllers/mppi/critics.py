@@ -1,7 +1,7 @@
 """Critics of MPPI, which compute costs of rollouts (nav2_mppi_controller), and the manager that adds up the costs.
 
-A critic takes its parameters and the critic data. It returns the cost of each rollout (n,): the value in its docstring
-times `cost_weight`.
+A critic is a function of its parameters and the critic data. It returns the cost of each rollout (n,): the value that
+its docstring describes, times `cost_weight`.
 """
 
 from typing import get_args
@@ -21,7 +21,7 @@ MAX_COST = 254.0
 """Highest cost of a known cell, by which CostCritic divides."""
 OPTIONAL_CRITICS = ("ObstaclesCritic", "TwirlingCritic", "VelocityDeadbandCritic")
 """Critics that Nav2 does not enable by default."""
-NAV2_CRITICS: tuple[model.CriticName, ...] = tuple(
+DEFAULT_CRITICS: tuple[model.CriticName, ...] = tuple(
     name for name in get_args(model.CriticName) if name not in OPTIONAL_CRITICS
 )
 """Critics that Nav2 enables by default."""
@@ -32,7 +32,7 @@ class CriticManager:
 
     def __init__(self, spec: model.Mppi, omni: bool) -> None:
         """Take the specification. `omni`: the base is holonomic, so that TwirlingCritic is a default critic, too."""
-        default = (*NAV2_CRITICS, "TwirlingCritic") if omni else NAV2_CRITICS
+        default = (*DEFAULT_CRITICS, "TwirlingCritic") if omni else DEFAULT_CRITICS
         names: tuple[model.CriticName, ...] = default if spec.critics is None else tuple(spec.critics)
         self._spec = spec
         self._names = [name for name in names if getattr(spec, name).enabled]
@@ -51,7 +51,7 @@ class CriticManager:
         return total, all_collide
 
     def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:
-        """Return the costs (n,) by a critic, and which rollouts (n,) collide; None if not determined by this critic."""
+        """Return the costs (n,) of a critic, and which rollouts (n,) collide; None for what it does not determine."""
         spec, length = self._spec, data.plan.length
         costs: Floats | None = None
         match name:
@@ -81,9 +81,9 @@ class CriticManager:
 
 
 def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Floats:
-    """Return the integral over time of the excess of velocities over their limits.
+    """Return the integral over time of the amount by which velocities exceed their limits.
 
-    For a car, the excess includes by how many m the turning radius is too small.
+    For a car, the amount in m by which the turning radius is too small is added.
     """
     velocities, limits = data.rollouts.velocities, data.limits
     vx, (low, *_), (high, lateral, _) = velocities[VX], limits.low, limits.high
@@ -116,8 +116,8 @@ def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, M
 def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return costs for the nearness of obstacles, and which rollouts collide.
 
-    The cost increases linearly as the distance falls below the collision margin. A smaller cost within the inflation
-    radius is relative to that of the rollout farthest from obstacles.
+    Within the collision margin, the cost increases linearly with the nearness. Within the inflation radius, a smaller
+    cost is added, from which its minimum over all rollouts is subtracted.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
     consider_footprint = spec.consider_footprint is not False
@@ -162,7 +162,7 @@ def twirling_critic(spec: model.MppiTwirlingCritic, data: CriticData) -> Floats:
 
 
 def velocity_deadband_critic(spec: model.MppiVelocityDeadbandCritic, data: CriticData) -> Floats:
-    """Return the integral over time of the difference by which absolute velocities are below the deadband."""
+    """Return the integral over time of the amount by which absolute velocities are below the deadband."""
     vx, vy, wz = spec.deadband_velocities
     deadband = {VX: vx, WZ: wz, VY: vy}
     deficit = np.zeros_like(data.rollouts.velocities[VX])
@@ -207,7 +207,7 @@ def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floa
 
 
 def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Floats:
-    """Return the distance in m from the end of each rollout to a free point of the plan beyond the rollouts."""
+    """Return the distance in m from the end of each rollout to a free point of the plan, beyond all rollouts."""
     x, y, _ = data.path
     last = len(x) - 1
     index = min(data.furthest_point + spec.offset_from_furthest, last)
@@ -219,7 +219,8 @@ def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Fl
 def path_angle_critic(spec: model.MppiPathAngleCritic, data: CriticData) -> Floats | None:
     """Return the angle in rad between the final heading of each rollout and the direction to a point of the plan.
 
-    Return None if the angle from the current heading is less than `max_angle_to_furthest`.
+    The point is beyond all rollouts. Return None if its direction from the robot differs by less than
+    `max_angle_to_furthest` from the current heading.
     """
     path_x, path_y, path_yaw = data.path
     index = min(data.furthest_point + spec.offset_from_furthest, len(path_x) - 1)

@@ -1,4 +1,4 @@
-"""Motion models of MPPI, which simulate n control sequences at once (nav2_mppi_controller).
+"""Motion models of MPPI (nav2_mppi_controller): simulate n control sequences at once.
 
 Controls and velocities are arrays (axes, steps, n) of float32. The axes are vx, wz, and for a holonomic base vy. `dt`
 is the time step in s.
@@ -44,11 +44,11 @@ class Rollouts:
 def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
     """Return the velocities of the base: `now` (axes,) at the first step, then the control of the previous step.
 
-    Only changes of the velocity are limited. As in Nav2, ConstraintCritic penalizes speeds beyond the limits.
+    Accelerations are limited, but speeds are not: as in Nav2, ConstraintCritic penalizes speeds beyond the limits.
     """
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
-    increase, decrease = axis_order(limits.acceleration) * dt, axis_order(limits.deceleration) * dt
+    increase, decrease = in_sequence_order(limits.acceleration) * dt, in_sequence_order(limits.deceleration) * dt
     changes = zip(increase.astype(np.float32), decrease.astype(np.float32), strict=True)
     for axis, requested, (up, down) in zip(velocities, controls, changes, strict=False):
         if down == -up:
@@ -116,7 +116,7 @@ def mppi_limits(spec: MppiSpec, robot: RobotModel, full_speed: float) -> Velocit
     )
 
 
-def axis_order(axes: Axes) -> Array:
+def in_sequence_order(axes: Axes) -> Array:
     """Return values for vx, vy, wz in the order of a control sequence: vx, wz, vy."""
     vx, vy, wz = axes
     return np.array((vx, wz, vy))
