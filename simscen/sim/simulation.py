@@ -55,8 +55,9 @@ class Simulation:
     ) -> None:
         """Build the world with the robots at rest at their initial poses. `tick_rate` is in Hz.
 
-        `bodies` are the movable objects. `triangulate` returns the surface of a shape that PyBullet does not support.
-        Clearances are measured up to `clearance_range` m. Without `has_images`, cameras cannot be used.
+        `static` is the static world, and `bodies` are the movable objects. `triangulate` returns the surface of a shape
+        that PyBullet does not support. Clearances are measured up to `clearance_range` m. Without `has_images`, cameras
+        cannot be used.
         """
         client = CLIENT_POOL.take()
         engine.set_physics_parameters(client, tick_rate, solver_iterations, solve_islands_separately=len(robots) > 1)
@@ -204,14 +205,17 @@ class Simulation:
     def _build_walls(self, ticks: int) -> None:
         """Create the walls that robots may touch now, and the walls that pushable objects can reach within `ticks`."""
         scene = self._scene
-        robots = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
+        robots = [
+            (robot.base.id, robot.base_pose().position, robot.clearance.bounding_radius)
+            for robot in self.robots.values()
+        ]
         for sphere in itertools.chain(robots, scene.actors.reachable_spheres(scene.tick, ticks)):
             if new_walls := scene.walls.build_near(*sphere):
                 for robot in self.robots.values():
                     robot.add_bodies(dict.fromkeys(new_walls))
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call `function` before each step that begins at a multiple of `period` ticks, instead of an earlier one."""
+        """Call `function` before each step that begins at a multiple of `period` ticks. Replaces the last function."""
         self._periodic_call = period, function
 
     # Changing the world
@@ -254,7 +258,7 @@ class Simulation:
         self._scene.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def add_steered(self, body: Body, max_speed: float) -> None:
-        """Add a body with a circular outline, such as a pedestrian, that `follow` moves at up to `max_speed` m/s."""
+        """Add a body with a circular outline, such as a pedestrian. `follow` moves it at up to `max_speed` m/s."""
         self._scene.before_change()
         path = MotionPath((0.0,), (body.pose.plane,))
         self._scene.actors.add(replace(body, path=path), self.tick, is_steered=True)
@@ -262,7 +266,7 @@ class Simulation:
         self._scene.after_change()
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a body from `add_steered` follow a path at up to `max_speed` m/s; the path begins at its current pose."""
+        """Let a body from `add_steered` follow a path at up to `max_speed` m/s. The path begins at the body's pose."""
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world

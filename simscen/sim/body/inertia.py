@@ -79,43 +79,44 @@ def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
     """Return the properties of a shape of uniform density in its own frame. A mesh counts as its bounding box."""
     match shape:
         case Box((x, y, z)):
-            return _symmetric(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
+            return _with_principal_moments(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
         case Cylinder(radius, length):
             across = (3 * radius**2 + length**2) / 12
-            return _symmetric(mass, across, across, radius**2 / 2)
+            return _with_principal_moments(mass, across, across, radius**2 / 2)
         case Sphere(radius):
             return inertia_of_shape(Ellipsoid((radius, radius, radius)), mass)
         case Ellipsoid((a, b, c)):
-            return _symmetric(mass, (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5)
+            return _with_principal_moments(mass, (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5)
         case Capsule(radius, length):
             balls = mass * 4 / 3 * radius / (length + 4 / 3 * radius)
             tube = inertia_of_shape(Cylinder(radius, length), mass - balls)
             across = 2 / 5 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
-            halves = _symmetric(balls, across, across, 2 / 5 * radius**2)
+            halves = _with_principal_moments(balls, across, across, 2 / 5 * radius**2)
             return MassProperties(mass, np.zeros(3), tube.tensor + halves.tensor)
         case Cone(radius, length):
             across = 3 / 80 * (4 * radius**2 + length**2)
-            cone = _symmetric(mass, across, across, 3 / 10 * radius**2)
+            cone = _with_principal_moments(mass, across, across, 3 / 10 * radius**2)
             return MassProperties(mass, np.array([0.0, 0.0, -length / 4]), cone.tensor)
         case Extrusion(polygon, height):
-            return _prism(polygon, height, mass)
+            return _inertia_of_prism(polygon, height, mass)
         case Mesh(vertices):
             low, high = vertices.min(axis=0), vertices.max(axis=0)
             x, y, z = (high - low).tolist()
             return MassProperties(mass, (low + high) / 2, inertia_of_shape(Box((x, y, z)), mass).tensor)
 
 
-def _symmetric(mass: float, xx: float, yy: float, zz: float) -> MassProperties:
+def _with_principal_moments(mass: float, xx: float, yy: float, zz: float) -> MassProperties:
     """Return properties with the center of mass at the origin, from moments of inertia per mass in m²."""
     return MassProperties(mass, np.zeros(3), mass * np.diag([xx, yy, zz]))
 
 
 def _parallel_axis_term(offset: Array) -> Array:
+    """Return the inertia tensor (3, 3) per mass in m² of a point at `offset` (3,) m, about the origin."""
     result: Array = offset @ offset * np.eye(3) - np.outer(offset, offset)
     return result
 
 
-def _prism(polygon: Sequence[tuple[float, float]], height: float, mass: float) -> MassProperties:
+def _inertia_of_prism(polygon: Sequence[tuple[float, float]], height: float, mass: float) -> MassProperties:
     area, cx, cy, xx, yy, xy = _polygon_moments(polygon)
     xx, yy, xy = xx / area - cx * cx, yy / area - cy * cy, xy / area - cx * cy
     upright = height**2 / 12

@@ -54,15 +54,17 @@ def hull_points(shape: Shape) -> Array:
         case Box(size):
             return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
         case Cylinder(radius, length):
-            return _rings(np.array([radius, radius]), np.array([-length / 2, length / 2]))
+            return _circle_points(np.array([radius, radius]), np.array([-length / 2, length / 2]))
         case Cone(radius, length):
-            return np.concatenate((_rings(np.array([radius]), np.array([-length / 2])), [[0.0, 0.0, length / 2]]))
+            return np.concatenate(
+                (_circle_points(np.array([radius]), np.array([-length / 2])), [[0.0, 0.0, length / 2]])
+            )
         case Sphere(radius):
-            return _ball((radius, radius, radius))
+            return _ellipsoid_points((radius, radius, radius))
         case Ellipsoid(radii):
-            return _ball(radii)
+            return _ellipsoid_points(radii)
         case Capsule(radius, length):
-            ball, up = _ball((radius, radius, radius)), np.array([0.0, 0.0, length / 2])
+            ball, up = _ellipsoid_points((radius, radius, radius)), np.array([0.0, 0.0, length / 2])
             return np.concatenate((ball - up, ball + up))
         case Extrusion(polygon, height):
             return np.array([(x, y, z) for z in (0.0, height) for x, y in polygon])
@@ -112,7 +114,7 @@ def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     return chain
 
 
-def _rings(radii: Array, heights: Array) -> Array:
+def _circle_points(radii: Array, heights: Array) -> Array:
     """Return the points (n, 3) of horizontal circles around the z axis, given their radii and heights in m."""
     angles = np.arange(_CIRCLE_CORNERS) * (2 * math.pi / _CIRCLE_CORNERS)
     points = np.empty((len(radii), _CIRCLE_CORNERS, 3))
@@ -121,11 +123,11 @@ def _rings(radii: Array, heights: Array) -> Array:
     return points.reshape(-1, 3)
 
 
-def _ball(radii: tuple[float, float, float]) -> Array:
+def _ellipsoid_points(radii: tuple[float, float, float]) -> Array:
     """Return points (n, 3) on an ellipsoid at the origin."""
     latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE_CORNERS // 2 + 1).tolist()
     rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
-    result: Array = _rings(*np.array(rings).T) * radii
+    result: Array = _circle_points(*np.array(rings).T) * radii
     return result
 
 
@@ -135,6 +137,7 @@ HULL_TOLERANCE_M = 0.001
 """Largest distance in m of an omitted vertex from the reduced hull."""
 
 _reduced_vertices: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
+"""Cached results of `reduce_hull_vertices`."""
 
 
 def reduce_hull_vertices(mesh: Mesh) -> Array:

@@ -128,8 +128,9 @@ def add_casters(
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
     """Return the chassis and two casters, one in front of the axle and one behind it.
 
-    The loaded caster touches the ground; the other caster is CASTER_GAP_M above it. The center of mass is shifted
-    towards the loaded caster if MIN_MASS_OFFSET_RATIO requires it. `outline` is the outline of the hull from above.
+    The loaded caster, on the side of the center of mass, touches the ground. The other one is CASTER_GAP_M above it.
+    The center of mass is shifted towards the loaded caster if MIN_MASS_OFFSET_RATIO requires it. `outline` is the
+    outline of the hull from above.
     """
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)

@@ -160,10 +160,12 @@ def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
 
 def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
     """Create the shape of the common convex hull of solids."""
-    return create_convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
+    return create_convex_shape(
+        client, np.concatenate([solid.pose.apply(_hull_points(solid.shape)) for solid in solids])
+    )
 
 
-def _corners(shape: Shape) -> Array:
+def _hull_points(shape: Shape) -> Array:
     """Return points (n, 3) that span the convex hull of a shape."""
     return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
 

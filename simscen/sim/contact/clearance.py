@@ -22,7 +22,7 @@ CONTACT_TOLERANCE_M = 0.002
 """Clearance up to which contact is possible, because corners of shapes are rounded by up to 0.4 mm."""
 
 
-class _StaticNearest(NamedTuple):
+class _StaticMeasurement(NamedTuple):
     """Measurement in which the static world was the nearest object.
 
     tick:    tick of the measurement
@@ -67,11 +67,11 @@ class Clearance:
         limits, (self._radius, self._height) = robot.limits, radius_and_height(robot.collision_solids)
         self._limits, self._max_speed = limits, max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0)
         self._extent = math.hypot(self._radius, self._height)
-        self.size = SHAPE_MARGIN_M + self._extent
+        self.bounding_radius = SHAPE_MARGIN_M + self._extent
         """Radius in m of the robot's bounding sphere around its base frame."""
-        self.contact_radius = self.size + CLEARANCE_RANGE_M
+        self.contact_radius = self.bounding_radius + CLEARANCE_RANGE_M
         """Radius in m around its base frame within which actors must be able to collide."""
-        self.query_radius = max(self.contact_radius, self.size + max_range)
+        self.query_radius = max(self.contact_radius, self.bounding_radius + max_range)
         """Radius in m around its base frame within which actors must be measurable."""
         # Wheels can also hit the solids that they roll on.
         touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
@@ -92,7 +92,7 @@ class Clearance:
         """Discard all results, because an object or robot was added, removed, or placed."""
         self._distance = 0.0
         self._measured_tick, self.no_contact_before = -1, 0
-        self._static_nearest: _StaticNearest | None = None
+        self._static_nearest: _StaticMeasurement | None = None
         self._deferrable_until = -1
         """Tick until which `can_defer` is true."""
         self._actors.set_no_contact_before(self._base.id, -1)
@@ -132,8 +132,8 @@ class Clearance:
         self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
         self._static_nearest, self._deferrable_until = None, -1
         if not (self.others or self.may_be_enclosed) and self._obstacle_distance is self._static_distance:
-            margin = self._actors.free_distance(self._base.id, pose[:3], self._distance + self.size, tick)
-            self._static_nearest = None if margin is None else _StaticNearest(tick, pose, margin)
+            margin = self._actors.free_distance(self._base.id, pose[:3], self._distance + self.bounding_radius, tick)
+            self._static_nearest = None if margin is None else _StaticMeasurement(tick, pose, margin)
         return self._distance
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
@@ -168,7 +168,7 @@ class Clearance:
         # The top of a tilted robot extends beyond its radius.
         ground_radius = SHAPE_MARGIN_M + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)
         for other in self._actors.prepare_nearby(
-            self._base.id, point, nearest + self.size, nearest + ground_radius, tick
+            self._base.id, point, nearest + self.bounding_radius, nearest + ground_radius, tick
         ):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
@@ -179,7 +179,7 @@ class Clearance:
 
     def _distance_to_robot(self, robot: "Clearance", point: Vector, max_distance: float) -> float:
         """Return the distance in m to another robot; inf above `max_distance`."""
-        if math.dist(point, robot._state().pose.position) > max_distance + self.size + robot.size:
+        if math.dist(point, robot._state().pose.position) > max_distance + self.bounding_radius + robot.bounding_radius:
             return math.inf
         link_pairs = itertools.product(self._base.hull_links, robot._base.hull_links)
         found = (

@@ -20,7 +20,7 @@ NO_BODY = -1
 """Invalid body id."""
 
 IsGroundContact = Callable[[int, int, float], bool]
-"""Returns whether a contact is with the ground, from the other body's id, the robot's link, and the normal's z."""
+"""Function (id of the other body, link of the robot, z of the unit normal): whether a contact is with the ground."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,8 @@ class PreStepMotion(NamedTuple):
 
 @dataclass
 class _OngoingCollision:
+    """Ticks of the first and the newest contact, and the sum of the impulses in N s."""
+
     first_tick: int
     last_tick: int
     impulse: float
@@ -95,13 +97,15 @@ class CollisionTracker:
                 self._events.append(_started_event(tick, contact, before))
             else:
                 collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
-        self._end(tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay))
+        self._end_collisions(
+            tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay)
+        )
 
     def end_all(self, tick: int) -> None:
         """End all collisions, because the robot is placed at `tick`."""
-        self._end(tick, sorted(self._ongoing))
+        self._end_collisions(tick, sorted(self._ongoing))
 
-    def _end(self, tick: int, names: list[str]) -> None:
+    def _end_collisions(self, tick: int, names: list[str]) -> None:
         for name in names:
             ended = self._ongoing.pop(name)
             data = {"impulse": ended.impulse, "ticks": ended.last_tick - ended.first_tick + 1}

@@ -1,1 +1,1 @@
-"""Movable objects other than robots: scripted, pushed and deferred."""
+"""Movable objects other than robots (actors), such as doors and pedestrians: their motion and their collisions."""

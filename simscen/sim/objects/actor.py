@@ -47,11 +47,11 @@ CenterPose = tuple[Vector, tuple[float, float, float, float]]
 class Actor:
     """A movable body, and the `path` that the body has followed since `path_start_tick` (None: no path).
 
-    segments:  line segments that contain every position of its origin on the path
-    max_speed: upper bound in m/s of the speed of any of its points on the path
-    size:      radius in m of its bounding sphere around the origin
-    radius:    radius in m of its bounding cylinder around the vertical axis
-    surface:   its surface in the body frame if its collision shape is a surface without an inside, else None
+    segments:         line segments that contain every position of its origin on the path
+    max_speed:        upper bound in m/s of the speed of any of its points on the path
+    bounding_radius:  radius in m of its bounding sphere around the origin
+    cylinder_radius:  radius in m of its bounding cylinder around the vertical axis
+    surface:          its surface in the body frame if its collision shape is a surface without an inside, else None
     """
 
     body: Body
@@ -59,8 +59,8 @@ class Actor:
     path_start_tick: int
     segments: Sequence[SweptSegment]
     max_speed: float
-    size: float
-    radius: float
+    bounding_radius: float
+    cylinder_radius: float
     surface: Mesh | None
     is_steered: bool = False
     """Whether the path can be replaced at any time, as for pedestrians."""
@@ -93,7 +93,7 @@ class Actor:
         return self.body.mass > 0 and self.path is None
 
     def is_parked(self, elapsed: float, horizon: float) -> bool:
-        """Return whether it stands still from `elapsed` seconds after the start of its path for `horizon` seconds."""
+        """Return whether it stands still for `horizon` seconds, beginning `elapsed` seconds after its path began."""
         if self.path is None or self.is_steered:
             return False
         return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start
@@ -124,9 +124,9 @@ class Actor:
         return (vx, vy, 0.0), wrap(following.yaw - pose.yaw) * tick_rate
 
     def ground_radius(self, pose: Pose3) -> float:
-        """Return the radius in m of a disc on the ground, around its origin, that contains its top view at `pose`."""
-        height = math.sqrt(self.size**2 - self.radius**2)
-        return min(self.size, self.radius + 2 * height * math.hypot(pose.qx, pose.qy))
+        """Return the radius in m of a disc around its origin that contains it at `pose`, seen from above."""
+        height = math.sqrt(self.bounding_radius**2 - self.cylinder_radius**2)
+        return min(self.bounding_radius, self.cylinder_radius + 2 * height * math.hypot(pose.qx, pose.qy))
 
     def distance_to(self, point: Vector, pose: Pose3) -> float:
         """Return the distance in m from a point to its origin, at `pose` or at `engine_pose`, whichever is nearer."""
@@ -152,7 +152,7 @@ class Actor:
         if self.is_resting:
             return FALL_SPEED_M_S
         linear, angular = pybullet.getBaseVelocity(self.id, physicsClientId=client)
-        return math.hypot(*linear) + math.hypot(*angular) * self.size + FALL_SPEED_M_S
+        return math.hypot(*linear) + math.hypot(*angular) * self.bounding_radius + FALL_SPEED_M_S
 
 
 class ActorBuilder:
@@ -173,8 +173,8 @@ class ActorBuilder:
             segments, speed = swept_segments(body.path), top_speed(body.path, radius)
         is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
         surface = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
-        size = math.hypot(radius, height)
-        return Actor(body, body.path, tick, segments, speed, size, radius, surface, is_steered)
+        bounding_radius = math.hypot(radius, height)
+        return Actor(body, body.path, tick, segments, speed, bounding_radius, radius, surface, is_steered)
 
     def enable_collisions(self, actor: Actor, tick: int) -> None:
         """Let an actor collide; creates it in the engine if necessary."""

@@ -375,7 +375,7 @@ class Actors:
         if self._pushable:
             poses, travel = self.poses(tick), self.speed_bound(tick) * ticks / self._tick_rate
             for actor in self._pushable:
-                yield actor.id, poses[actor.body.name].position, actor.size + travel
+                yield actor.id, poses[actor.body.name].position, actor.bounding_radius + travel
 
     def speed_bound(self, tick: int) -> float:
         """Return an upper bound in m/s of the speed of any actor for the next SPEED_HORIZON_S."""

@@ -95,7 +95,10 @@ class CollisionCandidates(NamedTuple):
 
 
 def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed: float) -> CollisionCandidates:
-    """Return the bodies that may touch within NEAR_CONTACT_S. A hit pushable body is at most `hit_speed` m/s fast."""
+    """Return the bodies that may touch within NEAR_CONTACT_S.
+
+    `hit_speed` is an upper bound in m/s of the speed of a pushable body after another body has hit it.
+    """
     distances = np.linalg.norm(scripted.centers[:, np.newaxis] - pushable.centers, axis=2)
     gaps = distances - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
     closing_speeds = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit_speed)
@@ -141,10 +144,10 @@ class BroadPhase:
                 moving.append(actor)
         if self._pushable_discs is None or not is_asleep:
             self._pushable_discs = BoundingDiscs.of(
-                (poses[a.body.name][:3], a.size, a.speed_bound(self._client)) for a in self._pushable
+                (poses[a.body.name][:3], a.bounding_radius, a.speed_bound(self._client)) for a in self._pushable
             )
         # Scripted actors are upright, so that their horizontal radius is sufficient.
-        scripted_discs = BoundingDiscs.of((poses[a.body.name][:3], a.radius, a.max_speed) for a in moving)
+        scripted_discs = BoundingDiscs.of((poses[a.body.name][:3], a.cylinder_radius, a.max_speed) for a in moving)
         scripted_speed = max(actor.max_speed for actor in self._scripted)
         # A body that is hit by a heavier one leaves with up to twice its speed.
         hit_speed = 2 * max(robot_speed, scripted_speed, float(self._pushable_discs.speeds.max()))

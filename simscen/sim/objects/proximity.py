@@ -56,7 +56,7 @@ class NearbyActors(NamedTuple):
             ]
         near = list[int]()
         for actor in self.actors:
-            pose, reach = poses[actor.body.name], distance + actor.size
+            pose, reach = poses[actor.body.name], distance + actor.bounding_radius
             if actor.path is not None and actor.distance_to(point, pose) <= reach:
                 actor.set_engine_pose(client, pose)
             if math.dist(pose[:3], point) <= reach:
@@ -69,7 +69,8 @@ class NearbyActors(NamedTuple):
         `travel` is an upper bound in m of the motion of any actor since `tick`.
         """
         free = self.distance - math.dist(point, self.point) - travel
-        return min([free, *(actor.distance_to(point, poses[actor.body.name]) - actor.size for actor in self.actors)])
+        distances = (actor.distance_to(point, poses[actor.body.name]) - actor.bounding_radius for actor in self.actors)
+        return min([free, *distances])
 
 
 def find_nearby(
@@ -86,7 +87,8 @@ def find_nearby(
     nearby = tuple(
         actor
         for actor in actors
-        if (is_awake and actor.is_pushable) or actor.distance_to(point, poses[actor.body.name]) <= distance + actor.size
+        if (is_awake and actor.is_pushable)
+        or actor.distance_to(point, poses[actor.body.name]) <= distance + actor.bounding_radius
     )
     resting = None
     if not any(actor.path is not None or (is_awake and actor.is_pushable) for actor in nearby):
@@ -119,8 +121,8 @@ class DeferredActors:
         self._owners = np.repeat(np.arange(len(actors)), [len(actor.segments) for actor in actors])
         self._starts, self._directions = segments[:, :2], segments[:, 2:4] - segments[:, :2]
         self._squared_lengths = np.maximum((self._directions**2).sum(axis=1), 1e-12)
-        sizes = np.array([actor.size for actor in actors])[self._owners]
-        self._radii = segments[:, 4] + sizes + ROUNDING_MARGIN_M
+        bounding_radii = np.array([actor.bounding_radius for actor in actors])[self._owners]
+        self._radii = segments[:, 4] + bounding_radii + ROUNDING_MARGIN_M
         self._is_deferred = np.ones(len(actors), dtype=np.bool_)
         self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
@@ -142,7 +144,7 @@ class DeferredActors:
         return [self._actors[index] for index in near], [self._actors[index] for index in measured]
 
     def _distances(self, point: Vector) -> Array:
-        """Return lower bounds (segments,) of the distance in m from a point to the area that an actor sweeps."""
+        """Return lower bounds of the distance in m from a point to the actors, one for each segment of their paths."""
         offsets = np.array(point[:2]) - self._starts
         shares = np.clip((offsets * self._directions).sum(axis=1) / self._squared_lengths, 0.0, 1.0)
         centers = offsets - shares[:, np.newaxis] * self._directions

@@ -21,7 +21,7 @@ class Base(Protocol):
     hull_links: tuple[int, ...]
     """Links that collide with obstacles."""
     ground_links: Mapping[int, float]
-    """Links of the wheels and casters that can stand on uneven ground, each with its smallest z of a contact normal."""
+    """Smallest z of the contact normal for each link of a wheel or caster that can stand on uneven ground."""
 
     def place(self, pose: Pose2) -> None:
         """Place the robot at rest on the ground."""

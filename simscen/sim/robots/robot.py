@@ -90,7 +90,7 @@ class Scene:
             robot.sampler.compute_deferred()
 
     def activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
-        """Let the actors (movable objects) near robots collide, which were deferred to save time.
+        """Let deferred actors near robots collide. These are movable objects that cannot collide yet, to save time.
 
         Skips robots that have moved less than `moved` m since their last query.
         """

@@ -21,7 +21,7 @@ KNUCKLE_MASS_RATIO = 0.2
 """Mass of a steering knuckle divided by the mass of its wheel."""
 PIN_RADIUS_M = 0.001
 """Radius of the small sphere that `_wheel_shape` adds to a wheel."""
-ROLL_MARGIN = 1.1
+ROLL_MARGIN_FACTOR = 1.1
 """Factor by which a wheel may roll farther in a step than the robot's velocity limits allow."""
 HULL_LINK_MASS_KG = 0.001
 """Mass of each link of the hull except the base, which has the mass of the chassis."""
@@ -53,7 +53,7 @@ class WheeledBase:
         self._center_from_base = self._base_from_center.inverse()
         self._is_aligned = self._center_from_base.quaternion == IDENTITY
         casters = casters_for_uneven_ground(body.casters) if terrain else body.casters
-        self.id, self.joints, self.hull_links = _build(client, body, casters, tick_seconds, visual_shape)
+        self.id, self.joints, self.hull_links = _create_multibody(client, body, casters, tick_seconds, visual_shape)
         self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
         self._supports = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *on_ground])
@@ -123,7 +123,7 @@ class WheeledBase:
 def _ground_links(
     body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
 ) -> dict[int, float]:
-    """Return the links of wheels and casters, each with its smallest z of the contact normal with uneven ground.
+    """Return the smallest z of the contact normal with uneven ground for each link of a wheel or caster.
 
     `joints` are the first joints of the wheels, and `hull` are the links of the hull and casters.
     """
@@ -131,7 +131,7 @@ def _ground_links(
     return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
 
 
-def _build(
+def _create_multibody(
     client: int, body: RobotBody, casters: Sequence[Solid], tick_seconds: float, visual_shape: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
     """Create the multibody; return its id, the first joint of each wheel, and the links of the hull and casters.
@@ -204,7 +204,9 @@ def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
     For a fast wheel, adds a tiny second sphere on the axle, a pin. It enlarges the extent of the shape, so that Bullet
     discards outdated contact points (see CONTACT_BREAKING_RATIO).
     """
-    pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2)
+    pin_distance = min(
+        ROLL_MARGIN_FACTOR * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2
+    )
     if pin_distance <= wheel.radius:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape

@@ -13,7 +13,7 @@ from simscen.sim.bullet import engine, pybullet
 
 NEAR_PLANE_M = 0.02
 """Distance from the camera below which nothing is rendered."""
-FACES_PER_SHAPE = 20_000
+MAX_FACES_PER_VISUAL_SHAPE = 20_000
 """Largest number of triangles in a visual shape."""
 
 
@@ -97,9 +97,9 @@ class RenderScene:
 
     def _create_bodies(self, vertices: Array, faces: engine.Faces) -> tuple[int, ...]:
         return tuple(
-            pybullet.createMultiBody(0, -1, self._create_shape(vertices[faces[k : k + FACES_PER_SHAPE]]),
+            pybullet.createMultiBody(0, -1, self._create_shape(vertices[faces[k : k + MAX_FACES_PER_VISUAL_SHAPE]]),
                                      physicsClientId=self._client)
-            for k in range(0, len(faces), FACES_PER_SHAPE)
+            for k in range(0, len(faces), MAX_FACES_PER_VISUAL_SHAPE)
         )  # fmt: skip
 
     def _create_shape(self, corners: Array) -> int:

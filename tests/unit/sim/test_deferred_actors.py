@@ -55,9 +55,10 @@ def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
 
     def nearest(actor: Actor) -> float:
         if actor.path is None:
-            return math.dist(actor.body.pose[:2], place[:2]) - actor.size
+            return math.dist(actor.body.pose[:2], place[:2]) - actor.bounding_radius
         times = (k / 100 * actor.path.times[-1] for k in range(101))
-        return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in times) - actor.size
+        distances = (math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in times)
+        return min(distances) - actor.bounding_radius
 
     distances = {actor.body.name: nearest(actor) for actor in actors}
     deviations = {actor.body.name: max(segment.deviation for segment in actor.segments) for actor in actors}
