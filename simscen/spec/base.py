@@ -1,4 +1,4 @@
-"""Base classes of specifications. A specification is a pydantic model of a part of a YAML file."""
+"""Base classes of specifications: pydantic models of parts of YAML files."""
 
 import ast
 import inspect
@@ -53,6 +53,7 @@ class Spec(BaseModel):
 
 
 def _reject_boolean(value: Any) -> Any:
+    """Return the value. Raises PydanticCustomError for true and false."""
     if isinstance(value, bool):  # `True == 1`, so a Literal accepts it
         raise PydanticCustomError("literal_error", "expected 1", {"expected": "1"})
     return value
@@ -65,7 +66,7 @@ T = TypeVar("T")
 
 
 class Value(RootModel[T], Generic[T]):
-    """Specification that is a single value instead of a mapping, e.g. `10 s` in `time: 10 s`."""
+    """Base class of specifications of a single value instead of a mapping, e.g. `10 s` in `time: 10 s`."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
@@ -78,6 +79,7 @@ class Ranged(Spec):
 
     @model_validator(mode="after")
     def _check_order(self) -> "Ranged":
+        """Raise ValueError if a minimum is greater than its maximum."""
         for low in type(self).model_fields:
             high = low.replace("min", "max")
             if high == low or high not in type(self).model_fields:
@@ -89,15 +91,15 @@ class Ranged(Spec):
 
 
 def by_default() -> Any:
-    """Return a pydantic field with the default `{}`, which validation turns into the specification of the field."""
+    """Return an optional pydantic field. Its default is the specification with default values."""
     # Creating the specification at import would cost every command 10 ms.
     return Field(default_factory=dict, validate_default=True)
 
 
 def type_discriminator(default: str) -> Callable[[Any], str | None]:
-    """Return a function for pydantic's Discriminator that selects a member of a union by the key `type`.
+    """Return a function for pydantic's Discriminator, which selects a member of a union by the key `type`.
 
-    `default` is the type of a mapping without this key.
+    `default` is the type of mappings without this key.
     """
 
     def tag(value: Any) -> str | None:
@@ -145,10 +147,11 @@ class Component(Spec):
     """
 
     component: ClassVar[str]
-    """Address `package.module:Class` of the class, or of a function that returns the object.
+    """Address `package.module:Class` of the class of the object, or of a function that returns the object.
 
-    It is called with the specification and a setting (facts about the run): simscen.stack.setting.Setting for a part of
-    a stack, simscen.sensors.sensor.SensorSetting for a sensor.
+    The class or function is called with two arguments: the specification, and a setting with facts about the run. The
+    setting is a simscen.stack.setting.Setting for a stack and its parts, and a simscen.sensors.sensor.SensorSetting for
+    a sensor.
     """
 
     @classmethod
@@ -165,7 +168,7 @@ class Component(Spec):
 
 
 class Typed(Component):
-    """Component that a file selects by its name under the key `type`."""
+    """Component that is selected by its name under the key `type`."""
 
     type: str = ""
     """Name of the component."""
@@ -173,7 +176,7 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation of a field that is a specification of the class `name` in `module`.
+    """Annotation of a field with a specification of the class `name` in `module`.
 
     The module is imported when a value of the field is validated.
     """
@@ -203,5 +206,5 @@ class LazySpec:
 
 
 def annotation_of(field: FieldInfo) -> Any:
-    """Return the type of a field. For a field with a LazySpec, import and return the specification class."""
+    """Return the type of a field. For a LazySpec field, this is the specification class, which is imported."""
     return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)

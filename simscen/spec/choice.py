@@ -1,6 +1,6 @@
 """Base class of YAML mappings with exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
 
-Installed packages can add keys to the keys that simscen ships.
+Installed packages can add keys.
 """
 
 from functools import cache
@@ -14,22 +14,22 @@ from simscen.spec.base import LazySpec, Spec
 
 
 class Choice(Spec):
-    """Mapping with exactly one key out of several, e.g. `spawn: {…}`, plus optional modifiers.
+    """Mapping with exactly one of several keys (the choices), e.g. `spawn: {…}`, and optional modifiers.
 
-    A subclass has one optional field for each choice. A mapping with a key that an installed package adds becomes an
-    instance of an extended class: a subclass with a further field for each added key.
+    A subclass has one optional field for each choice. A mapping with a key of an installed package becomes an instance
+    of an extended class: a subclass with a further field for each key that installed packages add.
     """
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
-    """Names of fields that can be combined with any choice."""
+    """Names of the fields that can be combined with any choice."""
     group: ClassVar[str] = ""
-    """Group of the registry in which installed packages can add choices; "" if they cannot."""
+    """Registry group in which installed packages can add choices; "" if they cannot add any."""
     original_class: ClassVar[type["Choice"] | None] = None
-    """In an extended class, the class that it extends; None in any other class."""
+    """Class that an extended class extends; None for any other class."""
 
     @classmethod
     def choices(cls) -> dict[str, str]:
-        """Return the field names of all choices by their keys in YAML."""
+        """Return the field names of all choices, by key in YAML."""
         return {f.alias or name: name for name, f in cls.model_fields.items() if name not in cls.modifiers}
 
     @classmethod
@@ -40,9 +40,9 @@ class Choice(Spec):
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the addresses "module:Class" of the specifications of the choices, by their keys in YAML.
+        """Return the address "module:Class" of the specification of each choice, by key in YAML.
 
-        Choices with a list or another Choice as value are left out.
+        Choices with a list or another Choice as their value are left out.
         """
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
@@ -50,6 +50,7 @@ class Choice(Spec):
     @model_validator(mode="wrap")
     @classmethod
     def _use_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
+        """Validate a mapping with a key of an installed package by the extended class."""
         if (
             cls.group
             and cls.original_class is None
@@ -73,6 +74,7 @@ class Choice(Spec):
 
     @model_validator(mode="after")
     def _check_one_choice(self) -> "Choice":
+        """Raise ValueError unless the mapping has exactly one choice."""
         given = self._given_keys()
         if not given:
             raise ValueError(f"expected one of: {', '.join(self.choices())}")
@@ -98,9 +100,9 @@ class Choice(Spec):
 
     @property
     def plugin_suffix(self) -> str:
-        """Suffix for messages that names the plugin, e.g. " (criterion `dwell` of yardwork 1.2)".
+        """Name of the plugin as a suffix for messages, e.g. " (criterion `dwell` of yardwork 1.2)".
 
-        It is "" if simscen ships the key.
+        It is "" if simscen ships the choice.
         """
         if self.original_class is None:
             return ""
@@ -117,7 +119,7 @@ class Choice(Spec):
 
 @cache
 def with_installed_choices(choice: type[Choice]) -> type[Choice]:
-    """Return the extended class of a choice; the class itself if no installed package adds a key."""
+    """Return the extended class of a Choice class; the class itself if no installed package adds a key."""
     from pydantic import create_model
 
     from simscen.spec.extensible_union import PluginSpec
@@ -143,14 +145,14 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
 
 
 def _empty_instance(original_class: type[Choice]) -> Choice:
-    """Return an uninitialized instance of the extended class of a choice, for unpickling."""
+    """Return an uninitialized instance of the extended class of a Choice class, for unpickling."""
     # Pickle cannot import an extended class by its name, because each process creates the class at run time.
     extended = with_installed_choices(original_class)
     return extended.__new__(extended)
 
 
 def _address(field: FieldInfo) -> str:
-    """Return the address "module:Class" of the specification of a field; "" for a list and for a nested choice."""
+    """Return the address "module:Class" of the specification of a field; "" for a list or another Choice."""
     lazy = next((item for item in field.metadata if isinstance(item, LazySpec)), None)
     if lazy is not None:
         return f"{lazy.module}:{lazy.name}"

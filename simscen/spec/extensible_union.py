@@ -1,4 +1,7 @@
-"""Fields that accept all types of a registry group, such as planners, including types of installed packages."""
+"""Annotations of fields that accept all types of a registry group, such as planners, including plugins.
+
+A plugin is a type that an installed package adds.
+"""
 
 import math
 from dataclasses import dataclass
@@ -12,19 +15,19 @@ from simscen.spec.base import LazySpec, Typed
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP_KEY = "simscen group"
-"""Key of the registry group in the metadata of a pydantic schema."""
+"""Key in the metadata of a pydantic schema: the value is the name of the registry group."""
 NAMES_ALLOWED_KEY = "simscen names"
-"""Key in the same metadata: true if the name of a type alone is a valid value."""
+"""Key in this metadata: the value is True if the name of a type alone is valid."""
 MAPPINGS_ALLOWED_KEY = "simscen mappings"
-"""Key in the same metadata: true if a mapping with the key `type` is a valid value."""
+"""Key in this metadata: the value is True if a mapping with the key `type` is valid."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Annotation of a field that is a specification of a registry group, selected by the key `type`.
+    """Annotation of a field with a specification of a registry group, which the key `type` selects.
 
-    `shipped_union` is the union of the shipped specifications. Another `type` selects the specification of an installed
-    package. With `allows_names`, the name of a type alone is also valid.
+    `shipped_union` is the union of the shipped specifications. With `allows_names`, the name of a type alone is also
+    valid.
     """
 
     group: str
@@ -37,6 +40,7 @@ class ExtensibleUnion:
         return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
 
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        """Return the specification of a value, validated by the shipped union or by a plugin."""
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
         if self.allows_names and isinstance(value, str) and value not in _shipped_names(self.group):
@@ -53,7 +57,7 @@ class ExtensibleUnion:
 
 @dataclass(frozen=True)
 class TypeName:
-    """Annotation of a string that names a type of a registry group, shipped or from an installed package."""
+    """Annotation of a string that names a type of a registry group, shipped or from a plugin."""
 
     group: str
 
@@ -62,13 +66,14 @@ class TypeName:
         return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=metadata)
 
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        """Return the name. Raises PydanticCustomError if there is no such type."""
         if isinstance(value, str) and value not in _shipped_names(self.group):
             return _find_or_raise(self.group, value).name
         return validate_shipped(value)
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
-"""Name of a recovery behavior, shipped or from an installed package."""
+"""Name of a recovery behavior, shipped or from a plugin."""
 
 
 def _shipped_names(group: str) -> frozenset[str]:
@@ -88,12 +93,12 @@ def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
 
 
 _CHECKED_PROPERTIES = ("horizon", "clearance_range")
-"""Properties of plugin criteria that are read before a run: a time in s, and a distance in m."""
+"""Properties of plugins that are read before a run: a time in s, and a distance in m."""
 
 
 @dataclass(frozen=True)
 class PluginSpec(LazySpec):
-    """Annotation of a field whose specification class comes from an installed package."""
+    """Annotation of a field with a specification of a plugin."""
 
     entry: Entry
 
@@ -106,7 +111,7 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """Return the specification of a value, validated by a plugin. Any error of the plugin is a validation error."""
+    """Return the specification of a value, validated by a plugin. Errors of the plugin become validation errors."""
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:

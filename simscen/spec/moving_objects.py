@@ -15,17 +15,18 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Half of the duration of a turn at a corner. If shorter, a quarter of the duration of the leg replaces it."""
+"""Half of the duration of a turn at a corner, but at most a quarter of the duration of a leg."""
 SMOOTH_DURATION_FACTOR = 1.5
-"""Duration of a leg with `ease: smooth`, divided by its duration at constant speed with the same top speed."""
+"""Duration of a leg with `ease: smooth`, divided by its duration at constant top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6
-"""Largest distance in m, and largest difference of yaw in rad, between the ends of a loop of keyframes."""
+"""Largest distance in m, and largest yaw difference in rad, between the ends of a loop of keyframes."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
 """Time in s, x and y in m, and yaw in rad. Lists are valid as well as tuples."""
 
 
 def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
+    """Return the keyframes. Raises ValueError unless their times increase."""
     for before, after in itertools.pairwise(keyframes):
         if after[0] <= before[0]:
             raise ValueError(f"the times of keyframes must rise, but {after[0]:g} s comes after {before[0]:g} s")
@@ -43,22 +44,24 @@ class Motion(Spec):
     keyframes: Annotated[list[Keyframe], Field(min_length=1, max_length=1000), AfterValidator(_check_times)] | None = (
         None
     )
-    """Timed poses instead of waypoints: [t, x, y, yaw] in the world frame, with t from the start of the motion. A
-    keyframe at time 0 places the object there; otherwise it moves from its current pose to the first keyframe. Turns
+    """Timed poses instead of waypoints: [t, x, y, yaw] in the world frame, with t from the start of the motion. With a
+    keyframe at time 0, the object starts there; otherwise, it moves from its current pose to the first keyframe. Turns
     take the shorter direction."""
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
     """Behavior at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
     keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
-    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them, with
-    the fraction 3u² - 2u³ of the leg covered after the fraction u of its time (peak speed 1.5 times the mean).
-    `spline`: through keyframes without stopping, along a cubic Hermite curve with Catmull-Rom velocities for uneven
-    times, (next - previous) / (difference of their times); at rest at both ends, except in a loop."""
+    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them. After
+    the fraction u of its time, a leg is then covered by the fraction 3u² - 2u³; the peak speed is 1.5 times the mean.
+    `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends, except in a loop.
+    The velocities at keyframes are Catmull-Rom velocities for uneven times: (next - previous) / (difference of their
+    times)."""
     phase: Duration = 0.0
     """Time into the keyframes at which the motion starts, so that several objects can share keyframes."""
 
     @model_validator(mode="after")
     def _check_kind(self) -> Motion:
+        """Raise ValueError unless the keys describe either waypoints or keyframes."""
         if (self.through is None) == (self.keyframes is None):
             raise ValueError("expected through and speed, or keyframes")
         if (self.through is None) != (self.speed is None):
@@ -71,6 +74,7 @@ class Motion(Spec):
 
     @model_validator(mode="after")
     def _check_repeat(self) -> Motion:
+        """Raise ValueError if the keyframes do not fit `repeat` or `phase`."""
         if self.keyframes is None:
             return self
         first, last = self.keyframes[0], self.keyframes[-1]
@@ -85,7 +89,7 @@ class Motion(Spec):
         return self
 
     def path(self, current: Pose2, start: float = 0.0) -> MotionPath:
-        """Return the path of an object whose pose is now `current` and that starts to move in `start` seconds."""
+        """Return the path of an object from the pose `current`. The object starts to move in `start` seconds."""
         if self.keyframes is not None:
             return _path_through_keyframes(current, self.keyframes, self.repeat, start, self.ease, self.phase)
         assert self.through is not None and self.speed is not None
@@ -100,7 +104,7 @@ def _path_through_keyframes(
     ease: str,
     phase: float,
 ) -> MotionPath:
-    """Return the path through keyframes; the parameters are those of Motion and `Motion.path`."""
+    """Return the path through keyframes. The parameters are the fields of Motion and the arguments of `Motion.path`."""
     times, poses = [t for t, *_ in keyframes], [Pose2(x, y, yaw) for _, x, y, yaw in keyframes]
     if times[0] > 0:
         times, poses = [0.0, *times], [current, *poses]
@@ -112,7 +116,7 @@ def _path_through_keyframes(
 def path_through_waypoints(
     current: Pose2, through: list[list[float]], speed: float, repeat: str, ease: str = "linear", start: float = 0.0
 ) -> MotionPath:
-    """Return the path along straight lines from `current` through waypoints [x, y]; `speed` in m/s is the top speed."""
+    """Return the path along straight lines from `current` through waypoints [x, y] at the top speed `speed` in m/s."""
     corners = [(current.x, current.y)]
     for x, y in [*through, *([[current.x, current.y]] if repeat == "loop" else [])]:
         if (x, y) != corners[-1]:
@@ -127,7 +131,7 @@ def path_through_waypoints(
 
 
 class _Leg(NamedTuple):
-    """Straight leg of a path. `begin` has the heading of the leg. `length` is in m, `end_point` is (x, y)."""
+    """Straight leg between two waypoints. `begin` has its heading, `length` is in m, and `end_point` is (x, y)."""
 
     begin: Pose2
     length: float
@@ -144,7 +148,7 @@ class _Leg(NamedTuple):
 
 
 def _poses_at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times in s and poses for a motion that turns while driving, half before each corner and half after it."""
+    """Return times in s and poses of a motion without stops. Half of each turn is before its corner, half after it."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         duration = leg.length / speed
@@ -168,7 +172,7 @@ def _poses_at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> lis
 
 
 def _poses_with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times in s and poses for a motion that stops at the end of each leg and turns in place at corners."""
+    """Return times in s and poses of a motion that stops at the end of each leg, and turns in place at corners."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         time += SMOOTH_DURATION_FACTOR * leg.length / speed
@@ -196,6 +200,7 @@ class ShapedObject(Spec):
 
     @model_validator(mode="after")
     def _check_shape(self) -> ShapedObject:
+        """Raise ValueError unless there is exactly one shape."""
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
         return self

@@ -1,7 +1,7 @@
-"""Field types for names, points, poses, and references to named things.
+"""Field types for names, points, poses, polygons, filter masks, and references to named things.
 
-A place is a named pose of a world. The loader replaces the name of a place in a pose or point field by the pose or
-point of the place.
+Some pose and point fields also accept the name of a place (a named pose of a world). The loader replaces the name by
+the pose or point of the place.
 """
 
 from __future__ import annotations
@@ -34,17 +34,20 @@ Name = Annotated[
     StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
     AfterValidator(_reject_path),
 ]
-"""Name of a thing: 1 to 120 characters without control characters, and not a path."""
+"""Name: 1 to 120 characters, no control characters, and not a path."""
 ROS_NAMESPACE_PATTERN = r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"
+"""Pattern of names that are also valid as ROS namespaces."""
 RobotName = Annotated[str, StringConstraints(max_length=40, pattern=ROS_NAMESPACE_PATTERN)]
 """Name of one of several robots, which is also its ROS namespace."""
 # The maximum length is not part of the pattern: compiling `\w{0,119}` for Unicode takes 25 ms at every start.
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
+"""Name of a place, a region, or a tag."""
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 """Point [x, y] in m."""
 
 
 def _check_polygon(ring: list[Point]) -> list[Point]:
+    """Return the corners of a polygon. Raises ValueError for an invalid polygon."""
     defect = polygon_defect([(x, y) for x, y in ring])
     if defect:
         raise ValueError(f"the polygon {defect}")
@@ -68,11 +71,11 @@ class PoseSpec(Spec):
 
     @property
     def place(self) -> str:
-        """Name of the place from which the pose comes; "" for a pose that the file contains."""
+        """Name of the place from which the pose comes; "" for a pose that is written out in the file."""
         return self._place
 
     def with_place(self, place: str) -> PoseSpec:
-        """Return a copy of the pose with `place` set to this name."""
+        """Return a copy of the pose that comes from this place."""
         copy = self.model_copy()
         copy._place = place
         return copy
@@ -84,6 +87,7 @@ class PoseSpec(Spec):
 
 
 ReferenceKind = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask"]
+"""Kind of thing to which a name refers."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,7 @@ PLACE_NAME_DESCRIPTION = "Name of a place in the world."
 
 
 def _union_tag(value: Any) -> str:
-    """Return the tag of a value in the unions below: "text" for the name of a place, otherwise "written out"."""
+    """Return the tag of a value in a union: "text" for the name of a place, otherwise "written out"."""
     return "text" if isinstance(value, str) else "written out"
 
 
@@ -120,7 +124,7 @@ def _union_tag(value: Any) -> str:
 class PlaceAllowed(ReferenceTo):
     """Annotation of a pose in the world frame that can also be given as the name of a place.
 
-    `keywords` are texts that this field accepts and that do not name a place.
+    `keywords` are other valid texts, such as "unknown", which do not name a place.
     """
 
     target: ReferenceKind = "place"
@@ -146,7 +150,7 @@ class PlaceAllowedForPoint(PlaceAllowed):
 
 @dataclass(frozen=True)
 class PlaceShorthand:
-    """Annotation of a mapping that can also be given as the name of a place, short for `{key: name}`."""
+    """Annotation of a mapping `{key: place}` that can also be given as the name of the place alone."""
 
     key: str
 
@@ -158,6 +162,7 @@ class PlaceShorthand:
         return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _union_tag)
 
     def _as_mapping(self, place: str) -> dict[str, str]:
+        """Return the mapping `{key: place}`."""
         return {self.key: place}
 
 

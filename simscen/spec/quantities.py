@@ -11,12 +11,13 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 _METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 _SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 _RADIANS = {"rad": 1.0, "deg": math.pi / 180}
+"""Factors to meters, seconds, and radians, by unit."""
 NUMBER_AND_UNIT_PATTERN = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d].*?)\s*")
 """Pattern of a quantity such as "1.5 m". Group 1 is the number, group 2 the unit."""
 
 
 def _units_per(top: dict[str, float], bottom: dict[str, float], power: Literal["", "^2"] = "") -> dict[str, float]:
-    """Return the SI factors of the units `top/bottom`, or `top/bottom^2`; e.g. m/s^2 from m and s."""
+    """Return the SI factors of the units `top/bottom` or `top/bottom^2`, e.g. of m/s^2 from m and s."""
     return {f"{a}/{b}{power}": x / (y**2 if power else y) for a, x in top.items() for b, y in bottom.items()}
 
 
@@ -40,7 +41,7 @@ UNITS: dict[str, dict[str, float]] = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """Annotation of a float with a physical dimension, a key of UNITS. Validation converts text to SI units."""
+    """Annotation of a float with a physical `dimension`, a key of UNITS. Validation converts text to SI units."""
 
     dimension: str
 
@@ -95,9 +96,9 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnyQuantity:
-    """Annotation of a float whose dimension depends on another field. It adds all units to the JSON schema.
+    """Annotation of a float with a dimension that depends on another field. The JSON schema allows all units.
 
-    The specification with the field must convert text by `si_number`.
+    The specification that contains the field must convert text by `si_number`.
     """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -113,7 +114,7 @@ class WholeQuantity(Quantity):
     """Annotation of an integer with a physical dimension, in SI units."""
 
     def parse(self, value: Any) -> Any:
-        """Convert text such as "240 Hz" to an integer. A fraction stays a float, which validation rejects."""
+        """Convert text such as "240 Hz" to an integer. A fraction becomes a float, which validation rejects."""
         number = super().parse(value)
         return int(number) if isinstance(value, str) and number.is_integer() else number
 
@@ -150,7 +151,7 @@ Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
 
 
 class Amount(NamedTuple):
-    """Number and its unit; "" for a number without a unit."""
+    """Number with its unit as written; "" for a number without a unit."""
 
     number: float
     unit: str = ""
@@ -174,8 +175,8 @@ AnyAmount = Annotated[Amount, _ParsedAmount()]
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
     """Return the amounts as numbers in one unit, and this unit.
 
-    The unit is that of the amounts if they all have the same, otherwise "" for the SI unit. Raises ValueError if their
-    dimensions differ.
+    Amounts with the same unit keep it. Other amounts are converted to the SI unit, which is returned as "". Raises
+    ValueError if their dimensions differ.
     """
     units = {amount.unit for amount in amounts}
     if len(units) == 1:
@@ -197,6 +198,7 @@ def si_number(value: Any) -> Any:
 
 
 def _parse_amount(value: Any) -> Amount:
+    """Return the amount in a YAML value. Raises PydanticCustomError for other values."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise PydanticCustomError("finite_number", "must be a finite number")

@@ -1,4 +1,4 @@
-"""Registry of the types of components that YAML files can use by name, such as planners and criteria.
+"""Registry of types that YAML files select by name: planners, criteria, faults, sensors, and so on.
 
 simscen ships types. An installed package adds a type, called a plugin, by an entry point. The value of the entry point
 is the address of a specification class (a pydantic model of the YAML):
@@ -29,20 +29,21 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 ENTRY_POINT_PREFIX = "simscen."
-"""Beginning of the names of entry point groups, e.g. "simscen.criterion" for the group "criterion"."""
+"""Prefix of entry point groups: "simscen.criterion" is the entry point group of the registry group "criterion"."""
 _BASE_CLASSES = ("simscen.spec.base:Spec", "simscen.spec.base:Value")
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-_ADDRESS = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
+"""Addresses of the base classes of all specifications."""
+_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]{0,59}")
+_ADDRESS_PATTERN = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
 
 
 @dataclass(frozen=True)
 class Group:
-    """Group of types, such as criteria. Addresses have the form "module:name"."""
+    """Group of types, such as criteria."""
 
     base: str
-    """Address of the base class of all specifications of the group."""
+    """Address "module:Class" of the base class of all specifications of the group."""
     shipped: str
-    """Address of the shipped types: a Choice, or a dict of addresses by name."""
+    """Address "module:name" of the shipped types: a Choice class, or a dict of addresses by name."""
     reserved: tuple[str, ...] = ()
     """Names that plugins cannot have, because YAML files use them as keys."""
 
@@ -85,7 +86,7 @@ class Entry:
     version: str = ""
     """Version of this package; "" for a shipped type."""
     problem: str = ""
-    """Reason why the type cannot be used, found without importing the package; "" if there is none."""
+    """Reason why the type cannot be used, as far as it is known without an import; "" if there is none."""
     folder: str = ""
     """Folder in which the package is installed; "" for a shipped type."""
 
@@ -137,14 +138,14 @@ def installed_specs(group: str) -> dict[str, type[BaseModel]]:
 
 
 def entries(group: str) -> tuple[Entry, ...]:
-    """Return the shipped types of a group, then the types of installed packages with other names."""
+    """Return all types of a group: shipped types, then types of installed packages with other names."""
     own = shipped(group)
     names = {entry.name for entry in own}
     return (*own, *(entry for entry in installed(group) if entry.name not in names))
 
 
 def find(group: str, name: str) -> Entry | None:
-    """Return the type with this name; None if there is none. Shipped types have priority."""
+    """Return the type with this name; None if there is none. A shipped type has priority."""
     own = next((entry for entry in shipped(group) if entry.name == name), None)
     return own or next((entry for entry in installed(group) if entry.name == name), None)
 
@@ -168,6 +169,7 @@ def entries_of(spec: type) -> tuple[Entry, ...]:
 
 
 def _has_spec(entry: Entry, spec: type) -> bool:
+    """Return whether a type has this specification class; False if the type cannot be used."""
     try:
         return entry.load() is spec
     except BrokenPlugin:
@@ -182,7 +184,7 @@ def _installed_entries() -> tuple[Entry, ...]:
 
 
 def _read_entries() -> Iterator[Entry]:
-    """Yield the types of all packages on the search path. Of several packages with one name, only the first counts."""
+    """Yield the types of all packages on the search path. Later packages of the same name are ignored."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
@@ -217,7 +219,7 @@ def _mentions_simscen(package: Distribution) -> bool:
 def search_path() -> list[str]:
     """Return sys.path without the working directory and the folder of the program, unless PYTHONPATH names them.
 
-    A dist-info folder next to scenarios must not run code.
+    Packages that lie next to scenarios must not run code.
     """
     program = getattr(sys.modules.get("__main__"), "__file__", None)
     implicit = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
@@ -231,7 +233,7 @@ def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
     group = GROUPS.get(entry.group)
     if group is None:
         return f"there is no group `{ENTRY_POINT_PREFIX}{entry.group}`"
-    if not _NAME.fullmatch(entry.name):
+    if not _NAME_PATTERN.fullmatch(entry.name):
         return "its name must start with a lowercase letter and consist of lowercase letters, digits, and `_`"
     if entry.name in group.reserved:
         return f"the name `{entry.name}` is reserved"
@@ -240,7 +242,7 @@ def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
     others = [other for other in all_entries if (other.group, other.name) == (entry.group, entry.name)]
     if len(others) > 1:
         return "added by " + " and by ".join(f"{other.origin} ({other.value})" for other in others)
-    if not _ADDRESS.fullmatch(entry.value):
+    if not _ADDRESS_PATTERN.fullmatch(entry.value):
         return f"`{entry.value}` is not of the form package.module:Class"
     return ""
 
