@@ -10,7 +10,7 @@ from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distances
 from simscen.stack.frames import Frames, transform_poses
-from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
@@ -38,7 +38,7 @@ class FollowedPlan:
         self._tracker = PathTracker(path)
         self._pose: Pose2 | None = None
         self._located_pose = Pose2(*path.points[0].tolist())
-        self._complex_points: Plane = path.points[:, 0] + 1j * path.points[:, 1]
+        self._complex_points: ComplexPoints = path.points[:, 0] + 1j * path.points[:, 1]
         self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest_step
         self._revision = costmap.revision
         self.update_occupied(costmap)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array, wrap_array
-from simscen.stack.localizers.beams import Plane, evenly_spaced
+from simscen.stack.localizers.beams import ComplexPoints, evenly_spaced
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.sensor_models import surfaces
 
@@ -53,8 +53,8 @@ class View:
     `ends` (n,) are the endpoints of beams. `passed` (m,) are points along the beams, which should be free.
     """
 
-    ends: Plane
-    passed: Plane
+    ends: ComplexPoints
+    passed: ComplexPoints
 
     def thinned(self, count: int) -> "View":
         """Return at most `count` of `ends` and of `passed`, evenly spaced."""
@@ -66,7 +66,7 @@ def _without_far_points(view: View) -> View:
     return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (view.ends, view.passed)))
 
 
-def _thin(points: Plane, count: int) -> Plane:
+def _thin(points: ComplexPoints, count: int) -> ComplexPoints:
     """Return at most `count` of the points, evenly spaced."""
     if len(points) <= count:
         return points
@@ -116,7 +116,7 @@ class GlobalSearch:
         scores: Array = np.asarray(total) / sum(weight for _, _, weight in nonempty)
         return scores
 
-    def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
+    def _mean(self, table: Levels, poses: Array, points: ComplexPoints) -> Array:
         """Return for each of `poses` (n, 3) the mean (n,), 0 … 1, of the table values at the `points` of a view."""
         blocks = [
             table.take(self._field.endpoint_cells(poses[begin : begin + 512], points)).mean(axis=1)

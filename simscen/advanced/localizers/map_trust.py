@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.beams import Beams, Cells, Plane
+from simscen.stack.localizers.beams import Beams, ComplexPoints, TableIndices
 from simscen.stack.localizers.distance_field import BLOCK_POSES, DistanceField
 from simscen.stack.localizers.particles import Particles
 
@@ -113,7 +113,7 @@ class MapTrust:
             used = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
         return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used)
 
-    def fitting_share(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
+    def fitting_share(self, poses: Array, ends: ComplexPoints, min_mapped: float) -> float | None:
         """Return the share of fitting beams at `poses` (n, 3), among the beams that end on the mapped area.
 
         `ends` are the endpoints in the base frame. None if less than the share `min_mapped` ends on the mapped area.
@@ -121,7 +121,7 @@ class MapTrust:
         known_share, fitting = _shares(self._classes(self._field.endpoint_cells(poses, ends)))
         return fitting if known_share and known_share >= min_mapped else None
 
-    def _endpoint_cells(self, poses: Array, beams: Beams) -> Cells:
+    def _endpoint_cells(self, poses: Array, beams: Beams) -> TableIndices:
         """Return the cells of the endpoints for about SAMPLED_PARTICLES of the `poses` (n, 3)."""
         # For few poses, the cells of all poses are cached.
         step = -(-len(poses) // SAMPLED_PARTICLES)
@@ -129,7 +129,7 @@ class MapTrust:
             return beams.cells(self._field, poses)[::step]
         return self._field.endpoint_cells(poses[::step], beams.ends)
 
-    def _classes(self, cells: Cells) -> npt.NDArray[np.uint8]:
+    def _classes(self, cells: TableIndices) -> npt.NDArray[np.uint8]:
         """Return the class of each cell: _UNMAPPED, _FITS, or _MISSES."""
         classes: npt.NDArray[np.uint8] = self._class_table.take(cells, mode="wrap")
         return classes

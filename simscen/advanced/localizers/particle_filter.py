@@ -146,7 +146,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         if self._trust is not None and len(beams.ends):
             self._map_weight, self.fitting_share, used_hits = self._trust.weight(self.particles, beams)
             if used_hits is not None and self._map_weight > 0:
-                beams = beams.keeping_hits(used_hits)
+                beams = beams.with_hits(used_hits)
         return self._map_weight * self._scan_weight, beams
 
     def _resample(self) -> None:

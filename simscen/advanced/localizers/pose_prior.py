@@ -10,7 +10,12 @@ import numpy as np
 
 from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.dead_reckoning import Noise, propagate_covariance, rotate_covariance, rotation_matrix
+from simscen.stack.localizers.dead_reckoning import (
+    CovarianceTriangle,
+    propagate_covariance,
+    rotate_covariance,
+    rotation_matrix,
+)
 from simscen.stack.localizers.particles import pose_errors
 
 CERTAIN_STD = (0.1, 0.1, 0.05)
@@ -23,7 +28,7 @@ of the motion by odometry. If both limits are exceeded, the scans show people wh
 KNOWN_STEP_STD_M = 0.012
 """Maximum standard deviation of a motion by scan matching that the scans determine. If it is larger, as in a corridor
 that looks the same everywhere, odometry has determined the motion, and the excess counts as a systematic error."""
-NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE: CovarianceTriangle = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Process noise of zero for `propagate_covariance`."""
 
 

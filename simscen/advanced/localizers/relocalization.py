@@ -16,7 +16,7 @@ from simscen.advanced.localizers.scan_memory import ScanMemory, distance_driven
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.localizers.particles import pose_errors
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
@@ -109,7 +109,7 @@ class Relocalizer:
             return None
         return self._search_map(self._memory.view_from(base), base, current)
 
-    def add_scan(self, scan: Scan, base: Pose2, limits: tuple[float, float], motion: ObservedMotion) -> Plane:
+    def add_scan(self, scan: Scan, base: Pose2, limits: tuple[float, float], motion: ObservedMotion) -> ComplexPoints:
         """Add a scan without checking the pose. Return the endpoints in the base frame. Arguments as in `update`."""
         self._propagate(base, motion)
         return self._memory.add(scan, base, *limits)

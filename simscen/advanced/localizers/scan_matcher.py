@@ -14,7 +14,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
+from simscen.stack.localizers.beams import ComplexPoints, directions, evenly_spaced
 from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 BASELINE_M = 0.15
@@ -25,15 +25,15 @@ MAX_LINE_M = 0.5
 """Maximum length of the line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
 MAX_RANGE_M = 20.0
 """Range beyond which points are ignored."""
-_NO_POINTS: Plane = np.empty(0, dtype=np.complex128)
+_NO_POINTS: ComplexPoints = np.empty(0, dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
     """Points (n,) on surfaces and their unit normals (n,), as x + iy."""
 
-    points: Plane
-    normals: Plane
+    points: ComplexPoints
+    normals: ComplexPoints
 
     def to_parent_frame(self, pose: Pose2) -> "Surface":
         """Return the surface, transformed from the frame at `pose` to the parent frame."""
@@ -55,7 +55,7 @@ def extract_surface(scan: Scan) -> Surface:
     if len(hit) < 3:
         return Surface(_NO_POINTS, _NO_POINTS)
     ranges, gap = ranges.take(hit), abs(scan.angle_increment)
-    points: Plane = ranges * directions(scan).take(hit)
+    points: ComplexPoints = ranges * directions(scan).take(hit)
     apart = np.ceil((BASELINE_M / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
     row = np.arange(len(hit))
     before = points.take(row - apart, mode="clip")

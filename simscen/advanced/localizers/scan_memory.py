@@ -13,7 +13,7 @@ import numpy as np
 from simscen.advanced.localizers.global_search import MAX_RANGE_M, PASSED_SHARES, View
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.localizers.beams import Plane, directions, evenly_spaced
+from simscen.stack.localizers.beams import ComplexPoints, directions, evenly_spaced
 
 MEMORY_LENGTH_M = 6.0
 """Distance driven after which scans are forgotten, because the frame drifts."""
@@ -36,7 +36,7 @@ class _StoredScan:
 
     base: Pose2
     driven: float
-    points: Plane
+    points: ComplexPoints
 
 
 class ScanMemory:
@@ -50,7 +50,7 @@ class ScanMemory:
         """Distance driven in m between the oldest and the newest stored scan."""
         return self._scans[-1].driven - self._scans[0].driven if self._scans else 0.0
 
-    def add(self, scan: Scan, base: Pose2, min_range: float, max_range: float) -> Plane:
+    def add(self, scan: Scan, base: Pose2, min_range: float, max_range: float) -> ComplexPoints:
         """Add a scan unless the last one is closer than MIN_SPACING_M. Return the endpoints (n,) in the base frame.
 
         Only ranges between the limits in m are used.
@@ -93,11 +93,11 @@ def distance_driven(before: Pose2, after: Pose2) -> float:
     return before.distance(after) + METERS_PER_RAD * abs(wrap(after.yaw - before.yaw))
 
 
-def endpoints_of(scan: Scan, min_range: float, max_range: float) -> Plane:
+def endpoints_of(scan: Scan, min_range: float, max_range: float) -> ComplexPoints:
     """Return the endpoints (n,) in the base frame of at most BEAMS_PER_SCAN beams with ranges between the limits."""
     min_range, max_range = max(scan.range_min, min_range), min(scan.range_max, max_range, MAX_RANGE_M)
     hit = ((scan.ranges > min_range) & (scan.ranges < max_range)).nonzero()[0]
     if len(hit) > BEAMS_PER_SCAN:
         hit = hit.take(evenly_spaced(len(hit), BEAMS_PER_SCAN))
-    ends: Plane = scan.ranges.take(hit) * directions(scan).take(hit) + complex(scan.mount.x, scan.mount.y)
+    ends: ComplexPoints = scan.ranges.take(hit) * directions(scan).take(hit) + complex(scan.mount.x, scan.mount.y)
     return ends

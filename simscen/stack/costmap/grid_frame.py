@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.beams import ComplexPoints
 
 Cells = npt.NDArray[np.int64]
 """Cells (n, 2) as (row, column)."""
@@ -50,7 +50,7 @@ class GridFrame:
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
-    def indices_of(self, points: Plane, center: complex, reach: float) -> CellIndices:
+    def indices_of(self, points: ComplexPoints, center: complex, reach: float) -> CellIndices:
         """Return the flat indices of the cells at points x + iy (n,). Points outside the grid are left out.
 
         All points must be within `reach` m of `center`. If this circle lies on the grid, points need not be checked.
@@ -78,12 +78,12 @@ class GridFrame:
         """Factors of (column, row) in the flat index of a cell."""
         return np.array((1, self.shape[1]))
 
-    def points(self, indices: CellIndices) -> Plane:
+    def points(self, indices: CellIndices) -> ComplexPoints:
         """Return the centers x + iy (n,) of the cells with these flat indices (n,)."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
             return _cell_centers(indices, columns, self.resolution, corner)
-        points: Plane = _all_cell_centers(self.shape, self.resolution).take(indices)
+        points: ComplexPoints = _all_cell_centers(self.shape, self.resolution).take(indices)
         points += corner
         return points
 
@@ -115,15 +115,15 @@ class GridFrame:
         )
 
 
-def _cell_centers(indices: CellIndices, columns: int, size: float, corner: complex = 0j) -> Plane:
+def _cell_centers(indices: CellIndices, columns: int, size: float, corner: complex = 0j) -> ComplexPoints:
     """Return the centers x + iy (n,) of cells of `size` m in a grid with this number of columns and corner."""
     up, across = np.divmod(indices, columns)
-    centers: Plane = up * (1j * size) + (across * size + (corner + (0.5 + 0.5j) * size))
+    centers: ComplexPoints = up * (1j * size) + (across * size + (corner + (0.5 + 0.5j) * size))
     return centers
 
 
 @lru_cache(maxsize=8)
-def _all_cell_centers(shape: tuple[int, int], size: float) -> Plane:
+def _all_cell_centers(shape: tuple[int, int], size: float) -> ComplexPoints:
     """Return the centers of all cells of a grid, relative to its corner."""
     return _cell_centers(np.arange(shape[0] * shape[1]), shape[1], size)
 

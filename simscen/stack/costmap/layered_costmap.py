@@ -43,7 +43,7 @@ from simscen.stack.costmap.obstacle_layer import (
     crossed_cells,
     remove_small_groups,
 )
-from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
@@ -125,7 +125,7 @@ class LayeredCostmap:
         """Revision of the costmap; increases with each update that changes a cell."""
         return self._revision
 
-    def changed_near(self, revision: int, points: Plane, distance: float) -> bool:
+    def changed_near(self, revision: int, points: ComplexPoints, distance: float) -> bool:
         """Return whether obstacles within `distance` m of `points` x + iy (n,) may have changed since a revision."""
         count = self._revision - revision
         if count > len(self._changes):

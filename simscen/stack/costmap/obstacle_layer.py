@@ -18,7 +18,7 @@ from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, is_seen_through, project_depth_image
 from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, ValueType, shift_layer
 from simscen.stack.costmap.layers import Mask, Squared
-from simscen.stack.localizers.beams import Plane, directions
+from simscen.stack.localizers.beams import ComplexPoints, directions
 
 RANGE_TOLERANCE_M = 1e-9
 """Rounding error allowed for ranges."""
@@ -31,26 +31,26 @@ class ScanWithMovingHits(Scan):
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
-def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
+def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[ComplexPoints, complex]:
     """Return the hits x + iy (n,) of beams between `nearest` and `farthest` m, and the position of the lidar.
 
     `base` is the pose of the robot. Hits on moving obstacles are left out.
     """
     lidar = _lidar_position(scan, base)
-    points: Plane = _hit_offsets(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
+    points: ComplexPoints = _hit_offsets(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
     points += lidar
     return points, lidar
 
 
 @lru_cache(maxsize=2)
-def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> Plane:
+def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> ComplexPoints:
     """Return the hits x + iy (n,) relative to the position of the lidar, along the axes of the base. Cached."""
     ranges = scan.ranges
     is_valid = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanWithMovingHits):
         is_valid &= ~scan.moving
     beams = is_valid.nonzero()[0]
-    ends: Plane = ranges.take(beams) * directions(scan).take(beams)
+    ends: ComplexPoints = ranges.take(beams) * directions(scan).take(beams)
     return ends
 
 
@@ -80,7 +80,7 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 
 
 def crossed_cells(
-    points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
+    points: ComplexPoints, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[CellIndices, float]:
     """Return which cells beams cross before their hits, and the distance in m from the lidar to the nearest center.
 

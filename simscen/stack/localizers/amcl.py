@@ -119,7 +119,7 @@ class AmclLocalizer:
         return self._correction.map_from_odom.compose(self._odometry.now)
 
     def _process(self, scan: Scan) -> None:
-        """Update the filter if an update by this lidar is due. After enough motion, one update per lidar is due."""
+        """Update the filter if an update by this lidar is due. After enough motion, each lidar has one update due."""
         odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return
@@ -130,13 +130,14 @@ class AmclLocalizer:
             self._correct(scan, odometry, delta)
 
     def _moved_enough(self, delta: Pose2) -> bool:
+        """Return whether the motion since the last update is more than `update_min_d` or `update_min_a`."""
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by `delta`, and weight them by the scan.
+        """Update the filter: move the particles by `delta`, and weight them by the scan.
 
         `odometry` is the pose in the odom frame at the time of the scan. `delta` is the motion since the last update in
-        the base frame; None at first.
+        the base frame; None at the first update.
         """
         if delta is not None:
             self._filter.move(delta)
@@ -150,6 +151,7 @@ class AmclLocalizer:
             self._correction = Correction(pose, covariance_about(self._filter.particles, pose), odometry, last.tick)
 
     def _mark_updated(self, scan: Scan, odometry: Pose2) -> None:
+        """Record that the lidar of a scan has updated the filter at this odometry pose."""
         self._update_due[scan.sensor], self._last_update, self._belief = False, odometry, None
 
     def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:

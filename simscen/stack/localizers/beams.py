@@ -11,30 +11,30 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Scan
 
-Plane = npt.NDArray[np.complex128]
+ComplexPoints = npt.NDArray[np.complex128]
 """Points or directions as complex numbers x + iy."""
-Cells = npt.NDArray[np.int32]
-"""Flat indices of map cells in a lookup table."""
+TableIndices = npt.NDArray[np.int32]
+"""Flat indices into a lookup table over the cells of a map."""
 
 
 class Field(Protocol):
     """Lookup table over the cells of a map, for example of distances to obstacles."""
 
-    def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
+    def endpoint_cells(self, poses: Array, points: ComplexPoints) -> TableIndices:
         """Return indices (n, b) into the table of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """The b valid beams of a scan, m of which hit something.
+    """The b valid beams of a scan; m of them hit something.
 
-    `ranges` (b,) are in m; `range_max` means no hit. `unit_vectors` (b,) along the beams, and the position `origin` of
-    the lidar, are in the base frame.
+    `ranges` (b,) are in m; `range_max` means no hit. The `unit_vectors` (b,) along the beams and the position `origin`
+    of the lidar are in the base frame.
     """
 
     ranges: Array
-    unit_vectors: Plane
+    unit_vectors: ComplexPoints
     origin: complex
     range_max: float
 
@@ -44,26 +44,26 @@ class Beams:
         return np.angle(self.unit_vectors)
 
     @cached_property
-    def ends(self) -> Plane:
+    def ends(self) -> ComplexPoints:
         """Endpoints (m,) in the base frame of the beams that hit something."""
         hit = (self.ranges < self.range_max).nonzero()[0]
         return self.ranges.take(hit) * self.unit_vectors.take(hit) + self.origin
 
-    def cells(self, field: Field, poses: Array) -> Cells:
-        """Return the cells (n, m) of the endpoints `ends` for each of the `poses` (n, 3). The last result is cached."""
-        last: tuple[Field, Array, Cells] | None = self.__dict__.get("_cells")
+    def cells(self, field: Field, poses: Array) -> TableIndices:
+        """Return indices (n, m) into the table of the endpoints for each of the `poses` (n, 3). Caches the result."""
+        last: tuple[Field, Array, TableIndices] | None = self.__dict__.get("_cells")
         if last is None or last[0] is not field or last[1] is not poses:
             last = self.__dict__["_cells"] = field, poses, field.endpoint_cells(poses, self.ends)
         return last[2]
 
-    def keeping_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
-        """Return these beams without the hits for which `chosen` (m,) is False. Beams that hit nothing remain."""
+    def with_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
+        """Return the beams whose hit is `chosen` (m,), and all beams that hit nothing."""
         is_kept = self.ranges >= self.range_max
         is_kept[(~is_kept).nonzero()[0][chosen]] = True
         return Beams(self.ranges[is_kept], self.unit_vectors[is_kept], self.origin, self.range_max)
 
 
-def directions(scan: Scan) -> Plane:
+def directions(scan: Scan) -> ComplexPoints:
     """Return read-only unit vectors (n,) along the beams of a scan, in the base frame."""
     return _directions(scan.angle_min, scan.angle_increment, len(scan.ranges), scan.mount.yaw)
 
@@ -77,10 +77,10 @@ def evenly_spaced(count: int, chosen_count: int) -> npt.NDArray[np.int64]:
 
 
 @lru_cache(maxsize=8)
-def _directions(first: float, increment: float, count: int, turn: float) -> Plane:
+def _directions(first: float, increment: float, count: int, turn: float) -> ComplexPoints:
     """Return the unit vectors along `count` beams. `turn` is the yaw of the lidar in the base frame. Cached."""
     angles = first + increment * np.arange(count, dtype=np.float64)
-    unit_vectors: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
+    unit_vectors: ComplexPoints = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
     unit_vectors.flags.writeable = False
     return unit_vectors
 

@@ -1,4 +1,4 @@
-"""Factories of the reference localizers. The `component` of each specification names its factory."""
+"""Functions that build the reference localizers. The `component` of a specification names its function."""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ from simscen.stack.setting import Setting
 
 
 def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
-    """Build AMCL; dead reckoning without a map."""
+    """Build AMCL; without a map, build dead reckoning instead."""
     if setting.map is None:
         return DeadReckoning(setting.estimate)
     motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
@@ -81,7 +81,7 @@ def motion_model(spec: model.AmclParameters, holonomic: bool) -> MotionModel:
 
 
 def sensor_model(spec: model.AmclParameters, grid: OccupancyGrid, field: DistanceField) -> SensorModel:
-    """Return the sensor model `laser_model_type`. `field` is the obstacle field of `grid`."""
+    """Return the sensor model `laser_model_type`. `field` is the result of `obstacle_field` for `grid`."""
     if spec.laser_model_type == "beam":
         opaque = opaque_field(grid, spec.max_used_range)
         return BeamModel(

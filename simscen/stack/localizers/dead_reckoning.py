@@ -13,14 +13,14 @@ from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.frames import is_plausible
 
-Noise = tuple[float, float, float, float, float, float]
+CovarianceTriangle = tuple[float, float, float, float, float, float]
 """Upper triangle of a covariance of x, y, and heading a, row by row: xx, xy, xa, yy, ya, aa."""
 
 
-def propagate_covariance(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
+def propagate_covariance(covariance: Array, dx: float, dy: float, noise: CovarianceTriangle) -> Array:
     """Return the covariance (3, 3) of a pose after a motion by (dx, dy) in m in the map frame.
 
-    `noise` is the covariance of the errors of this motion.
+    `noise` is the covariance of the errors that this motion adds.
     """
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     xx_new, xy_new, xa_new, yy_new, ya_new, aa_new = noise
@@ -38,7 +38,7 @@ def rotation_matrix(yaw: float) -> Array:
     return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
 
-def rotate_covariance(covariance: Array, yaw: float) -> Noise:
+def rotate_covariance(covariance: Array, yaw: float) -> CovarianceTriangle:
     """Rotate a covariance (3, 3) from a frame with heading `yaw` to its parent frame. Return the upper triangle."""
     c, s = math.cos(yaw), math.sin(yaw)
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
@@ -67,11 +67,11 @@ def grow_covariance(
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
 """Standard deviations of x, y, and yaw of an unknown pose: 100 m, 100 m, and that of a uniform distribution."""
 _NOISE = Ekf(type="ekf")
-"""Specification whose default noise parameters are used."""
+"""Specification of the EKF, from which the default noise parameters are taken."""
 
 
 def initial_pose(estimate: Estimate) -> tuple[Pose2, Array]:
-    """Return the initial pose and its covariance (3, 3). For an unknown pose, this is the origin of the map."""
+    """Return the initial pose and its covariance (3, 3): for an unknown pose, the origin with large variances."""
     if estimate.pose is None:
         return Pose2(0.0, 0.0, 0.0), np.diag(np.square(_UNKNOWN_STD))
     return estimate.pose, np.diag(np.square(estimate.std))

@@ -1,4 +1,4 @@
-"""Table of the distance from each map cell to the nearest obstacle, for likelihood fields and ray marching."""
+"""Table of the distances from map cells to the nearest obstacle, for likelihood fields and ray casting."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from simscen.stack.costmap.distance_transform import (
     squared_distance_blocks,
     squared_distances_within,
 )
-from simscen.stack.localizers.beams import Cells, Plane
+from simscen.stack.localizers.beams import ComplexPoints, TableIndices
 
 Float32 = npt.NDArray[np.float32]
 Kind = TypeVar("Kind", np.float32, np.uint8)
@@ -76,15 +76,15 @@ class DistanceField:
         positions = self._axes @ poses.T[:2] + self._corner
         return positions.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
-    def cells(self, x: Float32, y: Float32) -> Cells:
-        """Return indices into `table` of points with coordinates in cells, also outside the map. Overwrites x and y."""
+    def cells(self, x: Float32, y: Float32) -> TableIndices:
+        """Return indices into `table` of points, given in cells and possibly outside the map. Overwrites x and y."""
         column = x.clip(0, self._width + 1, out=x).astype(np.int32)
         row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2
         row += column
         return row
 
-    def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
+    def endpoint_cells(self, poses: Array, points: ComplexPoints) -> TableIndices:
         """Return indices (n, b) into `table` of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
         positions, heading = self.coordinates(poses)
         count = len(heading)

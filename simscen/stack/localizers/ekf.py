@@ -22,7 +22,7 @@ VELOCITY_VARIANCE = 1e6
 MIN_YAW_RATE_STD_RAD_S = 0.002
 """Standard deviation of the yaw rate that wheels at rest measure."""
 MAX_YAW_RATE_RAD_S = 100.0
-"""Absolute yaw rate from which on gyroscope readings are ignored as invalid."""
+"""Absolute yaw rate above which gyroscope readings are ignored as invalid."""
 
 _WHEELS_MATRIX = np.zeros((3, 7))
 """Measurement matrix of wheel odometry."""
@@ -33,7 +33,7 @@ _GYROSCOPE_MATRIX[0, [VYAW, BIAS]] = 1.0
 
 
 class EkfLocalizer:
-    """Localizer with a planar EKF of odometry and gyroscope. It does not use the map, so that its error grows.
+    """Localizer with a planar EKF of odometry and gyroscope. It does not use the map, so its error grows with time.
 
     Each odometry reading measures the mean velocity since the previous reading, with noise that grows with the distance
     driven. The gyroscope measures the yaw rate plus a bias, which the filter estimates.
@@ -136,6 +136,7 @@ class EkfLocalizer:
         self._predict(state, jacobian, np.zeros((7, 7)))
 
     def _predict(self, state: Array, jacobian: Array, noise: Array) -> None:
+        """Set the predicted `state`, and propagate the covariance with the process `noise` (7, 7)."""
         self._filter.F, self._filter.Q = jacobian, noise
         self._filter.predict(state)
 
@@ -144,4 +145,5 @@ class EkfLocalizer:
         self._filter.x = state
 
     def _update(self, measurement: Array, matrix: Array, noise: Array) -> None:
+        """Correct the state with a measurement, its measurement matrix, and the covariance of its noise."""
         self._filter.update(measurement, lambda _: matrix, lambda state: matrix @ state, R=noise)

@@ -1,4 +1,4 @@
-"""Motion models of nav2_amcl, which move particles by odometry, with noise.
+"""Motion models of nav2_amcl, which move particles by odometry and random noise.
 
 Source: the odometry motion model of Probabilistic Robotics, section 5.4 and table 5.6, with the variances of nav2_amcl.
 """
@@ -18,20 +18,20 @@ MIN_BEARING_DISTANCE_M = 0.01
 
 
 class MotionModel(Protocol):
-    """Moves particles by `delta`: the motion by odometry, in the base frame before the motion."""
+    """Moves particles by odometry. `delta` is the measured motion, in the base frame before the motion."""
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
         """Return `poses` (n, 3), each moved by `delta` with different random noise."""
         ...
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return a covariance (3, 3) after `delta`, to first order. `yaw` is the heading before the motion."""
+        """Return the covariance (3, 3) of a pose after `delta`, linearized. `yaw` is the heading before the motion."""
         ...
 
 
 @dataclass(frozen=True)
 class DifferentialMotionModel:
-    """Rotates, translates, and rotates again; for robots that cannot move sideways. `alpha`: Nav2's alpha1 … alpha4."""
+    """Model of robots that cannot move sideways: rotation, translation, rotation. `alpha`: Nav2's alpha1 … alpha4."""
 
     alpha: tuple[float, float, float, float]
 
@@ -73,7 +73,7 @@ class DifferentialMotionModel:
 
 @dataclass(frozen=True)
 class OmniMotionModel:
-    """Drives, strafes, and turns at once; for holonomic robots. `alpha`: Nav2's alpha1 … alpha5."""
+    """Model of holonomic robots, which drive, strafe, and turn at once. `alpha`: Nav2's alpha1 … alpha5."""
 
     alpha: tuple[float, float, float, float, float]
 

@@ -23,16 +23,20 @@ VX, VY, VYAW, BIAS = range(4)
 MIN_VARIANCE = 1e-9
 """Minimum variance of a measurement in (m/s)² or (rad/s)²; the same as in robot_localization."""
 MAX_GYRO_GAP_S = 0.1
-"""Longest gap between gyroscope readings over which the yaw rate is integrated."""
+"""Maximum time between two gyroscope readings over which the yaw rate is integrated."""
 
 _WHEELS = np.eye(3, 4)
+"""Measurement matrix of the wheels."""
 _WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))
-_FORWARD_AND_GYRO = _WHEELS_AND_GYRO[[VX, VY, 3]]
+"""Measurement matrix of wheels and gyroscope."""
+_TRANSLATION_AND_GYRO = _WHEELS_AND_GYRO[[VX, VY, 3]]
+"""Measurement matrix of wheels and gyroscope without the yaw rate of the wheels."""
 _IDENTITIES = {size: np.eye(size) for size in (3, 4)}
+"""Identity matrices by size."""
 
 
 class OdometryFilter:
-    """Fuses wheel odometry and the yaw rate of a gyroscope.
+    """Fuses wheel odometry and the yaw rate of a gyroscope; `fuse` returns the filtered odometry.
 
     Each update estimates the mean velocity since the previous update. The wheels measure this velocity. The gyroscope
     measures the yaw rate plus a bias. The pose is the integral of the velocity, so that it does not jump (REP 105).
@@ -95,7 +99,8 @@ class OdometryFilter:
     def _add_variances(self, odometry: Odometry, gap: float) -> None:
         """Add the variances of a reading to those of the motion since the last update.
 
-        `gap` is the time in s since the previous reading. After lost messages, it contains the errors of these, too.
+        `gap` is the time in s since the previous reading. Readings lost in this time are assumed to have the same
+        variance, which is added, too.
         """
         self._period = min(self._period, gap)
         (x, y, yaw), (vx, vy, wz), factor = self._step_variances, odometry.twist_variance, self._period * gap
@@ -104,7 +109,7 @@ class OdometryFilter:
     def _measure(self, wheels: Twist, turned: tuple[float, float] | None, seconds: float) -> None:
         """Predict and update the mean velocity during the last `seconds`.
 
-        `turned` is the angle of rotation by the gyroscope, with its variance; None without a measurement.
+        `turned` is the angle that the gyroscope has measured, with its variance; None without a measurement.
         """
         self._filter.Q = self._process_noise * seconds
         self._filter.predict()
@@ -114,8 +119,8 @@ class OdometryFilter:
             measurement, matrix = list(wheels), _WHEELS
         else:
             rate, variance = turned[0] / seconds, max(turned[1] / squared, MIN_VARIANCE)
-            if self._slips(wheels.wz - rate, variances[VYAW] + variance):
-                measurement, matrix = [wheels.vx, wheels.vy, rate], _FORWARD_AND_GYRO
+            if self._wheels_slip(wheels.wz - rate, variances[VYAW] + variance):
+                measurement, matrix = [wheels.vx, wheels.vy, rate], _TRANSLATION_AND_GYRO
                 variances[VYAW] = variance
             else:
                 measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
@@ -125,8 +130,11 @@ class OdometryFilter:
         cross = self._cross_covariance
         cross -= cross.dot(self._filter.K.dot(matrix).T)
 
-    def _slips(self, difference: float, variance: float) -> bool:
-        """Return whether the `difference` of the yaw rates of wheels and gyroscope is too large for its `variance`."""
+    def _wheels_slip(self, difference: float, variance: float) -> bool:
+        """Return whether the wheels slip: their yaw rate differs from the gyroscope's by more than `variance` allows.
+
+        `difference` is the difference in rad/s, with its `variance` from measurement noise.
+        """
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
         return bool(difference**2 > limit)
@@ -186,7 +194,7 @@ class GyroscopeIntegral:
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
-        """Return the angle of rotation since the last call in rad, and its variance; None if readings are missing."""
+        """Return the angle in rad from the tick of the last call to `tick`, and its variance; None if readings lack."""
         last, self._read = self._read, None
         if self._tick is None or abs(tick - self._tick) > self._max_gap:
             return None

@@ -25,14 +25,14 @@ from simscen.stack.localizers.particles import (
 from simscen.stack.localizers.resampling import PROBE_COUNT, AugmentedMcl, KldBound, kld_sampling, systematic_resampling
 from simscen.stack.localizers.sensor_models import SensorModel
 
-CONVERGED_WITHIN_M = 0.5
-"""The filter has converged if all particles are within this distance of their mean (nav2_amcl's pf.dist_threshold)."""
+CONVERGENCE_DISTANCE_M = 0.5
+"""The filter has converged if no particle is farther than this from their mean (nav2_amcl's pf.dist_threshold)."""
 _DESCENDANT, _RANDOM = 1.0, 2.0
 """Marks in the fourth column of drawn particles: descendant of a random particle, and new random particle."""
 
 
 class ParticleFilter:
-    """Particles in the map frame that odometry moves and scans weight.
+    """Particle filter in the map frame. Odometry moves the particles, and scans weight them.
 
     Subclasses may override `reset`, `_trusted_beams`, and `_resample`.
     """
@@ -77,7 +77,7 @@ class ParticleFilter:
         exponent, beams = self._trusted_beams(self.beams(scan))
         if exponent == 0:
             return None
-        converged = spec.do_beamskip and self.particles.are_within(CONVERGED_WITHIN_M)
+        converged = spec.do_beamskip and self.particles.are_within(CONVERGENCE_DISTANCE_M)
         logarithm = exponent * self._sensor.log_likelihood(poses, beams, converged)
         best, worst = logarithm.item(logarithm.argmax()), logarithm.item(logarithm.argmin())
         if best == worst and best > -np.inf:
@@ -94,11 +94,11 @@ class ParticleFilter:
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use: by default 1 and all beams."""
+        """Return an exponent (0 … 1) that weakens the likelihood of a scan, and the beams to use: here 1 and all."""
         return 1.0, beams
 
     def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
-        """Pass the likelihood of a scan to Augmented MCL, at the particles that are not new random particles.
+        """Pass the mean likelihood of a scan over the particles, except new random ones, to Augmented MCL.
 
         `weights` (n,) are not normalized. `shift` was subtracted from their logarithms.
         """
@@ -111,7 +111,10 @@ class ParticleFilter:
         self._augmented_mcl.observe(log_likelihood * scale, anywhere * scale)
 
     def _resample(self) -> None:
-        """Resample at every `resample_interval`-th scan; with `selective_resampling`, only if few particles count."""
+        """Resample at every `resample_interval`-th scan.
+
+        With `selective_resampling`, resample only if at most half of the particles are effective.
+        """
         self._corrections += 1
         self._random = None
         if self._corrections % self._spec.resample_interval:

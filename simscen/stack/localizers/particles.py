@@ -128,7 +128,7 @@ _NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a i
 
 
 def cluster_labels(keys: Keys) -> Keys:
-    """Return a cluster label (n,) for each particle, given its histogram bin in `keys` (n,).
+    """Return a cluster label (n,) for each particle, given the keys (n,) of their histogram bins.
 
     Adjacent bins form a cluster. Bins are also adjacent at corners, and across ±180° of the heading.
     """
@@ -148,9 +148,9 @@ def cluster_labels(keys: Keys) -> Keys:
 def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Array]:
     """Return the mean pose of the heaviest cluster, and the covariance (3, 3) of all particles about this pose.
 
-    With `peak_power` 1, it is the plain mean, as in nav2_amcl. Otherwise, the plain mean is combined with a mean whose
-    weights are raised to `peak_power`. This mean lags less behind a moving robot. The two means are weighted by the
-    inverse of their variances (see docs/reference/localizers.md).
+    With `peak_power` 1, the mean is the plain one, as in nav2_amcl. Otherwise, it combines the plain mean with a second
+    mean, for which weights are raised to `peak_power` and which lags less behind a moving robot. The two are weighted
+    by the inverse of their variances (see docs/reference/localizers.md).
     """
     poses, weights = particles.poses, particles.weights
     if not are_compact(particles):

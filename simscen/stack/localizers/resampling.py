@@ -84,7 +84,7 @@ class KldBound:
         return np.clip(np.ceil(needed), self.min_samples, self.max_samples).astype(np.int64)
 
     def sufficient_count(self, keys: Keys) -> int | None:
-        """Return how many of the first samples are sufficient, given their bins (n,); None if n are not sufficient."""
+        """Return the smallest sufficient number of samples, given the bin keys (n,); None if n are not sufficient."""
         if len(keys) == self.min_samples:  # no smaller number can be sufficient
             return self.min_samples if self.min_samples >= self.samples(len(np.unique(keys))) else None
         is_new = np.zeros(len(keys), dtype=np.int64)
@@ -108,9 +108,9 @@ def kld_sampling(draw: Callable[[int], Array], bound: KldBound) -> Array:
 PROBE_COUNT = 200
 """Number of random poses at which each scan is evaluated."""
 MIN_BETTER_FRACTION = 0.1
-"""Minimum fraction of random poses that fit recent scans better than the particles if the robot is lost."""
+"""The robot is lost only if at least this fraction of random poses fits recent scans better than the particles."""
 MAX_STRAY_SCANS = 4.0
-"""Random particles and their descendants ("strays") are limited to the number that can be added at this many scans."""
+"""Limit of random particles and their descendants ("strays"): the number that can be added at this many scans."""
 _MAX_LOG_RATIO = 50.0
 """Maximum logarithm of a likelihood ratio, so that its exponential stays finite."""
 
@@ -121,8 +121,8 @@ class AugmentedMcl:
     The ratio is the likelihood of a scan at the particles, divided by its likelihood at PROBE_COUNT random poses.
     (nav2_amcl averages the likelihood itself, which also decreases if obstacles are not on the map.)
 
-    Random particles are added while the fast average is below the slow one. Besides, at least MIN_BETTER_FRACTION of
-    the random poses must fit recent scans better than the particles.
+    Random particles are added while two conditions hold: the fast average is below the slow one, and at least
+    MIN_BETTER_FRACTION of the random poses fit recent scans better than the particles.
     """
 
     def __init__(self, alpha_slow: float, alpha_fast: float, max_fraction: float = 1.0) -> None:

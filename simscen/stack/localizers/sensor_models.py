@@ -30,7 +30,7 @@ class SensorModel(Protocol):
 
     @property
     def peak_power(self) -> float:
-        """Power of the weights with which the pose estimate emphasizes the best particles; 1 has no effect."""
+        """Power to which the pose estimate raises weights, to emphasize the best particles; 1 has no effect."""
         ...
 
     @property
@@ -59,7 +59,7 @@ def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return the solid cells (height, width) with a neighbor on the map that is not solid."""
+    """Return which of the `solid` cells (height, width) have a neighbor on the map that is not solid."""
     padded = np.pad(solid, 1, constant_values=True)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return solid & ~inside
@@ -99,8 +99,8 @@ class BeamSkipping:
     """Parameters of beam skipping, which ignores beams that hit people or other obstacles that are not on the map.
 
     A beam fits a particle if it ends less than `distance` m from an obstacle. A beam is skipped if it fits at most the
-    fraction `threshold` of the particles. No beam is skipped if this applies to the fraction `error_threshold` of the
-    beams.
+    fraction `threshold` of the particles. If at least the fraction `error_threshold` of the beams would be skipped, the
+    pose is assumed to be wrong, and no beam is skipped.
     """
 
     distance: float

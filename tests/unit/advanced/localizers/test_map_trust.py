@@ -7,7 +7,7 @@ from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.particle_filter import unmapped_cells
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.beams import Beams, Plane
+from simscen.stack.localizers.beams import Beams, ComplexPoints
 from simscen.stack.localizers.particles import Particles
 from simscen.stack.localizers.sensor_models import obstacle_field
 
@@ -25,7 +25,7 @@ def trust() -> MapTrust:
     return MapTrust(obstacle_field(grid, 2.0), unmapped_cells(grid).ravel(), 0.45, 0.8)
 
 
-def beams_to(ends: Plane) -> Beams:
+def beams_to(ends: ComplexPoints) -> Beams:
     """Return the beams of a lidar at the origin of the base."""
     return Beams(np.abs(ends), ends / np.abs(ends), 0j, 30.0)
 
@@ -64,7 +64,7 @@ def test_beams_that_leave_the_map_are_not_compared() -> None:
 
 def test_beams_without_a_hit_are_kept_if_others_are_excluded() -> None:
     beams = Beams(np.array([1.0, 9.0, 2.0, 3.0]), np.ones(4, dtype=np.complex128), 0j, 9.0)
-    kept = beams.keeping_hits(np.array([True, False, True]))
+    kept = beams.with_hits(np.array([True, False, True]))
     assert kept.ranges.tolist() == [1.0, 9.0, 3.0]
     assert kept.ends.tolist() == [1.0, 3.0]
 
