@@ -108,7 +108,7 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
 
     spec = robot.spec
     if spec is None:
-        from simscen.sim.urdf.body import infer_robot_spec
+        from simscen.sim.urdf.inference import infer_robot_spec
 
         spec = infer_robot_spec(robot.path, roots, read_mesh)
     files = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None

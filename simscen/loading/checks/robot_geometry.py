@@ -25,8 +25,8 @@ def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, root
     """
     if robot.urdf is None:
         return []
+    from simscen.sim.urdf.alignment import alignment_warnings
     from simscen.sim.urdf.body import read_spec_tree
-    from simscen.sim.urdf.wheels import alignment_warnings
     from simscen.sim.urdf.xml_source import RobotFiles
 
     tree = read_spec_tree(spec, robot.path, roots, read_mesh, RobotFiles(robot.urdf, robot.packages))

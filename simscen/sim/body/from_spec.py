@@ -22,17 +22,18 @@ def build_robot_body(
     file: Path | None = None,
     roots: Sequence[Path] = (),
     read_mesh: MeshReader | None = None,
-    located: RobotFiles | None = None,
+    robot_files: RobotFiles | None = None,
 ) -> RobotBody:
     """Build the body of a robot from its specification. Raises InvalidInput if the URDF or the body is unusable.
 
-    `file` is the `*.robot.yaml`. The URDF is at the path in `located`, or by default at `spec.urdf` relative to `file`.
-    All files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have meshes.
+    `file` is the `*.robot.yaml`. The URDF is at the path in `robot_files`, or by default at `spec.urdf` relative to
+    `file`. All files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have
+    meshes.
     """
     if spec.urdf is None:
         body = _body_from_shapes(spec, file)
     else:
-        body = body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, located))
+        body = body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, robot_files))
     check_robot_size(body, file)
     return body
 

@@ -103,11 +103,13 @@ class MeshSource:
 def parse_link(element: Element, meshes: MeshSource) -> Link:
     """Parse a `<link>`; raises InvalidElement."""
     collisions = tuple(
-        Solid(_shape(collision.required_child("geometry"), meshes), _origin(collision), element.text("name"))
+        Solid(
+            _parse_shape(collision.required_child("geometry"), meshes), _parse_origin(collision), element.text("name")
+        )
         for collision in element.all("collision")
     )
     inertial = element.child("inertial")
-    return Link(element.text("name"), collisions, None if inertial is None else _mass(inertial), element)
+    return Link(element.text("name"), collisions, None if inertial is None else _parse_mass(inertial), element)
 
 
 def parse_joint(element: Element) -> Joint:
@@ -122,14 +124,14 @@ def parse_joint(element: Element) -> Joint:
         element.text("type"),
         element.required_child("parent").text("link"),
         element.required_child("child").text("link"),
-        _origin(element),
+        _parse_origin(element),
         (axis[0] / length, axis[1] / length, axis[2] / length),
-        _limits(element),
+        _parse_limits(element),
         element,
     )
 
 
-def _limits(joint: Element) -> JointLimits:
+def _parse_limits(joint: Element) -> JointLimits:
     limit = joint.child("limit")
     if limit is None or joint.attributes.get("type") in ("fixed", "floating"):
         return JointLimits()
@@ -141,7 +143,7 @@ def _limits(joint: Element) -> JointLimits:
     return JointLimits(lower, upper, velocity)
 
 
-def _origin(element: Element) -> Pose3:
+def _parse_origin(element: Element) -> Pose3:
     origin = element.child("origin")
     if origin is None:
         return Pose3()
@@ -150,7 +152,7 @@ def _origin(element: Element) -> Pose3:
     return Pose3.from_rpy(x, y, z, roll, pitch, yaw)
 
 
-def _shape(geometry: Element, meshes: MeshSource) -> Shape:
+def _parse_shape(geometry: Element, meshes: MeshSource) -> Shape:
     for element in geometry.children:
         match element.tag:
             case "box":
@@ -171,7 +173,7 @@ def _shape(geometry: Element, meshes: MeshSource) -> Shape:
     raise InvalidElement(geometry, "<geometry> is empty")
 
 
-def _mass(inertial: Element) -> MassProperties:
+def _parse_mass(inertial: Element) -> MassProperties:
     mass = inertial.required_child("mass").numbers("value", 1)[0]
     if mass < 0:
         raise InvalidElement(inertial.required_child("mass"), "a mass must not be negative")
@@ -183,7 +185,7 @@ def _mass(inertial: Element) -> MassProperties:
             raise InvalidElement(tensor, "a moment of inertia must not be negative")
     xx, xy, xz, yy, yz, zz = values
     own = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    return own.transformed(_origin(inertial))
+    return own.transformed(_parse_origin(inertial))
 
 
 MAX_LINKS = 200
@@ -226,24 +228,24 @@ def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
     for element in robot.children:
         try:
             if element.tag == "link":
-                _add(links, parse_link(element, meshes), element)
+                _add_unique(links, parse_link(element, meshes), element)
             elif element.tag == "joint":
-                _add(joints, parse_joint(element), element)
+                _add_unique(joints, parse_joint(element), element)
         except InvalidElement as error:
             problems.append(error.problem)
     if problems:
         raise InvalidInput(problems)
-    return _join(robot, links, joints)
+    return _connect_links(robot, links, joints)
 
 
-def _add(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", element: Element) -> None:
+def _add_unique(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", element: Element) -> None:
     if item.name in known:
         raise InvalidElement(element, f"two <{element.tag}>s are called {item.name!r}")
     known[item.name] = item  # type: ignore[assignment]  # callers pass a dictionary of the same type
 
 
-def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> LinkTree:
-    """Return the tree that joints make of links. Raises InvalidInput unless there is exactly one root link."""
+def _connect_links(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> LinkTree:
+    """Return the tree of links that the joints connect. Raises InvalidInput unless there is exactly one root link."""
     problems = []
     parents: dict[str, Joint] = {}
     child_joints: dict[str, list[Joint]] = {}

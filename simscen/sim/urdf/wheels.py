@@ -1,12 +1,12 @@
-"""Finds the wheels and steering joints of a URDF, and warns about wheels and casters at wrong heights."""
+"""Finds the wheels and steering joints of a URDF."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simscen.core.errors import InvalidInput, Problem
+from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
@@ -27,6 +27,8 @@ MAX_WHEEL_GAP_RADII = 0.25
 """Largest gap below a wheel that counts as standing on the ground, in wheel radii."""
 MIN_DRIVEN_RADIUS_RATIO = 0.75
 """Smallest radius of a driven wheel, divided by the radius of the largest driven wheel."""
+MAX_LISTED_NAMES = 4
+"""Maximum number of names, and of reasons, in a message."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class WheelJoint:
     """A wheel with its `center` in the root frame. Lengths are in m.
 
     `joint` is the joint about which it rolls. `steering` is its steering joint (None: not steered), and `trail` the
-    distance along x between its center and the steering axis.
+    distance along x between its center and the steering axis. A wheel that swivels freely counts as steered, too.
     """
 
     joint: Joint
@@ -80,10 +82,12 @@ def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[
         elif wheel is not None:
             wheels.append(_with_steering(tree, wheel, steering_joints))
     ground = min((wheel.bottom for wheel in wheels), default=0.0)
-    largest = max((wheel.radius for wheel in wheels if not wheel.is_steered and _stands_on(ground, wheel)), default=0.0)
+    largest = max(
+        (wheel.radius for wheel in wheels if not wheel.is_steered and _stands_on_ground(wheel, ground)), default=0.0
+    )
     kept = []
     for wheel in sorted(wheels, key=lambda w: (w.center[0], -w.center[1], w.joint.name)):
-        if not _stands_on(ground, wheel):
+        if not _stands_on_ground(wheel, ground):
             others.setdefault(f"{wheel.bottom - ground:.3g} m above the ground", []).append(wheel.joint.name)
         elif not wheel.is_steered and wheel.radius < MIN_DRIVEN_RADIUS_RATIO * largest:
             reason = f"radius {wheel.radius:.3g} m, much less than that of the largest wheel"
@@ -93,7 +97,8 @@ def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[
     return kept, others
 
 
-def _stands_on(ground: float, wheel: WheelJoint) -> bool:
+def _stands_on_ground(wheel: WheelJoint, ground: float) -> bool:
+    """Return whether a wheel stands on the ground at the height `ground` m in the root frame."""
     return wheel.bottom - ground <= MAX_WHEEL_GAP_RADII * wheel.radius
 
 
@@ -156,18 +161,18 @@ def _steered_links(tree: LinkTree, steering_joints: Sequence[Joint]) -> set[str]
     return {link for joint in steering_joints for link in tree.subtree(joint.child)}
 
 
-def _measure_wheel(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
+def _measure_wheel(tree: LinkTree, joint: Joint, is_steered: bool) -> WheelJoint | None:
     """Return the wheel on a joint, with the size of its first round collision shape, or None if no shape is round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
         match solid.shape:
             case Cylinder(radius, length):
-                return WheelJoint(joint, place, radius, length, steered)
+                return WheelJoint(joint, place, radius, length, is_steered)
             case Sphere(radius):
-                return WheelJoint(joint, place, radius, radius / 2, steered)
+                return WheelJoint(joint, place, radius, radius / 2, is_steered)
             case Mesh() if (mesh := _round_mesh(joint, solid)) is not None:
                 center, radius, width = mesh
-                return WheelJoint(joint, tree.poses[joint.child].compose(center).position, radius, width, steered)
+                return WheelJoint(joint, tree.poses[joint.child].compose(center).position, radius, width, is_steered)
             case _:
                 continue
     return None
@@ -199,65 +204,36 @@ def _parallel_axis(tree: LinkTree, joint: Joint) -> str:
     return "".join(name for name, part in zip("xyz", parts, strict=True) if abs(part) >= MIN_AXIS_COSINE)
 
 
-ALIGNMENT_CODE = "SC405"
-"""Code of all warnings about the heights of wheels and casters."""
-HEIGHT_TOLERANCE_M = 0.0005
-"""Largest difference in m between the heights of parts that stand on the ground."""
-MAX_CASTER_GAP_M = 0.003
-"""Largest gap in m below a caster without a warning."""
-MAX_CASTER_HEIGHT_M = 0.02
-"""Largest height in m above the ground of a small link that is probably meant to be a caster."""
-MAX_CASTER_SIZE_M = 0.1
-"""Largest length and width in m of a link that is probably meant to be a caster."""
-
-
-def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
-    """Return warnings about wheels at different heights, and about casters that are too low or too high."""
-    wheels = select_wheels(tree, drive)
-    if not wheels:
-        return []
-    ground = min(wheel.bottom for wheel in wheels)
-    found = [*_wheel_warnings(wheels, ground), *_caster_warnings(tree, wheels, ground, drive.type == "differential")]
-    return [Problem(p.path, p.line, p.col, ALIGNMENT_CODE, p.message, p.hint, "warning", p.source) for p in found]
-
-
-def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
-    for wheel in wheels:
-        gap = wheel.bottom - ground
-        if gap > HEIGHT_TOLERANCE_M:
-            message = f"the wheel on joint {wheel.joint.name!r} is {1e3 * gap:.1f} mm higher than the lowest wheel"
-            yield wheel.joint.element.problem(message, "simscen places all wheels on the ground")
-
-
-def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
-    rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
-    gaps = {
-        name: _lowest_z(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
-    }
-    for name, gap in gaps.items():
-        if gap < -HEIGHT_TOLERANCE_M:
-            message = (
-                f"link {name!r} reaches {-1e3 * gap:.1f} mm below the wheels, which would lose contact with the ground"
-            )
-            hint = f"raise it by {-gap:.4g} m; simscen uses frictionless spheres as casters instead"
-            yield tree.links[name].element.problem(message, hint)
-    nearest = min(gaps, key=lambda name: gaps[name], default=None)
-    if needs_caster and nearest and MAX_CASTER_GAP_M < gaps[nearest] < MAX_CASTER_HEIGHT_M and _is_small(tree, nearest):
+def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
+    """Raise InvalidInput if the steered wheels are not in front of the other wheels."""
+    steered = [wheel for wheel in wheels if wheel.is_steered]
+    if not steered:
+        return
+    front, rear = (
+        float(np.mean([w.center[0] for w in group])) for group in (steered, [w for w in wheels if not w.is_steered])
+    )
+    if front <= rear:
         message = (
-            f"link {nearest!r} is {1e3 * gaps[nearest]:.1f} mm above the ground, so that the robot would tip onto it"
+            f"its steered wheels are {rear - front:.3g} m behind the driven ones: only front steering is simulated"
         )
-        hint = f"lower it by {gaps[nearest]:.4g} m; simscen uses spheres that touch the ground as casters instead"
-        yield tree.links[nearest].element.problem(message, hint)
+        hint = "x must point ahead: rotate the root's joint by 180 degrees if the URDF faces backwards"
+        raise InvalidInput([steered[0].joint.element.problem(message, hint)])
 
 
-def _collision_points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    pose = tree.poses[name]
-    return np.concatenate([pose.compose(s.pose).apply(hull_points(s.shape)) for s in tree.links[name].solids])
+def describe_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
+    """Return a message with the names of all wheels, and the reasons why the other movable joints are not wheels."""
+    if not wheels and not others:
+        return "it has no movable joints"
+    groups: dict[str, list[str]] = {"left": [], "right": []}
+    for wheel in wheels:
+        group = "steered" if wheel.is_steered else "left" if wheel.is_left else "right"
+        groups.setdefault(group, []).append(wheel.joint.name)
+    found = [f"{group}: {_shortened(names)}" for group, names in groups.items()]
+    reasons = [f"{_shortened(names)} ({reason})" for reason, names in others.items()][:MAX_LISTED_NAMES]
+    return "; ".join(found + ([f"no wheels: {', '.join(reasons)}"] if reasons else []))
 
 
-def _lowest_z(tree: LinkTree, name: str) -> float:
-    return float(_collision_points(tree, name)[:, 2].min())
-
-
-def _is_small(tree: LinkTree, name: str) -> bool:
-    return bool((np.ptp(_collision_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())
+def _shortened(names: Sequence[str]) -> str:
+    """Return a list of at most MAX_LISTED_NAMES names for a message."""
+    more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+    return ", ".join(names[:MAX_LISTED_NAMES]) + more if names else "none"

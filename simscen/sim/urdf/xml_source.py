@@ -42,7 +42,7 @@ class Element(markup.Element):
     def numbers(
         self, attribute: str, count: int, default: tuple[float, ...] | None = None, largest: float = 1e6
     ) -> tuple[float, ...]:
-        """Return the numbers of an attribute, or `default` if the attribute is missing; it is required without default.
+        """Return the numbers in an attribute; `default` if it is missing. Without `default`, the attribute is required.
 
         Raises InvalidElement unless there are `count` numbers, each from -`largest` to `largest`.
         """

@@ -8,7 +8,7 @@ from simulation_helpers import robot_spec
 from simscen.core.errors import InvalidInput
 from simscen.loading.builders import read_mesh
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.urdf.body import infer_robot_spec
+from simscen.sim.urdf.inference import infer_robot_spec
 from simscen.sim.urdf.writer import to_urdf
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"

@@ -1,0 +1,134 @@
+"""Infers the specification of a robot that has only a URDF: its drive, limits, and sensors."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from simscen.assets.folders import AllowedFolders
+from simscen.core.errors import InvalidInput
+from simscen.model.robot import (
+    Ackermann,
+    Differential,
+    Drive,
+    InertialUnit,
+    Lidar,
+    Limits,
+    Mount,
+    RobotSpec,
+    Sensor,
+    SkidSteer,
+    WheelOdometry,
+)
+from simscen.sim.body.outline import hull_points
+from simscen.sim.urdf.body import body_from_tree, read_tree
+from simscen.sim.urdf.elements import LinkTree, MeshReader
+from simscen.sim.urdf.wheels import WheelJoint, check_front_steering, describe_wheels, examine_joints
+
+AXLE_TOLERANCE_M = 0.02
+"""Largest distance in m along x between wheels on the same axle."""
+MAX_UPSIDE_DOWN_Z = -0.9
+"""A lidar is mounted upside down if the z component of its z axis is at most this value."""
+DEFAULT_MAX_STEERING_RAD = 0.5
+"""Largest steering angle of a car whose steering joints have no limits below 90 degrees."""
+MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
+"""Range to which the limit of a steering joint is clipped."""
+LIDAR_NAMES = ("laser", "lidar", "scan")
+"""A link carries a lidar if its name contains one of these words."""
+ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
+
+
+def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
+    """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
+
+    A robot with steered wheels has an Ackermann drive, one with a single axle a differential drive, and any other robot
+    a skid-steer drive. Limits are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or lower if the wheel joints are slower. The
+    lidar is at a link with a name like LIDAR_NAMES, or on top of the robot. All files must be in `roots` (default: the
+    folder of `path`). Raises InvalidInput if the file is invalid or its drive cannot be inferred.
+    """
+    folders = AllowedFolders.of(roots or (path.resolve().parent,))
+    tree = read_tree(path, folders, read_mesh)
+    wheels, others = examine_joints(tree)
+    drive = _infer_drive(tree, wheels, others)
+    draft = RobotSpec(
+        simscen=1,
+        name=tree.name.lstrip("/") or path.stem,
+        urdf=path.name,
+        drive=drive,
+        limits=_infer_limits(wheels, drive),
+        sensors={},
+    )
+    sensors = {
+        "lidar": Sensor(lidar=Lidar(mount=_infer_lidar_mount(tree, draft, wheels))),
+        "odom": Sensor(odometry=WheelOdometry()),
+        "imu": Sensor(imu=InertialUnit()),
+    }
+    return draft.model_copy(update={"sensors": sensors})
+
+
+def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
+    driven = [wheel for wheel in wheels if not wheel.is_steered]
+    left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
+    if not left or len(left) != len(right):
+        message = f"the drive of the robot cannot be inferred from its wheels: {describe_wheels(wheels, others)}"
+        raise InvalidInput([tree.element.problem(message, ROBOT_FILE_HINT)])
+    separation = float(np.mean([w.center[1] for w in left]) - np.mean([w.center[1] for w in right]))
+    axles = [w.center[0] for w in driven]
+    radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
+    size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
+    steered = [wheel for wheel in wheels if wheel.is_steered and not wheel.is_caster]
+    if steered:
+        check_front_steering([*driven, *steered])
+        base = float(np.mean([wheel.center[0] for wheel in steered]) - np.mean(axles))
+        steering = _max_steering(steered, separation / (2 * base))
+        return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
+    if max(axles) - min(axles) < AXLE_TOLERANCE_M:
+        return Differential.model_validate({"type": "differential", **size})
+    base = max(axles) - min(axles)
+    scale = min(10.0, 1 + _skid_factor(axles) * (base / separation) ** 2)
+    return SkidSteer.model_validate({"type": "skid_steer", "wheel_base": base, "turning_scale": scale, **size})
+
+
+def _skid_factor(axles: Sequence[float]) -> float:
+    """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for axles at x = `axles` in m.
+
+    The factors for two, three, and more axles were measured with `simscen robot check`.
+    """
+    gaps = sum(after - before > AXLE_TOLERANCE_M for before, after in pairwise(sorted(axles)))
+    return {1: 1.2, 2: 0.1}.get(gaps, 0.3)
+
+
+def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
+    """Return the largest steering angle in rad of the bicycle model, from the limits of the steering joints.
+
+    `ratio` is wheel separation / (2 * wheel base). cot(bicycle angle) = cot(angle of the inner wheel) + ratio.
+    """
+    ranges = [min(-wheel.steering.limits.lower, wheel.steering.limits.upper) for wheel in wheels if wheel.steering]
+    limits = [angle for angle in ranges if 0 < angle < math.pi / 2]
+    if not limits:
+        return DEFAULT_MAX_STEERING_RAD
+    tangent = math.tan(max(MIN_STEERING_RAD, min(MAX_STEERING_RAD, *limits)))
+    return math.atan(tangent / (1 + tangent * ratio))
+
+
+def _infer_limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
+    speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.is_steered]
+    linear = min([1.0, *(speed for speed in speeds if speed > 0)])
+    angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
+    return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
+
+
+def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
+    body = body_from_tree(draft, tree)
+    ground = min(wheel.bottom for wheel in wheels)
+    axle = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0)
+    for name in tree.links:
+        if any(word in name.lower() for word in LIDAR_NAMES):
+            pose = tree.poses[name]
+            x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
+            roll = math.pi if pose.rotation()[2, 2] < MAX_UPSIDE_DOWN_Z else 0.0
+            return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
+    top = max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
+    return Mount(z=top + 0.02)
