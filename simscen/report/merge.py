@@ -56,7 +56,7 @@ def _shard_problem(folder: Path, message: str, hint: str = "") -> Problem:
 def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:
     """Write one journal for all shards to `folder`, and copy the files of their runs. Raises OSError.
 
-    `runs_folder` is the name of the subfolder with the files of runs in each output folder. Files are hard-linked if the
+    `runs_folder` is the name of the subfolder with the files of runs in an output folder. Files are hard-linked if the
     file system supports it. The wall time of the merged session is the wall time of the longest shard.
     """
     planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)

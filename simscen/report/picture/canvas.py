@@ -1,6 +1,6 @@
 """Canvas for drawing anti-aliased shapes and text in world coordinates with Pillow.
 
-The canvas also keeps a list of the drawn parts, from which the legend is made.
+The canvas also lists the drawn parts, so that the legend explains only these parts.
 """
 
 import math
@@ -23,9 +23,9 @@ Fill = tuple[int, ...]
 """Red, green, and blue from 0 to 255, optionally followed by the opacity from 0 to 255."""
 
 SUPERSAMPLING = 2
-"""Factor by which shapes are drawn larger than the final image, which is reduced at the end (anti-aliasing)."""
+"""Scale of the image in which shapes are drawn. `finish` reduces it to the final size (anti-aliasing)."""
 LABEL_CELL_PX = 4
-"""Side of the square label cells: the grid in which the canvas tracks the areas that labels should not cover."""
+"""Side of a label cell. The canvas tracks in a grid of these cells which areas labels should not cover."""
 
 MAX_ELLIPSE_RADIUS_PX, _SIDES_OF_LARGE_DISC = 4000.0, 2000
 """Maximum radius of a disc that is drawn as an ellipse, and number of sides of the polygon for a larger disc."""
@@ -68,7 +68,7 @@ class Canvas:
     """
 
     def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
-        """Create an image with a `background` color; None: call `set_image` before drawing."""
+        """Create an image with a `background` color. If it is None, call `set_image` before drawing."""
         self.bounds, self.scale = bounds, scale
         x0, y0, x1, y1 = bounds
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
@@ -90,7 +90,7 @@ class Canvas:
 
     @property
     def blocked_fractions(self) -> Array:
-        """Fraction (0 to 1) of each label cell that labels should not cover, in rows from the top of the image."""
+        """Share (0 to 1) of each label cell that labels should not cover, as an array with the top row first."""
         return np.asarray(self._blocked, dtype=np.float64) / 255
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
@@ -225,7 +225,7 @@ class Canvas:
         return image
 
     def _corners(self, points: Array) -> list[tuple[float, float]]:
-        """Return the pixels of points (n, 2) in m in the supersampled image."""
+        """Return the pixels of points (n, 2), given in m, in the supersampled image."""
         u = (points[:, 0] - self.bounds[0]) * self.scale * SUPERSAMPLING
         v = (self.bounds[3] - points[:, 1]) * self.scale * SUPERSAMPLING
         return list(zip(u.tolist(), v.tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Pictures of paths: test drives of `simscen robot`, and the estimated path on the map of `simscen localize`."""
+"""Pictures of paths: the test drives of `simscen robot`, and the estimated path of `simscen localize` on a map."""
 
 from collections.abc import Sequence
 from pathlib import Path

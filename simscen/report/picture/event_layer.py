@@ -21,11 +21,12 @@ from simscen.report.picture.path_layer import driven_segments
 from simscen.report.picture.scene import Scene
 
 _GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+"""Events that end the drive to a goal."""
 
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """Outcome of a goal on the picture.
+    """Outcome of a goal, as shown on the picture.
 
     `word` is reached, failed, canceled, "not reached", or "not tried". `text` is the label behind the name of the goal;
     "" for a goal that was reached.
@@ -68,7 +69,7 @@ def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
 
 
 def _is_false_success(goal: Goal, scene: Scene) -> bool:
-    """Return whether the criterion goals_reached has a violated finding about the goal."""
+    """Return whether the criterion goals_reached failed at a goal that the stack reported as reached."""
     findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
     return any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings)
 
@@ -208,7 +209,7 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         if (round(pose.x, 3), round(pose.y, 3)) not in goal_positions and canvas.shows(pose.x, pose.y):
             canvas.symbol(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
             canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
-            yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, optional=True)
+            yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, is_optional=True)
 
 
 def _truncate(text: str, limit: int = 60) -> str:

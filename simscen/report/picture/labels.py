@@ -17,17 +17,17 @@ _ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 1
 _LEADER_DISTANCE_PX = 16.0
 """Distance between label and object above which a line connects them."""
 _WALL_COST, _LABEL_COST, _COST_PER_PX = 0.25, 3.0, 0.0015
-"""Cost of a label on walls, on another label, and per pixel of distance. On shapes that block labels, the cost is 1."""
+"""Costs of a label on walls, on another label, and per pixel of distance. On a shape that blocks labels, it is 1."""
 _MAX_OPTIONAL_COST = 0.2
-"""Maximum cost of an optional label. Optional labels with a higher cost are omitted."""
+"""Cost above which an optional label is omitted."""
 
 
 @dataclass(frozen=True)
 class Label:
     """Text with the font `size` in pixels for an object at (x, y) in m with a radius of `rim` pixels.
 
-    Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for no box. An
-    `optional` label is omitted if there is no free space.
+    Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for no box. An optional
+    label is omitted if there is no free space.
     """
 
     rank: int
@@ -38,20 +38,20 @@ class Label:
     size: int = 12
     rim: float = 6.0
     box: Color | None = None
-    optional: bool = False
+    is_optional: bool = False
 
 
 def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
-    """Choose a position for each label, and draw it. Labels of objects outside of the canvas are omitted.
+    """Choose a position for each label, and draw the label. Labels of objects outside of the canvas are omitted.
 
-    `walls` is the fraction, from 0 to 1, of walls in each label cell of the canvas.
+    `walls` is the share (0 to 1) of walls in each label cell of the canvas.
     """
     occupied = canvas.blocked_fractions + _WALL_COST * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
         cost, (left, top, right, bottom) = _best_box(canvas, label, occupied)
-        if label.optional and cost > _MAX_OPTIONAL_COST:
+        if label.is_optional and cost > _MAX_OPTIONAL_COST:
             continue
         rows, columns = (
             slice(int(top // LABEL_CELL_PX), int(bottom // LABEL_CELL_PX) + 1),
@@ -75,7 +75,7 @@ Box = tuple[float, float, float, float]
 
 
 def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
-    """Return the lowest cost of a label, and the box with this cost. `occupied` is the cost of each label cell."""
+    """Return the lowest possible cost of a label, and its box. `occupied` is the cost of each label cell."""
     sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
     sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
     width, height = text_size(label.text, label.size)

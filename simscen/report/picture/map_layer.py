@@ -15,7 +15,7 @@ from simscen.report.picture.canvas import SUPERSAMPLING, Bounds, Canvas, TextIte
 MAX_MAP_SIZE_PX = (1000, 800)
 """Maximum width and height of the map on a picture."""
 MARGIN_M = 0.4
-"""Margin around the known cells and the required points."""
+"""Margin of a picture around the known cells and the required points."""
 
 
 def map_extent(grid: OccupancyGrid, points: Array) -> Bounds:
@@ -39,7 +39,7 @@ def map_scale(bounds: Bounds) -> float:
 
 def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
     """Set the image of the canvas to the map."""
-    image, resolution = _colored(grid, 1 / (canvas.scale * SUPERSAMPLING))
+    image, resolution = _color_image(grid, 1 / (canvas.scale * SUPERSAMPLING))
     per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
     x0, _, _, y1 = canvas.bounds
     corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
@@ -55,8 +55,8 @@ def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
     )
 
 
-def _colored(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
-    """Return the map as a colored image, and the size of a pixel in m. Cells smaller than `pixel_m` are merged."""
+def _color_image(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
+    """Return the map as a color image, and the size of its pixels in m. Cells smaller than `pixel_m` are merged."""
     cells, merge = grid.cells, max(1, int(pixel_m / grid.resolution))
     if merge > 1:
         cells = _downsample(cells, merge)
@@ -74,12 +74,12 @@ def _colors() -> npt.NDArray[np.uint8]:
     return table
 
 
-def _downsample(cells: npt.NDArray[np.int8], merge: int) -> npt.NDArray[np.int8]:
-    """Return the highest value of each block of merge x merge cells."""
-    height, width = (-(-side // merge) * merge for side in cells.shape)
+def _downsample(cells: npt.NDArray[np.int8], factor: int) -> npt.NDArray[np.int8]:
+    """Return the highest value in each block of factor x factor cells."""
+    height, width = (-(-side // factor) * factor for side in cells.shape)
     padded = np.full((height, width), UNKNOWN, dtype=np.int8)
     padded[: cells.shape[0], : cells.shape[1]] = cells
-    blocks: npt.NDArray[np.int8] = padded.reshape(height // merge, merge, width // merge, merge).max(axis=(1, 3))
+    blocks: npt.NDArray[np.int8] = padded.reshape(height // factor, factor, width // factor, factor).max(axis=(1, 3))
     return blocks
 
 
@@ -90,7 +90,7 @@ _MIN_GRID_SPACING_PX = 55
 
 
 def grid_spacing(canvas: Canvas) -> float:
-    """Return the distance of grid lines in m: the smallest legible one that is 1, 2, or 5 times a power of ten."""
+    """Return the distance of grid lines in m: 1, 2, or 5 times a power of ten, and at least _MIN_GRID_SPACING_PX."""
     min_spacing = _MIN_GRID_SPACING_PX / canvas.scale
     power = 10.0 ** math.floor(math.log10(min_spacing))
     return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= min_spacing)

@@ -12,9 +12,11 @@ Color = tuple[int, int, int]
 """Red, green, and blue from 0 to 255."""
 
 PAGE: Color = (255, 255, 255)
+"""Background of pictures."""
 FREE: Color = (252, 251, 249)
 UNKNOWN: Color = (226, 223, 216)
 WALL: Color = (58, 63, 71)
+"""Colors of free, unknown, and occupied cells of a map."""
 INK: Color = (38, 42, 48)
 FAINT_INK: Color = (98, 103, 111)
 """Colors of text, and of less important text."""

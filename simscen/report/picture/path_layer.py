@@ -17,18 +17,19 @@ from simscen.report.picture.canvas import Canvas, printable
 from simscen.report.picture.labels import Label
 from simscen.report.picture.scene import Scene
 
-MAX_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
-"""Limits of a motion. Between two samples, a larger distance at a higher speed is a jump."""
+MIN_JUMP_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
+"""Speed and distance above which the motion between two samples counts as a jump."""
 _TIME_COLOR_COUNT = 48
-"""Number of colors of the true path, each for an equal part of the duration of the run."""
+"""Number of colors of the true path. Each color stands for an equal part of the duration of the run."""
 _DEFAULT_FOOTPRINT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
+"""Circle with a radius of 0.15 m for a robot without a footprint."""
 _LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
 _SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
 """Corners of the arrows at a kidnapping in pixels from the center, x right and y down."""
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
-    """Split poses at jumps, and at `placement_ticks`, at which the robot was moved to another place.
+    """Split poses at jumps, and at `placement_ticks`, the ticks at which the robot was placed elsewhere.
 
     `tick_rate` is in ticks per second.
     """
@@ -36,7 +37,7 @@ def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int,
         return [samples] if len(samples) else []
     distances = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
     seconds = np.diff(samples.ticks) / tick_rate
-    cuts = {*(np.flatnonzero((distances > MIN_JUMP_M) & (distances > MAX_SPEED_M_S * seconds)) + 1).tolist()}
+    cuts = {*(np.flatnonzero((distances > MIN_JUMP_M) & (distances > MIN_JUMP_SPEED_M_S * seconds)) + 1).tolist()}
     for tick in placement_ticks:
         near = max(0, int(np.searchsorted(samples.ticks, tick)) - 1)
         cuts.add(near + 1 + int(distances[near : near + 2].argmax()) if near < len(distances) else len(samples))
@@ -45,7 +46,7 @@ def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int,
 
 
 def driven_segments(scene: Scene) -> list[Samples]:
-    """Return the true path, split where the robot jumped or was moved to another place."""
+    """Return the true path, split where the robot jumped or was placed elsewhere."""
     placement_ticks = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
     return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placement_ticks)
 
@@ -134,7 +135,7 @@ def round_time_step(seconds: float) -> float:
 
 
 def _drop_close_points(points: Array, canvas: Canvas) -> Array:
-    """Return the points without successive points in the same pixel, but with the last point."""
+    """Return the points, omitting each point in the same pixel as its predecessor. The last point remains."""
     if len(points) < 3:
         return points
     pixels = np.floor(points * canvas.scale)

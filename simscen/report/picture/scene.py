@@ -1,4 +1,4 @@
-"""Data from which the picture of a run is drawn, and the outlines of objects."""
+"""Scene: the data from which the picture of a run is drawn. Also computes the outlines of objects."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,9 +16,9 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run to draw: the world and the data of one robot.
+    """Finished run to draw: the world and the data of one robot.
 
-    With several robots, each robot has a scene, and `robots` of the common scene contains these scenes.
+    With several robots, there is a scene for each robot, and a common scene, whose `robots` contains the others.
 
     Attributes:
         trace: Recorded run of the robot.
@@ -54,7 +54,7 @@ class Scene:
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """Return a common scene with a scene for each robot. `robots` maps each name to a trace and a case."""
+    """Return the common scene of several robots. `robots` has the trace and the case of each robot by name."""
     parts = {name: replace(scene, trace=trace, case=case, robot_name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 

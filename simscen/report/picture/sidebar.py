@@ -21,7 +21,7 @@ _STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
 """Function that draws the symbol of a legend entry. Parameters: pen, x of the left edge and y of the center in px."""
-Row = tuple[Status, Color, list[str]]
+CriterionRow = tuple[Status, Color, list[str]]
 """Status of a criterion, its color, and lines of text."""
 
 
@@ -65,9 +65,9 @@ def _reasons(scene: Scene) -> list[str]:
     return []
 
 
-def _criteria(scene: Scene) -> list[Row]:
+def _criteria(scene: Scene) -> list[CriterionRow]:
     """Return a row for each criterion, failures first."""
-    rows: list[Row] = []
+    rows: list[CriterionRow] = []
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
         finding = verdict.tightest
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
@@ -83,7 +83,7 @@ def _criteria(scene: Scene) -> list[Row]:
     return rows
 
 
-def _draw_criteria(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
+def _draw_criteria(draw: Pen, reasons: list[str], rows: list[CriterionRow]) -> None:
     y = 24.0
     for line in reasons:
         draw_text(draw, TextItem(_PADDING_PX, y, line, 13, palette.INK))

@@ -20,7 +20,7 @@ from simscen.report.picture.path_layer import split_at_jumps
 from simscen.report.picture.scene import Outlines, Scene, object_outlines, spawn_pose
 
 LABEL_RANK = 6
-"""Rank of the labels of ramps and floors. They are placed after the labels of robots, goals, and objects."""
+"""Rank of the labels of ramps and floors, which are placed after the labels of robots, goals, and objects."""
 
 
 def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -35,10 +35,11 @@ def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         x, y = outline.mean(axis=0).tolist()
         height = f"{ground.height:.2g} m" if ground.height >= 1 else f"{100 * ground.height:.2g} cm"
         text = printable(f"{ground.name}, {height} high" if ground.name else f"{height} high")
-        yield Label(LABEL_RANK, x, y, text, palette.FAINT_INK, 11, _label_distance(canvas, outline), optional=True)
+        yield Label(LABEL_RANK, x, y, text, palette.FAINT_INK, 11, _label_distance(canvas, outline), is_optional=True)
 
 
 def _draw_chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
+    """Draw three arrowheads that point uphill. Draw nothing on a level surface."""
     slope = math.hypot(*ground.uphill)
     if slope < 0.01:
         return
@@ -76,7 +77,7 @@ def _draw_floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterato
         palette.OBJECT,
         11,
         _label_distance(canvas, outline),
-        optional=True,
+        is_optional=True,
     )
 
 
@@ -144,7 +145,7 @@ def _label_distance(canvas: Canvas, outline: Array) -> float:
 _EARLIER_POSE_COUNT = 6
 """Maximum number of earlier poses at which a moving object is drawn."""
 _MIN_MOTION_M = 0.02
-"""Minimum motion of an object whose path and earlier poses are drawn. A rotation counts 0.3 m per rad."""
+"""Motion of an object above which its path and earlier poses are drawn. A rotation counts as 0.3 m per rad."""
 
 
 def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -214,7 +215,7 @@ def _draw_heading(canvas: Canvas, pose: Pose2, outline: Array) -> None:
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
-    """Return the indices of samples evenly spread over the path of an object without its end; [] without motion."""
+    """Return the indices of samples at equal distances along an object's path, except its end; [] without motion."""
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))

@@ -1,4 +1,4 @@
-"""Compact encoding of arrays of numbers for the replay page, and selection of samples to limit the size of the page.
+"""Compact encoding of arrays of numbers for the replay page, and selection of samples to limit the page size.
 
 Numbers are rounded to multiples of a step. The differences between successive numbers are stored as zigzag varints, as
 in Protocol Buffers.
@@ -11,14 +11,14 @@ from simscen.core.geometry import Array
 from simscen.core.records.trace import Ticks
 
 INFINITE_STEPS = 2**30
-"""Number of steps that encodes infinity. INFINITE_STEPS + 1 encodes nan."""
+"""Code for infinity, as a number of steps. INFINITE_STEPS + 1 is the code for nan."""
 
 Column = list[float]
 """Reference to an encoded array: offset of the first byte, number of elements, and step."""
 
 
 class PackedColumns:
-    """Collects encoded arrays. `reductions` are notes about data of which the page contains only a part."""
+    """Collects encoded arrays. `reductions` are notes about data that the page contains only in part."""
 
     def __init__(self) -> None:
         self.reductions: list[str] = []
@@ -46,7 +46,7 @@ class PackedColumns:
 
 
 def quantize(values: Array, step: float) -> npt.NDArray[np.int64]:
-    """Return the values divided by `step` and rounded; INFINITE_STEPS for infinity, INFINITE_STEPS + 1 for nan."""
+    """Return the values divided by `step` and rounded; ±INFINITE_STEPS for ±inf, INFINITE_STEPS + 1 for nan."""
     bounded = np.clip(
         np.nan_to_num(values / step, nan=0.0, posinf=INFINITE_STEPS, neginf=-INFINITE_STEPS),
         -INFINITE_STEPS,
@@ -91,22 +91,22 @@ def evenly_spaced(count: int, max_count: int) -> Indices:
 
 
 def spaced_in_time(ticks: Ticks, period: int) -> Indices:
-    """Return the indices of samples at least `period` ticks apart, and of the last sample before each longer gap.
+    """Return the indices of samples that are at least `period` ticks apart.
 
-    A longer gap is more than two periods.
+    The last sample, and the last sample before a gap of more than two periods, are included as well.
     """
     indices: list[int] = []
     last = None
     for k, tick in enumerate(ticks.tolist()):
-        pause = k + 1 == len(ticks) or int(ticks[k + 1]) - tick > 2 * period
-        if last is None or tick - last >= period or pause:
+        is_before_gap = k + 1 == len(ticks) or int(ticks[k + 1]) - tick > 2 * period
+        if last is None or tick - last >= period or is_before_gap:
             indices.append(k)
             last = tick
     return np.array(indices, dtype=np.int64)
 
 
 def keep_extremes(values: Array, max_count: int) -> Indices:
-    """Return the indices of at most `max_count` samples: the minimum and the maximum of segments of equal length."""
+    """Return the indices of at most `max_count` samples: minimum and maximum of each of several equal segments."""
     if len(values) <= max_count:
         return np.arange(len(values))
     segments = np.array_split(np.arange(len(values)), max(1, max_count // 2))

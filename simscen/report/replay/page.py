@@ -51,12 +51,12 @@ def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
 def page_html(title: str, data: bytes, numbers: bytes) -> str:
     """Return the HTML with a content security policy that allows only the script and style of the page.
 
-    `data` is a JSON document, `numbers` are the bytes of PackedColumns.
+    `data` is a JSON document, `numbers` are the encoded arrays of PackedColumns.
     """
     compressed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _COMPRESSION_LEVEL)
     packed = compressed[2:-4]  # deflate without header
     parts = {name: (PAGE_FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
-    parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
+    parts = {**parts, "css": css_variables() + parts["css"], "js": joined_script()}
     policy = (
         f"default-src 'none'; script-src '{csp_hash(parts['js'])}'; style-src '{csp_hash(parts['css'])}'; "
         "img-src data:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"
@@ -67,7 +67,7 @@ def page_html(title: str, data: bytes, numbers: bytes) -> str:
 
 
 @lru_cache(maxsize=1)
-def script() -> str:
+def joined_script() -> str:
     """Return all JavaScript modules as one script."""
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(PAGE_FOLDER.glob("*.js"))}
     modules = [re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _in_order(texts)]
@@ -75,7 +75,7 @@ def script() -> str:
 
 
 def _in_order(texts: Mapping[str, str]) -> list[str]:
-    """Return the names of the modules in the order of their imports. `texts` is the source of each module by name."""
+    """Return the names of the modules, each after the modules that it imports. `texts` are the sources by name."""
     ordered: list[str] = []
 
     def visit(name: str) -> None:
@@ -94,7 +94,7 @@ def _title(run: Mapping[str, Any]) -> str:
 
 
 MAX_MASK_BLOCKS = 2000
-"""Maximum number of blocks of a filter mask to draw, the largest first."""
+"""Maximum number of blocks of a filter mask. The largest blocks are used."""
 
 
 def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
 
 
 def _zones(scenery: Scenery) -> list[dict[str, Any]]:
-    """Return the zones of costmap filters as JSON data. A mask is a list of blocks of equal cells."""
+    """Return the zones of costmap filters as JSON data. A filter mask is a list of blocks of equal cells."""
     zones = []
     for zone in scenery.zones:
         data: dict[str, Any] = {"filter": zone.filter, "region": one_line(zone.region), "limit": zone.speed_limit}
@@ -201,5 +201,5 @@ def _spawned(event: Event) -> dict[str, Any]:
 
 
 def _number(value: object) -> float:
-    """Return a number rounded to four digits, or 0 for anything else."""
+    """Return a number rounded to four decimal places; 0 for any other value."""
     return round(float(value), 4) if isinstance(value, int | float) else 0.0

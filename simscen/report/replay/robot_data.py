@@ -36,7 +36,7 @@ MAX_LOCAL_PLANS = 1500
 MAX_GRID_CELLS = 2_000_000
 """Maximum number of cells in all grids of a costmap topic."""
 _POINT_STEP_M, _PARTICLE_YAW_STEP_RAD = 0.01, 0.02
-"""Steps to which positions and ranges, and headings of particles, are rounded."""
+"""Rounding steps of positions and ranges, and of the headings of particles."""
 
 
 def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
@@ -45,7 +45,7 @@ def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str
 
 
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
-    """Return the scans of one lidar that have as many beams as the first scan."""
+    """Return the scans of one lidar. Scans with another number of beams than the first scan are omitted."""
     first = sensors.scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
@@ -136,7 +136,7 @@ def costmaps_data(sensors: SensorMessages, trace: Trace, columns: PackedColumns)
 def _costmap(
     topic: str, messages: LoggedMessages, sensors: SensorMessages, trace: Trace, columns: PackedColumns
 ) -> dict[str, Any]:
-    """Return the grids of a topic. A grid with the same origin as the previous grid is stored as differences."""
+    """Return the grids of a topic. A grid with the origin and size of the previous grid is stored as differences."""
     _, first = sensors.costmap(messages[0][1])
     indices = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
     columns.note_reduction(f"grids on {one_line(topic)}", len(indices), len(messages))
@@ -175,7 +175,7 @@ def _rounded(pose: Sequence[float]) -> list[float]:
 MAX_POSES = 12_000
 """Maximum number of poses per robot: five minutes at 40 Hz."""
 POSITION_STEP_M, YAW_STEP_RAD = 1e-3, 1e-3
-"""Steps to which the poses of robots and objects are rounded."""
+"""Rounding steps of the poses of robots and objects."""
 
 
 def robot_data(
@@ -215,7 +215,7 @@ def robot_data(
 
 
 def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
-    """Return each goal once, even if the robot drives to the goal in several loops."""
+    """Return each goal once, also if the robot drives to it in several loops."""
     goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
         base = goal.name.partition("#")[0] if goal.name.partition("#")[0] in lines.goals else goal.name

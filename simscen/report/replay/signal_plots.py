@@ -21,7 +21,7 @@ from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
 MAX_SAMPLES = 6000
 """Maximum number of samples per plot."""
 _STEP_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
-"""Step to which values are rounded, by unit."""
+"""Rounding step of values, by unit."""
 _EXCLUDED_SIGNALS = frozenset({"time", "started"})
 """Signals that are not plotted."""
 _SIGNAL_OF_CRITERION = {
@@ -41,7 +41,7 @@ _SIGNAL_OF_CRITERION = {
 
 @dataclass(frozen=True)
 class SignalPlot:
-    """Signal to plot, with the arguments of the signal by name, such as the object of `distance_to`."""
+    """Signal to plot, and the arguments of the signal by name, such as the object of `distance_to`."""
 
     signal: SignalName
     arguments: SignalArguments
@@ -100,7 +100,7 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
 
 
 def _step(unit: str, values: Array) -> float:
-    """Return the step to which the values of a signal are rounded: 1 for whole numbers without a unit."""
+    """Return the rounding step of a signal by its unit; 1 for whole numbers without a unit."""
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
@@ -108,7 +108,7 @@ def _step(unit: str, values: Array) -> float:
 
 
 def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str, Any], ...]]]:
-    """Yield each signal in temporal criteria, and pairs of name and value of the signal's arguments."""
+    """Yield each signal in a temporal criterion, and its arguments as pairs of name and value."""
     for entry in spec.pass_:
         chosen = entry.chosen
         for one in chosen.all_comparisons() if isinstance(chosen, TemporalCriterion) else ():

@@ -86,6 +86,7 @@ def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
 
 
 def _is_tree_change(line: LogLine) -> bool:
+    """Return whether a log line reports a change of the behavior tree."""
     return line.name == BEHAVIOR_TREE_LOGGER and _TREE_CHANGE.fullmatch(line.text) is not None
 
 
@@ -96,7 +97,7 @@ def _severity(level: int) -> str:
 def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the parameters of each node; [] if the stack reported none.
 
-    `values` of a node lists the name, the value as text, and whether the parameter is a main parameter. `total` is the
+    For each parameter, `values` has the name, the value as text, and whether it is a main parameter. `total` is the
     number of parameters before the reduction to MAX_PARAMETERS.
     """
     nodes = _reported_parameters(log)

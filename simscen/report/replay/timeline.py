@@ -24,6 +24,7 @@ from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
 
 K = EventKind
+"""Abbreviation for the tables below."""
 _LANES = {
     K.GOAL_ACCEPTED: "goals", K.GOAL_REACHED: "goals", K.GOAL_PASSED: "goals", K.GOAL_FAILED: "failures",
     K.GOAL_CANCELED: "goals", K.NAVIGATION_ENDED: "goals", K.PLAN_MADE: "plans", K.PLAN_FAILED: "plans",
@@ -61,7 +62,7 @@ class TimelineEntry:
         name: Name of the goal, fault, object, or event.
         text: Further data of the event as text.
         place: Position (x, y) in m; () if the event has none.
-        about: Data of a zone.switched event, which the page needs to draw the zone; otherwise {}.
+        about: Data of an event that switches a zone on or off, to draw the zone; {} for other events.
     """
 
     tick: int
@@ -85,7 +86,7 @@ class TimelineEntry:
 
 
 def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
-    """Return the entries for the events of a robot in order. With `with_world`, include the events of the world."""
+    """Return the entries for the events of a robot in order; if `with_world`, also for the events of the world."""
     entries: list[TimelineEntry] = []
     open_intervals: dict[tuple[EventKind, str], int] = {}
     for event in trace.events:
@@ -135,6 +136,7 @@ def _details(event: Event) -> Iterator[str]:
 
 
 def _short(value: object) -> str:
+    """Return a value as text, with at most four digits of a number."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -197,7 +199,7 @@ def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines])
 
 
 def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
-    """Return the line of the disturbance for a verdict about a missing disturbance; 0 for other verdicts."""
+    """Return the line of the disturbance if a verdict states that it did not take place; 0 for other verdicts."""
     if verdict.criterion != DISTURBANCE:
         return 0
     ordered = [one.disturbance for one in result.disturbances]
@@ -253,7 +255,7 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
 
 
 def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """Return the names of all goals. In contrast to ScenarioSpec.goal_names, a pose can be the name of a place."""
+    """Return the names of all goals. Unlike ScenarioSpec.goal_names, accept names of places as poses."""
     used_names, names = {goal.name for goal in spec.goals}, list[str]()
     for number, goal in enumerate(spec.goals, start=1):
         pose: Any = goal.pose

@@ -27,7 +27,7 @@ from simscen.record.sensor_messages import SensorMessages
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time
-from simscen.report.replay.page import PAGE_FOLDER, script
+from simscen.report.replay.page import PAGE_FOLDER, joined_script
 from simscen.report.replay.robot_data import costmaps_data, map_from_odom
 from simscen.testing.synthetic_trace import synthetic_trace
 
@@ -176,7 +176,7 @@ def test_thinning_keeps_ends_pauses_and_extremes() -> None:
 
 
 def test_script_is_one_module_and_never_creates_markup_from_text() -> None:
-    text = script()
+    text = joined_script()
     assert not re.search(r"^(import|export) ", text, re.MULTILINE)
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", text)
     assert "</script" not in text.lower()
