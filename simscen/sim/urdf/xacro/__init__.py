@@ -1,1 +1,1 @@
-"""Expansion of xacro files without executing code, which xacro itself would do."""
+"""Expansion of xacro files. Unlike xacro itself, it does not execute Python code from the files."""

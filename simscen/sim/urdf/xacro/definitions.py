@@ -21,8 +21,8 @@ PARAMETER = re.compile(
 class Parameter:
     """A parameter of a macro.
 
-    Without an argument, the value is the caller's property of the same name if the parameter `is_forwarded` (`^`), else
-    `default` (None: the argument is required).
+    If a call has no argument for it, its value is `default` (None: the argument is required). If the parameter
+    `is_forwarded` (`^`), a property of the same name in the scope of the caller takes precedence over `default`.
     """
 
     name: str
@@ -107,37 +107,37 @@ def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tupl
 
 
 def bind_parameters(
-    macro: Macro, call: Element, blocks: list[Element], scope: Scope, inside: Scope, texts: TextEvaluator
+    macro: Macro, call: Element, blocks: list[Element], caller_scope: Scope, body_scope: Scope, texts: TextEvaluator
 ) -> Scope:
-    """Add the arguments of a macro call to `inside`, the scope of the macro's body; return `inside`.
+    """Add the arguments of a macro call to the scope of the macro's body, and return this scope.
 
-    `scope` is the scope of the caller. `blocks` are the expanded child elements of the call. Raises ExpansionError.
+    `blocks` are the expanded child elements of the call. Raises ExpansionError.
     """
     missing = {parameter.name: parameter for parameter in macro.parameters}
     for name, text in call.attributes.items():
         if missing.pop(name, None) is None:
             raise ExpansionError(f"macro {macro.name!r} has no parameter {name[:60]!r}")
-        inside.values[name] = texts.literal(text, scope)
+        body_scope.values[name] = texts.literal(text, caller_scope)
     unused_blocks = iter(blocks)
     for name in [parameter.name for parameter in macro.parameters if parameter.is_block]:
         block = next(unused_blocks, None)
         if block is None:
             raise ExpansionError(f"macro {macro.name!r} needs a block for {name!r}")
-        inside.values[name] = Block(block, includes_element=not name.startswith("**"))
+        body_scope.values[name] = Block(block, includes_element=not name.startswith("**"))
         del missing[name]
     if extra := next(unused_blocks, None):
         raise ExpansionError(f"macro {macro.name!r} has no parameter for the block <{extra.tag[:60]}>")
     for name, parameter in missing.items():
-        inside.values[name] = _default(parameter, scope, macro, texts)
-    return inside
+        body_scope.values[name] = _default_value(parameter, caller_scope, macro, texts)
+    return body_scope
 
 
-def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> ScopeValue:
-    """Return the value of a parameter without an argument. Raises ExpansionError."""
-    if parameter.is_forwarded and scope.find_scope(parameter.name) is not None:
-        return texts.property(scope, parameter.name)
+def _default_value(parameter: Parameter, caller_scope: Scope, macro: Macro, texts: TextEvaluator) -> ScopeValue:
+    """Return the value of a parameter for which the call has no argument. Raises ExpansionError."""
+    if parameter.is_forwarded and caller_scope.find_scope(parameter.name) is not None:
+        return texts.property(caller_scope, parameter.name)
     if parameter.default is not None:
-        return texts.literal(parameter.default, scope)
+        return texts.literal(parameter.default, caller_scope)
     what = "there is no property to forward to" if parameter.is_forwarded else "a call lacks the argument"
     raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
 

@@ -67,7 +67,7 @@ def declared_arguments(element: Element) -> set[str]:
 
 
 class _Expansion:
-    """Expansion of one file, with a handler method for each xacro element.
+    """Expansion of one file. Most private methods are handlers of one xacro element, such as `_if` of `<xacro:if>`.
 
     A handler appends the expansion of the element `source` to the children of `into`. `scope` has the visible
     properties, and `macros` has the visible macros.
@@ -100,18 +100,18 @@ class _Expansion:
         try:
             with self._budget:
                 self._budget.spend()
-                other = self._call if source.tag.startswith("xacro:") else self._plain
+                other = self._call if source.tag.startswith("xacro:") else self._copy
                 self._handlers.get(source.tag, other)(source, into, scope, macros)
         except ExpansionError as error:
             calls = [f"in macro {m.name!r}, called at {e.source.name}:{e.line}" for m, e in self._calls[-1:]]
             hint = "; ".join(filter(None, [error.hint, *calls]))
             raise InvalidInput([source.problem(error.message, hint)]) from error
 
-    def _children(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _expand_children(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         for child in source.children:
             self.element(child, into, scope, macros)
 
-    def _plain(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _copy(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         """Append a copy of an element that is not a xacro element."""
         own = [(n, text) for n, text in source.attributes.items() if not n.startswith("xacro:") and n != "xmlns:xacro"]
         attributes = {name: self._texts.text(text, scope) for name, text in own}
@@ -121,7 +121,7 @@ class _Expansion:
             raise ExpansionError(f"more than {MAX_ELEMENTS} elements or {MAX_URDF_BYTES // 2**20} MiB when expanded")
         copy = replace(source, attributes=attributes, children=[])
         into.children.append(copy)
-        self._children(source, copy, scope, macros)
+        self._expand_children(source, copy, scope, macros)
 
     def _macro(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         macro = parse_macro(source)
@@ -137,7 +137,7 @@ class _Expansion:
 
     def _if(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         if parse_bool(self._texts.value(required_attribute(source, "value"), scope)) is (source.tag == "xacro:if"):
-            self._children(source, into, scope, macros)
+            self._expand_children(source, into, scope, macros)
 
     def _attribute(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         name = self._texts.text(required_attribute(source, "name"), scope)
@@ -153,7 +153,7 @@ class _Expansion:
         for key in (f"**{name}", f"*{name}"):
             owner = scope.find_scope(key)
             if owner is not None and isinstance(block := owner.values[key], Block):
-                insert = self._plain if block.includes_element else self._children
+                insert = self._copy if block.includes_element else self._expand_children
                 insert(block.element, into, scope, macros)
                 return
         raise ExpansionError(f"there is no block {name[:60]!r}")
@@ -167,10 +167,10 @@ class _Expansion:
         self._budget.spend(10)
         macro, enclosing, enclosing_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
         arguments = replace(source, attributes={}, children=[])
-        self._children(source, arguments, scope, macros)
+        self._expand_children(source, arguments, scope, macros)
         inside = bind_parameters(macro, source, arguments.children, scope, Scope(enclosing), self._texts)
         self._calls.append((macro, source))
-        self._children(macro.body, into, inside, MacroScope(enclosing_macros))
+        self._expand_children(macro.body, into, inside, MacroScope(enclosing_macros))
         self._calls.pop()
 
     def _include(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
@@ -193,7 +193,7 @@ class _Expansion:
                 return
             raise MissingFile(f"include {filename[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
-        self._children(self._parse(path), into, scope, macros)
+        self._expand_children(self._parse(path), into, scope, macros)
         self._texts.file = before
 
     def _parse(self, path: Path) -> Element:

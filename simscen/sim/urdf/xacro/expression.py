@@ -13,13 +13,13 @@ Function = Callable[..., object]
 PYTHON_TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": bool, "list": list, "dict": dict}
 
 
-def _round(number: float, digits: int | None = None) -> float:
+def _limited_round(number: float, digits: int | None = None) -> float:
     if digits is not None and abs(digits) > 100:  # Python would compute 10**digits
         raise ExpansionError("round() takes up to 100 digits")
     return round(number, digits)
 
 
-def _range(*bounds: int) -> list[int]:
+def _limited_range(*bounds: int) -> list[int]:
     numbers = range(*bounds)
     if len(numbers) > MAX_LENGTH:
         raise ExpansionError(f"range() gives more than {MAX_LENGTH} numbers")
@@ -27,6 +27,7 @@ def _range(*bounds: int) -> list[int]:
 
 
 def _tokenize(text: str, separators: str = ",; ", skip_empty: bool = True) -> list[str]:
+    """Split a text at each of the separators, as `xacro.tokenize` does."""
     for separator in separators[1:]:
         text = text.replace(separator, separators[0])
     return [word for word in text.split(separators[0]) if word or not skip_empty]
@@ -36,7 +37,7 @@ def _ignore_message(*_: object) -> str:
     return ""  # messages of a file are meant for its authors
 
 
-def _fatal(*messages: object) -> str:
+def _fail_with_message(*messages: object) -> str:
     raise ExpansionError(f"error in the file: {' '.join(map(str, messages))[:200]}")
 
 
@@ -49,11 +50,12 @@ MATH_FUNCTIONS: Mapping[str, Function | float] = {
     )
 }  # fmt: skip
 PYTHON_FUNCTIONS: Mapping[str, Function] = {
-    **PYTHON_TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range,
-    "round": _round, "sorted": sorted, "sum": sum,
+    **PYTHON_TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _limited_range,
+    "round": _limited_round, "sorted": sorted, "sum": sum,
 }  # fmt: skip
 XACRO_FUNCTIONS: Mapping[str, Function] = {
-    "message": _ignore_message, "warning": _ignore_message, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
+    "message": _ignore_message, "warning": _ignore_message, "error": _fail_with_message, "fatal": _fail_with_message,
+    "tokenize": _tokenize,
 }  # fmt: skip
 NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {
     "math": MATH_FUNCTIONS,
@@ -65,13 +67,13 @@ GLOBAL_FUNCTIONS: Mapping[str, Function | float] = {**MATH_FUNCTIONS, **PYTHON_F
 """Functions and constants that can be used without a namespace."""
 
 
-def _replace(text: str, old: str, new: str) -> str:
+def _limited_replace(text: str, old: str, new: str) -> str:
     if text.count(old) * len(new) > MAX_LENGTH:
         raise ExpansionError(f"replace() gives more than {MAX_LENGTH} characters")
     return text.replace(old, new)
 
 
-def _join(separator: str, words: list[Any]) -> str:
+def _limited_join(separator: str, words: list[Any]) -> str:
     if len(words) * len(separator) > MAX_LENGTH:
         raise ExpansionError(f"join() gives more than {MAX_LENGTH} characters")
     return separator.join(words)
@@ -81,14 +83,14 @@ METHODS: Mapping[tuple[type, str], Function] = {
     **{(str, name): getattr(str, name) for name in (
         "count", "endswith", "find", "lower", "lstrip", "rstrip", "split", "startswith", "strip", "upper",
     )},
-    (str, "replace"): _replace,
-    (str, "join"): _join,
+    (str, "replace"): _limited_replace,
+    (str, "join"): _limited_join,
     **{(list, name): getattr(list, name) for name in ("count", "index", "pop")},
     (dict, "get"): dict.get,
     (dict, "keys"): list,
     (dict, "values"): lambda mapping: list(mapping.values()),
 }  # fmt: skip
-
+"""Methods of texts, lists, and dictionaries that can be called, by type and name."""
 
 MAX_EXPRESSION_CHARACTERS = 1000
 """Maximum length of an expression."""
@@ -127,6 +129,8 @@ def evaluate(text: str, properties: PropertyLookup, budget: Budget) -> Value:
 
 
 class _Evaluation:
+    """Evaluation of one expression with the values of `properties`. Its steps are counted in `budget`."""
+
     def __init__(self, properties: PropertyLookup, budget: Budget) -> None:
         self._properties, self._budget = properties, budget
 
@@ -264,6 +268,7 @@ def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
 
 
 def _describe(node: ast.expr) -> str:
+    """Return a description of an unsupported part of an expression for messages."""
     return {
         ast.Lambda: "a lambda", ast.ListComp: "a comprehension", ast.SetComp: "a comprehension", ast.Dict: "{…}",
         ast.DictComp: "a comprehension", ast.GeneratorExp: "a comprehension", ast.JoinedStr: "an f-string",

@@ -28,11 +28,12 @@ class Block:
 
 
 @dataclass(eq=False)
-class Unfinished:
+class EvaluationMarker:
     """Marker for a property that is being evaluated, to detect circular definitions."""
 
 
-ScopeValue = Union[Value, LazyText, Block, Unfinished, "Scope"]
+ScopeValue = Union[Value, LazyText, Block, EvaluationMarker, "Scope"]
+"""Content of a name in a scope: a property, a block, or the scope of an included namespace."""
 
 
 @dataclass(eq=False)
@@ -63,7 +64,8 @@ class Scope:
     def caller(self) -> "Scope":
         """Return the scope in which `<xacro:property scope="parent">` sets a property.
 
-        This is the parent of a namespace. In a macro call, it is the innermost enclosing scope that is not a namespace.
+        In a namespace, this is its parent scope. In a macro call, it is the innermost enclosing scope that is not a
+        namespace.
         """
         scope = self.parent
         while scope is not None and scope.is_namespace and not self.is_namespace:
@@ -129,7 +131,7 @@ class TextEvaluator:
             raise KeyError(name)
         match owner.values[name]:
             case LazyText(text) as lazy:
-                owner.values[name] = Unfinished()
+                owner.values[name] = EvaluationMarker()
                 try:
                     with self.budget:
                         value = self.literal(text, owner)
@@ -138,7 +140,7 @@ class TextEvaluator:
                     raise
                 owner.values[name] = value
                 return value
-            case Unfinished():
+            case EvaluationMarker():
                 raise ExpansionError(f"the property {name!r} is defined by itself")
             case Block():
                 raise KeyError(name)
@@ -173,7 +175,7 @@ class TextEvaluator:
             case ["optenv", _, *default]:
                 return " ".join(default)  # a run must not depend on the environment
             case ["find", package]:
-                return self._package(package)
+                return self._package_path(package)
             case ["dirname"]:
                 return str(self.file.parent)
             case ["env", *_]:
@@ -181,7 +183,7 @@ class TextEvaluator:
             case _:
                 raise ExpansionError(f"$({command[:60]}) is not supported", "use arg, find, dirname, or optenv")
 
-    def _package(self, name: str) -> str:
+    def _package_path(self, name: str) -> str:
         try:
             return str(self._folders.package_folder(name, self.file.parent))
         except UnusableFile as trouble:
