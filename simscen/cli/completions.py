@@ -44,13 +44,13 @@ def stacks(incomplete: str) -> list[str]:
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
-    from simscen.spec.registry import entries
+    from simscen.spec.registry import all_types
 
     try:
         configured = list(load_config(config_file()).spec.stacks)
     except SimscenError:  # the command itself reports what is wrong with the file
         configured = []
-    names = dict.fromkeys([*(entry.name for entry in entries("stack")), *configured])
+    names = dict.fromkeys([*(entry.name for entry in all_types("stack")), *configured])
     return [name for name in names if name.startswith(incomplete)]
 
 

@@ -1,6 +1,6 @@
 """Plugins that a scenario uses, and plugins of a log that are not installed.
 
-A plugin is a type, such as a criterion, that an installed package adds; an Entry describes it.
+A plugin is a type, such as a criterion, that an installed package adds; a RegisteredType describes it.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -11,35 +11,35 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import walk
 from simscen.loading.yaml.tree import Keys
 from simscen.spec.choice import Choice
-from simscen.spec.registry import Entry, entries_of, find
+from simscen.spec.registry import RegisteredType, find_type, plugins_with_spec
 
 _HEADER_PREFIX = "plugin."
 """Beginning of the header keys of plugins in a log."""
 
 
-def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
+def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
     """Return the plugins that a scenario and its robots use, sorted by group and name."""
     return _plugins_of_specs(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
 
 
-def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
+def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[RegisteredType, ...]:
     """Return the plugins that at least one of the scenarios uses, sorted by group and name."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
 
 
-def _plugins_of_specs(*specs: Any) -> tuple[Entry, ...]:
+def _plugins_of_specs(*specs: Any) -> tuple[RegisteredType, ...]:
     """Return the plugins that the specifications use, sorted by group and name."""
     found = {entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)}
     return _sorted(found)
 
 
-def log_header_key(entry: Entry) -> str:
+def log_header_key(entry: RegisteredType) -> str:
     """Return the header key of a plugin in a log, e.g. `plugin.criterion.dwell`. Its value is the requirement."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
-def requirement_of(entry: Entry) -> str:
+def requirement_of(entry: RegisteredType) -> str:
     """Return the pip requirement of the package of a plugin: `package==version`."""
     return f"{entry.distribution}=={entry.version}"
 
@@ -55,7 +55,7 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
         group, _, name = key.removeprefix(_HEADER_PREFIX).partition(".")
         if not key.startswith(_HEADER_PREFIX) or group not in groups:
             continue
-        entry = find(group, name)
+        entry = find_type(group, name)
         installed = requirement_of(entry) if entry is not None else ""
         if installed != recorded:
             difference = f"{installed} is installed" if installed else "it is not installed"
@@ -65,17 +65,17 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
     return missing
 
 
-def _sorted(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 
-def _plugins_of_part(keys: Keys, part: Any) -> Iterator[Entry]:
+def _plugins_of_part(keys: Keys, part: Any) -> Iterator[RegisteredType]:
     """Yield the plugin that defines the part of a specification at `keys`; nothing if simscen defines it."""
     if isinstance(part, Choice):
-        entry = find(part.group, part.kind) if part.original_class is not None else None
+        entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:
             yield entry
         return
-    candidates = entries_of(type(part))
+    candidates = plugins_with_spec(type(part))
     named = [entry for entry in candidates if entry.name in (getattr(part, "type", None), *keys[-1:])]
     yield from named or candidates[:1]

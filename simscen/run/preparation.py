@@ -36,7 +36,7 @@ from simscen.model.stack import StackSpec
 from simscen.model.stack_files import AnyStack
 from simscen.model.world import WorldSpec
 from simscen.sim.body.robot_body import RobotBody
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 from simscen.triggers.robot_state import ClearanceBelow
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
@@ -71,7 +71,7 @@ class PreparedScenario:
     """The part of the world's mesh that blocks the robot."""
     map_faults: tuple[int, ...] = ()
     """Indices of the faults that have changed the map."""
-    plugins: tuple[Entry, ...] = ()
+    plugins: tuple[RegisteredType, ...] = ()
     """Plug-ins that the scenario uses."""
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
 

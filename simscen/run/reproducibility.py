@@ -21,7 +21,7 @@ from simscen.loading.loaded import LoadedMap, LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.loading.yaml.library import DEFAULTS_FILE
 from simscen.model.stack_base import StackBase
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 PACKAGES = (
     *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
@@ -110,7 +110,7 @@ def _version(package: str) -> str:
         return ""
 
 
-def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
+def plugin_packages(plugins: Iterable[RegisteredType]) -> dict[str, dict[str, object]]:
     """Return the `version` and the `used` entry points of each package with plug-ins, by package name."""
     found: dict[str, dict[str, object]] = {}
     for entry in plugins:
@@ -121,7 +121,7 @@ def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
     return found
 
 
-def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
+def plugin_fingerprints(plugins: Iterable[RegisteredType]) -> dict[str, list[str]]:
     """Return the package, its version, the class, and the digest of all files of each plug-in, by "GROUP NAME"."""
     return {
         f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _package_digest(entry.value)]
@@ -144,7 +144,7 @@ def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
     return sha.hexdigest()
 
 
-def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
+def plugin_files(plugins: Iterable[RegisteredType]) -> list[Path]:
     """Return the files of the top-level packages that contain the plug-ins."""
     return [file for entry in plugins for _, file in _package_files(entry.value)]
 

@@ -26,7 +26,7 @@ from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
 from simscen.run.preparation import PreparedScenario
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 AttachLogs = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
 """Function that takes the setup of a run and the logs of its first robot, and returns more logs for this robot."""
@@ -149,7 +149,7 @@ def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path 
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 
 
-def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
+def plugin_error(error: Exception, plugins: Sequence[RegisteredType]) -> RunError | None:
     """Return a RunError with the name of the plug-in that raised an exception, or None if no plug-in raised it."""
     packages = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
@@ -162,7 +162,7 @@ def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
     return None
 
 
-def _plugin_of_module(module: str, plugins: Sequence[Entry]) -> Entry:
+def _plugin_of_module(module: str, plugins: Sequence[RegisteredType]) -> RegisteredType:
     """Return the plug-in that is defined in a module, or else the first plug-in of the module's package."""
     package = module.partition(".")[0]
     candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]

@@ -106,9 +106,9 @@ class Choice(Spec):
         """
         if self.original_class is None:
             return ""
-        from simscen.spec.registry import find
+        from simscen.spec.registry import find_type
 
-        found = find(self.group, self.kind)
+        found = find_type(self.group, self.kind)
         return f" ({self.group} `{self.kind}` of {found.origin})" if found is not None and not found.is_shipped else ""
 
     def __reduce_ex__(self, protocol: Any) -> Any:
@@ -123,7 +123,7 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     from pydantic import create_model
 
     from simscen.spec.extensible_union import PluginSpec
-    from simscen.spec.registry import installed
+    from simscen.spec.registry import installed_types
 
     if choice.original_class is not None or not choice.group:
         return choice
@@ -132,7 +132,7 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
             Annotated[BaseModel | None, PluginSpec(*entry.value.partition(":")[::2], entry)],
             Field(default=None, alias=entry.name),
         )
-        for entry in installed(choice.group)
+        for entry in installed_types(choice.group)
         if entry.name not in choice.known_keys()
     }
     if not fields:

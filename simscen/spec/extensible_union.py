@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, Val
 
 from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import LazySpec, Typed
-from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
+from simscen.spec.registry import BrokenPlugin, RegisteredType, find_type, installed_types, shipped_types
 
 GROUP_KEY = "simscen group"
 """Key in the metadata of a pydantic schema: the value is the name of the registry group."""
@@ -48,7 +48,7 @@ class ExtensibleUnion:
         name = value.get("type") if isinstance(value, dict) else None
         if not isinstance(name, str) or name in _shipped_names(self.group):
             return validate_shipped(value)
-        entry = find(self.group, name)
+        entry = find_type(self.group, name)
         if entry is not None:
             return validate_plugin_spec(entry, value)
         details = InitErrorDetails(type=_unknown_type_error(self.group, name), loc=("type",), input=name)
@@ -77,18 +77,18 @@ BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
 
 
 def _shipped_names(group: str) -> frozenset[str]:
-    return frozenset(entry.name for entry in shipped(group))
+    return frozenset(entry.name for entry in shipped_types(group))
 
 
-def _find_or_raise(group: str, name: str) -> Entry:
+def _find_or_raise(group: str, name: str) -> RegisteredType:
     """Return the type of a group by name. Raises PydanticCustomError if there is none."""
-    if (entry := find(group, name)) is None:
+    if (entry := find_type(group, name)) is None:
         raise _unknown_type_error(group, name)
     return entry
 
 
 def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
-    names = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
+    names = [*(entry.name for entry in shipped_types(group)), *(entry.name for entry in installed_types(group))]
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(names)})
 
 
@@ -100,7 +100,7 @@ _CHECKED_PROPERTIES = ("horizon", "clearance_range")
 class PluginSpec(LazySpec):
     """Annotation of a field with a specification of a plugin."""
 
-    entry: Entry
+    entry: RegisteredType
 
     def load(self) -> type[BaseModel]:
         """Import the package and return the specification class. Raises BrokenPlugin."""
@@ -110,7 +110,7 @@ class PluginSpec(LazySpec):
         return validate_plugin_spec(self.entry, value)
 
 
-def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
+def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
     """Return the specification of a value, validated by a plugin. Errors of the plugin become validation errors."""
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
@@ -128,7 +128,7 @@ def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
     return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 
-def _with_valid_properties(entry: Entry, spec: BaseModel) -> BaseModel:
+def _with_valid_properties(entry: RegisteredType, spec: BaseModel) -> BaseModel:
     """Return `spec`. Raises BrokenPlugin if a checked property is not a finite number of at least 0."""
     for name in _CHECKED_PROPERTIES:
         number = getattr(spec, name) if hasattr(type(spec), name) else 0.0

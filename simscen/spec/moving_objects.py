@@ -51,8 +51,8 @@ class Motion(Spec):
     """Behavior at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
     keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
-    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them. After
-    the fraction u of its time, a leg is then covered by the fraction 3u² - 2u³; the peak speed is 1.5 times the mean.
+    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them;
+    after the fraction u of its time, a leg is covered by the fraction 3u² - 2u³ (peak speed 1.5 times the mean).
     `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends, except in a loop.
     The velocities at keyframes are Catmull-Rom velocities for uneven times: (next - previous) / (difference of their
     times)."""

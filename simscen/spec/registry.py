@@ -74,7 +74,7 @@ GROUPS: dict[str, Group] = {
 
 
 @dataclass(frozen=True)
-class Entry:
+class RegisteredType:
     """Registered type, shipped or from an installed package."""
 
     group: str
@@ -110,20 +110,20 @@ class Entry:
 class BrokenPlugin(Exception):
     """A type of an installed package cannot be used. `why` is the reason, `hint` the next step for the user."""
 
-    def __init__(self, entry: Entry, why: str, hint: str = "") -> None:
+    def __init__(self, entry: RegisteredType, why: str, hint: str = "") -> None:
         self.entry, self.why = entry, why
         self.hint = hint or "`simscen plugins` lists what installed packages add"
         super().__init__(f"{entry.group} `{entry.name}` of {entry.origin} cannot be used: {why}")
 
 
-def shipped(group: str) -> tuple[Entry, ...]:
+def shipped_types(group: str) -> tuple[RegisteredType, ...]:
     """Return the shipped types of a group."""
     types = _import_address(GROUPS[group].shipped)
     values: dict[str, str] = types if isinstance(types, dict) else types.addresses()
-    return tuple(Entry(group, name, value) for name, value in values.items())
+    return tuple(RegisteredType(group, name, value) for name, value in values.items())
 
 
-def installed(group: str) -> tuple[Entry, ...]:
+def installed_types(group: str) -> tuple[RegisteredType, ...]:
     """Return the types that installed packages add to a group, sorted by name, including unusable ones."""
     return tuple(entry for entry in _installed_entries() if entry.group == group)
 
@@ -131,31 +131,31 @@ def installed(group: str) -> tuple[Entry, ...]:
 def installed_specs(group: str) -> dict[str, type[BaseModel]]:
     """Return the usable specification classes that installed packages add to a group, by name of the type."""
     specs = {}
-    for entry in installed(group):
+    for entry in installed_types(group):
         with contextlib.suppress(BrokenPlugin):
             specs[entry.name] = entry.load()
     return specs
 
 
-def entries(group: str) -> tuple[Entry, ...]:
+def all_types(group: str) -> tuple[RegisteredType, ...]:
     """Return all types of a group: shipped types, then types of installed packages with other names."""
-    own = shipped(group)
+    own = shipped_types(group)
     names = {entry.name for entry in own}
-    return (*own, *(entry for entry in installed(group) if entry.name not in names))
+    return (*own, *(entry for entry in installed_types(group) if entry.name not in names))
 
 
-def find(group: str, name: str) -> Entry | None:
+def find_type(group: str, name: str) -> RegisteredType | None:
     """Return the type with this name; None if there is none. A shipped type has priority."""
-    own = next((entry for entry in shipped(group) if entry.name == name), None)
-    return own or next((entry for entry in installed(group) if entry.name == name), None)
+    own = next((entry for entry in shipped_types(group) if entry.name == name), None)
+    return own or next((entry for entry in installed_types(group) if entry.name == name), None)
 
 
-def unknown_groups() -> tuple[Entry, ...]:
+def unknown_groups() -> tuple[RegisteredType, ...]:
     """Return the entry points of installed packages in groups `simscen.…` that do not exist."""
     return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
 
 
-def entries_of(spec: type) -> tuple[Entry, ...]:
+def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
     """Return the types of installed packages whose specification is this class; () if simscen ships the class."""
     package = spec.__module__.partition(".")[0]
     if package == "simscen":
@@ -168,7 +168,7 @@ def entries_of(spec: type) -> tuple[Entry, ...]:
     return tuple(entry for entry in same_package if _has_spec(entry, spec))
 
 
-def _has_spec(entry: Entry, spec: type) -> bool:
+def _has_spec(entry: RegisteredType, spec: type) -> bool:
     """Return whether a type has this specification class; False if the type cannot be used."""
     try:
         return entry.load() is spec
@@ -177,13 +177,13 @@ def _has_spec(entry: Entry, spec: type) -> bool:
 
 
 @cache
-def _installed_entries() -> tuple[Entry, ...]:
+def _installed_entries() -> tuple[RegisteredType, ...]:
     """Return all types of installed packages, sorted by group, name, and package."""
     found = sorted(set(_read_entries()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
     return tuple(replace(entry, problem=entry.problem or _entry_problem(entry, found)) for entry in found)
 
 
-def _read_entries() -> Iterator[Entry]:
+def _read_entries() -> Iterator[RegisteredType]:
     """Yield the types of all packages on the search path. Later packages of the same name are ignored."""
     from importlib.metadata import distributions
 
@@ -201,11 +201,12 @@ def _read_entries() -> Iterator[Entry]:
         try:
             points = [(point.group, point.name, point.value) for point in package.entry_points]
         except (ValueError, TypeError, LookupError) as error:  # raised by importlib.metadata for damaged files
-            yield Entry("", "", "entry_points.txt", *owner, f"its entry_points.txt is damaged: {error}", folder)
+            problem = f"its entry_points.txt is damaged: {error}"
+            yield RegisteredType("", "", "entry_points.txt", *owner, problem, folder)
             continue
         for group, point, value in points:
             if group.startswith(ENTRY_POINT_PREFIX):
-                yield Entry(group.removeprefix(ENTRY_POINT_PREFIX), point, value, *owner, folder=folder)
+                yield RegisteredType(group.removeprefix(ENTRY_POINT_PREFIX), point, value, *owner, folder=folder)
 
 
 def _mentions_simscen(package: Distribution) -> bool:
@@ -228,7 +229,7 @@ def search_path() -> list[str]:
     return [folder for folder in sys.path if folder not in implicit - explicit]
 
 
-def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
+def _entry_problem(entry: RegisteredType, all_entries: list[RegisteredType]) -> str:
     """Return the reason why a type cannot be used, found without importing its package; "" if there is none."""
     group = GROUPS.get(entry.group)
     if group is None:
@@ -237,7 +238,7 @@ def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
         return "its name must start with a lowercase letter and consist of lowercase letters, digits, and `_`"
     if entry.name in group.reserved:
         return f"the name `{entry.name}` is reserved"
-    if any(own.name == entry.name for own in shipped(entry.group)):
+    if any(own.name == entry.name for own in shipped_types(entry.group)):
         return "simscen ships a type with the same name, which takes precedence"
     others = [other for other in all_entries if (other.group, other.name) == (entry.group, entry.name)]
     if len(others) > 1:
@@ -248,7 +249,7 @@ def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
 
 
 @cache
-def _load(entry: Entry) -> type[BaseModel]:
+def _load(entry: RegisteredType) -> type[BaseModel]:
     """Import and return the specification class of a type. Raises BrokenPlugin."""
     module, _, name = entry.value.partition(":")
     try:
@@ -266,7 +267,7 @@ def _load(entry: Entry) -> type[BaseModel]:
     return model  # type: ignore[return-value]
 
 
-def _specification_problem(entry: Entry, model: Any) -> str | None:
+def _specification_problem(entry: RegisteredType, model: Any) -> str | None:
     """Return the reason why `model` is not a valid specification class of the group; None if it is valid."""
     if model is None:
         return f"`{entry.value}` does not exist"

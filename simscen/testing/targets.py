@@ -19,7 +19,7 @@ from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec
 from simscen.model.robot import SensorSpec
 from simscen.model.stack_base import ControllerSpec, StackBase
-from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
+from simscen.spec.registry import GROUPS, BrokenPlugin, RegisteredType, find_type
 from simscen.stack.protocols import RobotModel
 from simscen.testing.contracts.base import Contract, Promise
 from simscen.testing.contracts.behavior import BehaviorContract
@@ -103,7 +103,7 @@ def _specification_classes(component: str) -> Sequence[Any]:
     """Return the specification classes of `package.module:Class`, or of all entry points with this name."""
     if ":" in component:
         return [specification_of(_import_class(component), component)]
-    entries = [entry for group in GROUPS if (entry := find(group, component)) is not None]
+    entries = [entry for group in GROUPS if (entry := find_type(group, component)) is not None]
     if not entries:
         raise InvalidTarget(
             f"{component}: no installed package adds anything of that name, and it is not package.module:Class"
@@ -111,7 +111,7 @@ def _specification_classes(component: str) -> Sequence[Any]:
     return [_load_entry(entry) for entry in entries]
 
 
-def _load_entry(entry: Entry) -> Any:
+def _load_entry(entry: RegisteredType) -> Any:
     try:
         return entry.load()
     except BrokenPlugin as broken:

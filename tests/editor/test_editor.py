@@ -24,7 +24,7 @@ from simscen.faults.base import AnyFault
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
-from simscen.spec.registry import GROUPS, entries
+from simscen.spec.registry import GROUPS, all_types
 from simscen.triggers.base import AnyCondition as Condition
 
 ROOT = Path(__file__).parents[2]
@@ -276,7 +276,7 @@ def test_each_type_is_offered_behind_type(server: LanguageServer) -> None:
     pages = [(group, Page(server, place.kind, place.before + "type: ")) for group, place in TYPED.items()]
     for group, page in pages:
         names = {topic.name for topic in topics() if topic.group == group}
-        names = {entry.name for entry in entries(group)} if group in GROUPS else names
+        names = {entry.name for entry in all_types(group)} if group in GROUPS else names
         assert names - page.offered(len(page.lines) - 1) == set(), group
 
 

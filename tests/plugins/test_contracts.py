@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.spec.registry import find
+from simscen.spec.registry import find_type
 from simscen.testing import promises_of
 from simscen.testing.targets import InvalidTarget, promises_of_target
 
@@ -18,7 +18,7 @@ VALUES = {
 
 @pytest.mark.parametrize(("kind", "name"), VALUES)
 def test_types_of_the_package_meet_their_contracts(yardwork, kind: str, name: str) -> None:
-    entry = find(kind, name)
+    entry = find_type(kind, name)
     assert entry is not None
     promises = promises_of(entry.load().model_validate(VALUES[kind, name]), name)
     assert len(promises) >= 2

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from simscen.run.process.isolation import plugin_path_arguments
-from simscen.spec.registry import Entry, installed
+from simscen.spec.registry import RegisteredType, installed_types
 
 ROOT = Path(__file__).parents[2]
 ISOLATED = (
     f"import sys; sys.path.insert(0, {str(ROOT)!r});"
     "from simscen.run.process.isolation import apply_plugin_path; apply_plugin_path(sys.argv[1]);"
-    "from simscen.spec.registry import installed;"
-    "print([(entry.version, entry.load().__module__) for entry in installed('criterion')], sys.path.index({0!r}))"
+    "from simscen.spec.registry import installed_types;"
+    "print([(entry.version, entry.load().__module__) for entry in installed_types('criterion')], sys.path.index({0!r}))"
 )
 
 
@@ -33,7 +33,7 @@ def test_no_package_folders_are_passed_without_package_types() -> None:
 
 
 def test_package_folders_are_appended_to_the_path(yardwork) -> None:
-    (argument,) = plugin_path_arguments(installed("criterion"))
+    (argument,) = plugin_path_arguments(installed_types("criterion"))
     found, index = isolated(argument, yardwork).rsplit(" ", 1)
     assert found == "[('1.2', 'yardwork.dwell')]"
     assert int(index) > 2
@@ -67,7 +67,7 @@ def test_working_folder_is_not_on_the_worker_path(yardwork, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
     (argument,) = plugin_path_arguments(
-        [Entry("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
+        [RegisteredType("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
     )
     assert str(tmp_path) not in json.loads(argument)["path"]
     assert str(yardwork) in json.loads(argument)["path"]
@@ -81,12 +81,13 @@ def test_pip_installs_the_same_files_as_the_fixture(tmp_path, yardwork) -> None:
     done = subprocess.run([*call, "--target", str(target), str(folder)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     code = (
-        "from simscen.spec.registry import GROUPS, installed; print(*(e.value for g in GROUPS for e in installed(g)))"
+        "from simscen.spec.registry import GROUPS, installed_types;"
+        "print(*(e.value for g in GROUPS for e in installed_types(g)))"
     )
     env = {**os.environ, "PYTHONPATH": f"{target}{os.pathep}{ROOT}"}
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env).stdout
     assert found.split() == [
         entry.value
         for group in ("criterion", "fault", "trigger", "action", "sensor", "metric")
-        for entry in installed(group)
+        for entry in installed_types(group)
     ]

@@ -332,7 +332,7 @@ def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
     """Yield the topics of the types that installed packages add to a group; nothing if `installed` is false."""
     if installed:
-        origins = {entry.name: entry.origin for entry in registry.installed(group)}
+        origins = {entry.name: entry.origin for entry in registry.installed_types(group)}
         for name, model in registry.installed_specs(group).items():
             yield replace(_topic(group, name, model), origin=origins[name])
 

@@ -13,7 +13,14 @@ import typer
 
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.core.errors import Exit
-from simscen.spec.registry import ENTRY_POINT_PREFIX, GROUPS, BrokenPlugin, Entry, installed, unknown_groups
+from simscen.spec.registry import (
+    ENTRY_POINT_PREFIX,
+    GROUPS,
+    BrokenPlugin,
+    RegisteredType,
+    installed_types,
+    unknown_groups,
+)
 
 INDENT = 6
 """Number of spaces before the description of a type."""
@@ -40,13 +47,13 @@ def command(format_: Annotated[Format, typer.Option("--format", help="Output for
     sys.exit(Exit.INCOMPLETE if any(row["broken"] for row in listed) else Exit.PASSED)
 
 
-def _entries_by_package() -> list[Entry]:
+def _entries_by_package() -> list[RegisteredType]:
     """Return the entry points of installed packages, sorted by package and then in the order of GROUPS."""
-    found = [entry for kind in GROUPS for entry in installed(kind)]
+    found = [entry for kind in GROUPS for entry in installed_types(kind)]
     return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
 
-def _row(entry: Entry) -> dict[str, Any]:
+def _row(entry: RegisteredType) -> dict[str, Any]:
     """Return the JSON data of one type. Its key `broken` is the reason why the type cannot be used; "" if it can."""
     text, broken, hint = "", "", ""
     try:

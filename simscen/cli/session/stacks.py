@@ -21,7 +21,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import REFERENCE, StackChoice
 from simscen.loading.stacks.userconfig import conflicting_stacks, undefined_stack
 from simscen.model.stack_files import ExternalStackSpec
-from simscen.spec.registry import entries, find
+from simscen.spec.registry import all_types, find_type
 
 YAML_SUFFIXES = (".yaml", ".yml")
 STACK_HELP = (
@@ -142,7 +142,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     if RunKey("", 1, stack_name=name.casefold()).is_repetition:
         raise UsageError(f"--stack {escaped(text)}: the name {quoted(name)} is reserved for second runs")
     value = value if equals else name
-    if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
+    if value == REFERENCE or (_NAME.fullmatch(value) and find_type("stack", value)):
         return StackChoice(name, value, type=value)
     if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML_SUFFIXES) and Path(value).is_file()):
         from simscen.loading.stacks.choice import load_stack_file
@@ -162,7 +162,7 @@ def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> Ext
     if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
         return known
     if not may_be_command:
-        names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
+        names = [REFERENCE, *(entry.name for entry in all_types("stack")), *stacks.config.spec.stacks]
         reason = f"{quoted(value)} is neither a stack type nor a name in {stacks.config.file}"
         hint = suggestion(value, dict.fromkeys(names))
         raise UsageError(f"cannot read --stack {escaped(text)}: expected NAME=VALUE; {reason}; {hint}")

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path, PurePath
 
 from simscen.core.cpu_kernels import kernel_variables
-from simscen.spec.registry import Entry, search_path
+from simscen.spec.registry import RegisteredType, search_path
 
 MAX_HEAD_BYTES = 1 << 20
 MAX_TAIL_BYTES = 1 << 18
@@ -208,7 +208,7 @@ def _parent(pid: int) -> int:
         return 0
 
 
-def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
+def plugin_path_arguments(plugins: Iterable[RegisteredType]) -> tuple[str, ...]:
     """Return the command-line argument for `apply_plugin_path` in a fork server; empty without plug-ins."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     if not used:

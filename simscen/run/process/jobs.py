@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.loading.loaded import LoadedScenario
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 _LENGTH = struct.Struct("<I")
 """Length in bytes of a pickled job, which precedes the job in a pipe."""
@@ -174,7 +174,10 @@ class Backend(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
+        self,
+        jobs: Iterable[Job],
+        plugins: Sequence[RegisteredType] = (),
+        should_continue: Callable[[], bool] = always_true,
     ) -> Iterator[JobUpdate]:
         """Execute jobs, several at a time, and yield their updates: exactly one Ended for each started job.
 

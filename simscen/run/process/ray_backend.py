@@ -33,7 +33,7 @@ from simscen.run.process.ray_node import (
     pack,
 )
 from simscen.run.reproducibility import source_digest
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 MAX_ATTEMPTS = 2
 """Largest number of attempts at a job whose runner or node is lost."""
@@ -99,7 +99,10 @@ class RayBackend:
         ray.shutdown()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
+        self,
+        jobs: Iterable[Job],
+        plugins: Sequence[RegisteredType] = (),
+        should_continue: Callable[[], bool] = always_true,
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Raises UsageError for an unusable cluster."""
         batch, start_time = _Batch(jobs, should_continue), time.monotonic()
@@ -153,7 +156,7 @@ class RayBackend:
         actor = actor.remote(workers, self._entry, ray.get)
         return _Runner(f"runner-{self._next_name}", node, address, actor, workers, actor.software.remote())
 
-    def _start(self, runner: _Runner, plugins: Sequence[Entry]) -> None:
+    def _start(self, runner: _Runner, plugins: Sequence[RegisteredType]) -> None:
         """Let a runner take jobs from the queue."""
         call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=MAX_UNREAD_UPDATES)
         runner.call = call.remote(self._queue, runner.name, list(plugins))
@@ -175,7 +178,9 @@ class RayBackend:
             self._files[path] = self._contents[digest]
         return self._files[path]
 
-    def _process_reply(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
+    def _process_reply(
+        self, runner: _Runner, batch: "_Batch", plugins: Sequence[RegisteredType]
+    ) -> Iterator[JobUpdate]:
         """Process the next reply of a runner. Raises UsageError if its version of simscen or a plug-in differs."""
         try:
             if not runner.is_ready:

@@ -22,7 +22,7 @@ from simscen.loading.plugins import requirement_of
 from simscen.run.process.jobs import Ended, ForkServerDeath, Job, ProcessEnd, Progressed, Started
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.reproducibility import source_digest
-from simscen.spec.registry import Entry, find
+from simscen.spec.registry import RegisteredType, find_type
 
 PACKAGE_FOLDER = Path(__file__).parents[2]
 """Folder of the installed package simscen, which can differ between machines."""
@@ -222,7 +222,7 @@ class NodeRunner:
         """Return the version of simscen on this node, and a digest of its code."""
         return __version__, source_digest()
 
-    def run(self, queue: Any, runner: str, plugins: Sequence[Entry]) -> Iterator[NodeUpdate]:
+    def run(self, queue: Any, runner: str, plugins: Sequence[RegisteredType]) -> Iterator[NodeUpdate]:
         """Run jobs from the queue until it is empty, and yield their updates and files.
 
         `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here.
@@ -271,9 +271,9 @@ def _file_chunks(job: Job) -> Iterator[FileChunk]:
                     yield FileChunk(job.number, name, data)
 
 
-def _installed_plugin(entry: Entry) -> Entry:
+def _installed_plugin(entry: RegisteredType) -> RegisteredType:
     """Return the plug-in as installed on this node. Raises UsageError if it is missing or has another version here."""
-    installed = find(entry.group, entry.name)
+    installed = find_type(entry.group, entry.name)
     required = requirement_of(entry)
     if installed is None or requirement_of(installed) != required:
         found = "it is not installed" if installed is None else f"{requirement_of(installed)} is installed"

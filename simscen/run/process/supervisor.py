@@ -27,7 +27,7 @@ from simscen.run.process.jobs import (
     always_true,
     pack_job,
 )
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 PIPE_BYTES = 1 << 16
 """Largest number of bytes that are written to or read from a pipe at once."""
@@ -159,7 +159,7 @@ class Supervisor:
     def __init__(self, workers: int, entry: Sequence[str]) -> None:
         """`entry` are the Python arguments that start the fork server, such as `-m module`."""
         self._workers, self._entry = workers, tuple(entry)
-        self._plugins: frozenset[Entry] = frozenset()
+        self._plugins: frozenset[RegisteredType] = frozenset()
         self._server: ForkServerProcess | None = None
         self._jobs: Iterator[Job] = iter(())
         self._should_continue: Callable[[], bool] = always_true
@@ -177,7 +177,10 @@ class Supervisor:
         self.close()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always_true
+        self,
+        jobs: Iterable[Job],
+        plugins: Sequence[RegisteredType] = (),
+        should_continue: Callable[[], bool] = always_true,
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Takes a job from `jobs` only when it can start."""
         if not self._plugins.issuperset(plugins):

@@ -111,7 +111,7 @@ def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> No
     shipped = {
         getattr(import_module(module), name)
         for group in ("localizer", "planner", "controller", "goal_checker", "behavior")
-        for module, name in (entry.value.split(":") for entry in registry.shipped(group))
+        for module, name in (entry.value.split(":") for entry in registry.shipped_types(group))
     }
     bases = {LocalizerSpec, PlannerSpec, ControllerSpec, GoalCheckerSpec, GoalTolerances}
     assert (sections | shipped | {Latency}) - bases <= output

@@ -11,7 +11,7 @@ from simscen.editor.document import EditedFile
 from simscen.editor.trial_run import Trial, TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always_true
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 TEXT = """\
 simscen: 1
@@ -33,7 +33,7 @@ class EndlessBackend:
         pass
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always_true
+        self, jobs: Iterable[Job], plugins: Sequence[RegisteredType] = (), go_on: Callable[[], bool] = always_true
     ) -> Iterator[JobUpdate]:
         (job,) = jobs
         job.folder.mkdir(parents=True)

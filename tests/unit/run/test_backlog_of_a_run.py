@@ -10,7 +10,7 @@ from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 SCENARIO = """\
 simscen: 1
@@ -48,7 +48,7 @@ class Lag:
 def test_moments_are_recorded_immediately_if_a_run_has_plugins(tmp_path: Path, others: bool) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(SCENARIO)
-    package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
+    package = RegisteredType("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(prepare(load_scenario(file, tmp_path)), plugins=(package,) if others else ())
     lag = Lag()
     run = simulate(prepared, attach=lag.attach)

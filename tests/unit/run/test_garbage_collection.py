@@ -9,7 +9,7 @@ import pytest
 from simscen.loading.scenario import load_scenario
 from simscen.run import simulate
 from simscen.run.preparation import prepare
-from simscen.spec.registry import Entry
+from simscen.spec.registry import RegisteredType
 
 SCENARIO = """\
 simscen: 1
@@ -41,7 +41,7 @@ def test_garbage_collection_threshold_is_not_changed_if_a_run_has_plugins(
 
     monkeypatch.setattr(simulate, "simulate", stop)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
+    package = RegisteredType("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(
         prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
     )

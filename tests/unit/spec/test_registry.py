@@ -7,33 +7,41 @@ import simscen.plugin
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
-from simscen.spec.registry import GROUPS, BrokenPlugin, entries, find, installed, shipped, unknown_groups
+from simscen.spec.registry import (
+    GROUPS,
+    BrokenPlugin,
+    all_types,
+    find_type,
+    installed_types,
+    shipped_types,
+    unknown_groups,
+)
 from simscen.triggers.base import Trigger
 
 
 def test_shipped_types_are_listed_first_and_installed_ones_by_name(packages, calm_module) -> None:
     packages("zeta", "2.0", {"criterion": {"zen": "calm:Calm"}}, calm=calm_module)
     packages("alpha", "1.0", {"criterion": {"calm": "calm:Calm"}})
-    names = [entry.name for entry in entries("criterion")]
-    own = [entry.name for entry in shipped("criterion")]
+    names = [entry.name for entry in all_types("criterion")]
+    own = [entry.name for entry in shipped_types("criterion")]
     assert own[:3] == ["goals_reached", "result", "error_code"]
     assert names == [*own, "calm", "zen"]
-    assert [entry.origin for entry in installed("criterion")] == ["alpha 1.0", "zeta 2.0"]
+    assert [entry.origin for entry in installed_types("criterion")] == ["alpha 1.0", "zeta 2.0"]
 
 
 def test_shipped_and_installed_types_are_loaded_the_same_way(packages, calm_module) -> None:
     packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
     for name, wanted in (("calm", "Calm"), ("speed", "Speed")):
-        entry = find("criterion", name)
+        entry = find_type("criterion", name)
         assert entry is not None
         assert entry.load().__name__ == wanted
-    assert find("criterion", "clam") is None
-    assert [find("criterion", name).is_shipped for name in ("calm", "speed")] == [False, True]
+    assert find_type("criterion", "clam") is None
+    assert [find_type("criterion", name).is_shipped for name in ("calm", "speed")] == [False, True]
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS.keys() - {"metric"}))  # what simscen measures has no parameters
 def test_shipped_types_are_valid_members_of_their_group(group: str) -> None:
-    for entry in shipped(group):
+    for entry in shipped_types(group):
         if (group, entry.name) != ("criterion", "whenever"):  # half of one, `then` is the other
             assert entry.load() is not None, entry
 
@@ -56,7 +64,7 @@ def test_shipped_types_are_valid_members_of_their_group(group: str) -> None:
 )
 def test_unusable_type_states_reason_and_package(packages, group, name, value, why, calm_module) -> None:
     packages("calm-driving", "1.0", {group: {name: value}}, calm=calm_module)
-    (entry,) = installed(group)
+    (entry,) = installed_types(group)
     with pytest.raises(BrokenPlugin) as broken:
         entry.load()
     assert why in str(broken.value)
@@ -67,20 +75,20 @@ def test_unusable_type_states_reason_and_package(packages, group, name, value, w
 def test_module_that_fails_during_import_is_a_broken_plugin(packages, text: str) -> None:
     packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=text)
     with pytest.raises(BrokenPlugin, match="`calm:Calm` cannot be loaded: "):
-        find("criterion", "calm").load()
+        find_type("criterion", "calm").load()
 
 
 def test_name_added_by_two_packages_is_unusable(packages, calm_module) -> None:
     packages("b", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
     packages("a", "2.0", {"criterion": {"calm": "calm:Calm"}})
     with pytest.raises(BrokenPlugin, match=r"added by a 2.0 \(calm:Calm\) and by b 1.0"):
-        find("criterion", "calm").load()
+        find_type("criterion", "calm").load()
 
 
 def test_packages_cannot_redefine_shipped_names(packages, calm_module) -> None:
     packages("calm", "1.0", {"criterion": {"speed": "calm:Calm"}}, calm=calm_module)
-    assert find("criterion", "speed").is_shipped
-    assert [entry.name for entry in entries("criterion")].count("speed") == 1
+    assert find_type("criterion", "speed").is_shipped
+    assert [entry.name for entry in all_types("criterion")].count("speed") == 1
 
 
 def test_unknown_groups_are_reported(packages, calm_module) -> None:
@@ -90,13 +98,13 @@ def test_unknown_groups_are_reported(packages, calm_module) -> None:
 
 def test_output_of_a_module_during_import_goes_to_stderr(packages, capsys, calm_module) -> None:
     packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module + "\nprint('hello')\n")
-    find("criterion", "calm").load()
+    find_type("criterion", "calm").load()
     assert capsys.readouterr() == ("", "hello\n")
 
 
 @pytest.mark.parametrize(("group", "choice"), [("trigger", Trigger), ("fault", FaultEntry), ("sensor", Sensor)])
 def test_modifiers_are_reserved_names(group: str, choice: type[Choice]) -> None:
-    beside = choice.known_keys() - {entry.name for entry in shipped(group)}
+    beside = choice.known_keys() - {entry.name for entry in shipped_types(group)}
     assert beside == set(GROUPS[group].reserved)
 
 
@@ -122,7 +130,7 @@ def test_damaged_installation_is_reported_and_hides_no_other(packages, calm_modu
     site = packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
     packages("wreck", "2.0", {})
     (site / "wreck-2.0.dist-info" / "entry_points.txt").write_bytes(text.encode("latin-1"))
-    assert find("criterion", "calm").load().__name__ == "Calm"
+    assert find_type("criterion", "calm").load().__name__ == "Calm"
     output = [(stranger.distribution, stranger.problem.partition(":")[0]) for stranger in unknown_groups()]
     assert output == ([("wreck", "its entry_points.txt is damaged")] if "simscen." in text else [])
 
@@ -130,7 +138,7 @@ def test_damaged_installation_is_reported_and_hides_no_other(packages, calm_modu
 def test_incomplete_installation_without_a_name_is_usable(packages, calm_module) -> None:
     site = packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
     (site / "calm-1.0.dist-info" / "METADATA").unlink()
-    (entry,) = installed("criterion")
+    (entry,) = installed_types("criterion")
     assert (entry.origin, entry.load().__name__) == ("an unnamed package", "Calm")
 
 
