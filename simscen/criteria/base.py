@@ -1,4 +1,4 @@
-"""Base classes of criteria and of the metrics of plug-ins, and the specification that selects a plug-in's metric."""
+"""Base classes of criteria (Criterion) and of plug-in metrics (Measure), and the entry of `metrics`."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Measure(ABC):
 
 
 class AnyMeasure(Choice):
-    """Metric of an installed plug-in, selected by its key."""
+    """Entry of `metrics`: a metric of an installed plug-in, selected by its key."""
 
     group: ClassVar[str] = "metric"
 

@@ -1,4 +1,4 @@
-"""Nav2's error codes in specifications and in recorded events."""
+"""Nav2's error codes as values of YAML keys, and as data of recorded events."""
 
 from __future__ import annotations
 

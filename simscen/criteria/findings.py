@@ -1,10 +1,10 @@
-"""Functions that create findings: results of checks of one bound.
+"""Functions that create findings, the results of checks of one bound: passed, failed, or inconclusive.
 
 Common parameters:
 
 - `what`: measured quantity, e.g. "path_length".
 - `value`, `limit`: measured value and its limit in `unit`. `measured` is a measured value as text.
-- `at`: the trace, and the tick that decided the finding; None if the finding does not belong to a tick.
+- `at`: the trace and the tick that decided the finding; None if no single tick decided it.
 - `context`: text after the limit, e.g. "after lidar.off".
 - `detail`: lines that explain a failure.
 """
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 class InvalidTrace(ValueError):
-    """The trace contains invalid values, such as nan. No criterion can be judged."""
+    """The trace contains invalid values, such as nan, so that a criterion cannot be judged."""
 
 
 class MissingEvidence(ValueError):
-    """The trace lacks data that a criterion needs. The criterion is inconclusive."""
+    """The trace lacks data that a criterion needs, so that the criterion is inconclusive."""
 
 
 def at_most(
@@ -67,7 +67,7 @@ def counted(
     at: tuple[Trace, int] | None = None,
     detail: Sequence[str] = (),
 ) -> list[Finding]:
-    """Return one finding for each bound of a number of events: the minimum `low` and the maximum `high`.
+    """Return one finding for each bound on a number of events: for the minimum `low`, and for the maximum `high`.
 
     A bound of None is not checked. `noun` is the name of one event, e.g. "collision".
     """

@@ -1,4 +1,4 @@
-"""Outcome of each goal of a run, as the robot reported it."""
+"""Outcome of each goal of a run as reported by the robot: reached, passed, failed, canceled, or none."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _GOAL_END_KINDS = (*_ARRIVAL_KINDS, EventKind.GOAL_FAILED, EventKind.GOAL_CANCEL
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """Outcome of a goal, as the robot reported it.
+    """Outcome of one goal, as reported by the robot.
 
     `accepted` is the tick at which the robot accepted the goal; None if it did not. `end` is the event that ended the
     goal; None if the goal did not end. `failure` is the failure that the scenario expects: "failed", or the name of an
@@ -82,7 +82,7 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
         GoalOutcome(goal, *_nth(reports.get(goal.name, []), earlier[k]), case.expected.get(goal.name, ""))
         for k, goal in enumerate(case.goals)
     ]
-    found = [_with_outcome_of_drive(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
+    found = [_with_outcome_of_next_stop(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
     for goal in case.sent:
         own = reports.get(goal.name, [])
         # A sent goal may preempt several poses of one drive at the same tick.
@@ -119,10 +119,10 @@ def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[Goal
     return int(poses.ticks[is_in_drive][k]), float(distances[k])
 
 
-def _with_outcome_of_drive(
+def _with_outcome_of_next_stop(
     outcome: GoalOutcome, later: list[GoalOutcome], reports: Mapping[str, list[_Report]]
 ) -> GoalOutcome:
-    """Return the outcome. For a via pose without reports, it is that of the next goal at which the robot stops."""
+    """Return the outcome; for a via pose without reports, the outcome of the next goal at which the robot stops."""
     stop = next((each for each in later if not each.goal.via), None)
     if not outcome.goal.via or outcome.goal.name in reports or stop is None or stop.end is None:
         return outcome
@@ -131,7 +131,7 @@ def _with_outcome_of_drive(
 
 
 def _earlier_uses(names: list[str]) -> list[int]:
-    """Return for each name how often it occurs earlier in the list."""
+    """Return how often each name occurs earlier in the list."""
     uses: dict[str, int] = {}
     counts = []
     for name in names:

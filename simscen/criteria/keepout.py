@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     DistanceFunction = Callable[[Array], Array]
 
-RESOLUTION_M = 0.005
-"""Accuracy of the smallest distance."""
+ACCURACY_M = 0.005
+"""Accuracy with which the smallest distance is computed."""
 
 
 class Keepout(Spec, Criterion):
@@ -120,7 +120,7 @@ class Keepout(Spec, Criterion):
 def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
     """Return the smallest signed distance in m along the driven path, and its tick. Teleportation does not count.
 
-    Intervals between two samples are bisected as long as they may contain a distance that is smaller by RESOLUTION_M.
+    An interval between two samples is bisected while it may contain a distance that is smaller by more than ACCURACY_M.
     """
     # While no point of the robot moves by more than d, the distance changes by at most d.
     radius = max(math.hypot(x, y) for x, y in case.footprint or POINT)
@@ -131,7 +131,7 @@ def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: Dist
     begin, end = states[:-1][driven], states[1:][driven]
     while len(begin):
         moved = np.hypot(*(end - begin)[:, :2].T) + radius * np.abs(end[:, 2] - begin[:, 2])
-        may_improve = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - RESOLUTION_M
+        may_improve = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - ACCURACY_M
         begin, end = begin[may_improve], end[may_improve]
         middle = (begin + end) / 2
         middle[:, 3] = distances(middle[:, :3])

@@ -1,4 +1,4 @@
-"""Specification of an entry of `pass`, with all criteria by key."""
+"""Specification of an entry of `pass`, with one field for each criterion."""
 
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal

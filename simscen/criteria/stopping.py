@@ -1,4 +1,4 @@
-"""The criteria `stopped_within` (the robot stopped when it had to) and `stuck` (it made progress otherwise)."""
+"""The criteria `stopped_within` (the robot stopped in time) and `stuck` (the robot was never stuck)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 STALE_SCAN_S = 0.2
-"""Age of the newest scan above which findings call the robot blind: two periods of a 10 Hz lidar."""
+"""Age of the newest scan above which the text of a finding calls the robot blind: two periods of a 10 Hz lidar."""
 
 
 class StoppedWithin(Spec, Criterion):

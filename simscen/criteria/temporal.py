@@ -86,8 +86,9 @@ class Eventually(WindowedCriterion):
 class Until(Release, TemporalCriterion):
     """The condition `hold` is true until the condition `release` becomes true, which must happen within the window.
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin at one sample
-        is the smallest distance of `release` at this sample and of `hold` before. The best sample counts.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. For each
+        sample, take the smallest of the distance of `release` at this sample and the distances of `hold` before it. The
+        margin is the largest of these minima.
     When it fails: `release` was not true in the window, or `hold` was false before `release` became true.
     Why this: only this criterion can require an order, for example that a robot does not move before it is localized.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.

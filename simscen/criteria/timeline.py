@@ -62,7 +62,7 @@ def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
 
 
 def end_reason(trace: Trace) -> str:
-    """Return as text why the run ended, or that the log is truncated."""
+    """Return as text why the run ended; for a truncated log, that the log stops."""
     ends = trace.of_kind(EventKind.RUN_ENDED)
     return ends[-1].name if ends else "the log stops there"
 
@@ -96,7 +96,7 @@ def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) 
 def clip_samples(samples: Samples, first: int, last: int) -> Samples:
     """Return the samples from tick `first` to `last`, with samples at these two ticks.
 
-    Added samples have the values of the newest sample. Nothing is added outside the time of `samples`.
+    Added samples repeat the sample before. None is added before the first or after the last of `samples`.
     """
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
@@ -105,10 +105,10 @@ def clip_samples(samples: Samples, first: int, last: int) -> Samples:
 
 
 def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
-    """Return the first tick from which a state lasts for at least `hold` ticks, and whether there is such a tick.
+    """Return the first tick from which a state is true for at least `hold` ticks, and True.
 
-    `is_true` contains the state at each of the `ticks`; the last state lasts until the tick `end`. If the state never
-    lasts that long, the returned tick is the start of its last period; None if the last state is False.
+    `is_true` contains the state at each of the `ticks`; the last state lasts until the tick `end`. If the state is
+    never true that long, return False, with the start of the period that lasts until `end`, or None without one.
     """
     begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
     breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """Criterion that checks a condition at the start of the run."""
+    """Criterion whose condition must be true at the start of the run. Its temporal operators cover later times."""
 
     @abstractmethod
     def all_comparisons(self) -> list[Condition]:
@@ -119,7 +119,7 @@ def _detail_lines(trace: Trace, formula: str, witness: Witness) -> tuple[str, ..
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the common unit of the compared signals; "" if all have a `scale`, None if they are not comparable."""
+    """Return the common unit of the compared signals; "" if all have a `scale`, None if their units differ."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""

@@ -1,4 +1,4 @@
-"""Text of conditions, and of the values that decide them, for reports."""
+"""Text for reports: conditions, and the measured values that decide them."""
 
 from __future__ import annotations
 

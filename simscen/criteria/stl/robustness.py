@@ -30,7 +30,7 @@ TIE_MARGIN = sys.float_info.min
 """Magnitude of the robustness if a signal equals its limit. The sign is positive for `>=` and `<=`."""
 
 HOLD_VIOLATED, RESPONSE_DUE = "`hold` was false", "the response was due"
-"""Texts of `Witness.notes`."""
+"""Texts in `Witness.notes`."""
 
 Bound = Literal["low", "high"]
 """Lower or upper bound of the robustness."""
@@ -60,14 +60,14 @@ class Robustness:
     """Lower and upper bound (n,) of the robustness of a condition at each sample.
 
     The bounds differ where something is unknown, such as the time after the last sample. A condition is decided at a
-    sample if both bounds have the same sign. There is a subclass for each operator.
+    sample if both bounds have the same sign, and certainly true if both are positive. Each operator has a subclass.
     """
 
     low: Array
     high: Array
 
     def bound(self, bound: Bound) -> Array:
-        """Return the array `low` or `high`."""
+        """Return the array of a bound."""
         return self.low if bound == "low" else self.high
 
     def witness(self, sample: int, bound: Bound) -> Witness:
@@ -193,7 +193,7 @@ class ResponseRobustness(Robustness):
 
     @property
     def may_be_tested(self) -> bool:
-        """Whether the premise was true at a sample, or may have become true after the last sample."""
+        """Whether the premise was true at a sample, or may have been true if the run had continued."""
         return bool((self.premise.high[self.premise_samples] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
@@ -286,7 +286,7 @@ def windowed_robustness(
 def until_robustness(
     hold: Condition, release: Condition, window: Window, context: EvaluationContext, begin: int = 0
 ) -> Robustness:
-    """Return the robustness of "`hold` until `release`", with a release in a window. For `begin`, see `robustness`."""
+    """Return the robustness of "`hold` until `release`" with the release in `window`. For `begin`, see `robustness`."""
     windows = context.sample_windows(window)
     holds, releases = robustness(hold, context, begin), robustness(release, context, _start(windows, begin))
     low, high = (
@@ -336,11 +336,12 @@ def _start(windows: SampleWindows, begin: int) -> int:
 
 
 def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
-    """Return for each bound the assumption about the time after the last sample."""
+    """Return each bound with its assumption about the time after the last sample."""
     return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
 
 
 def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Robustness:
+    """Return the robustness of `all` or `any` with the robustness of its operands."""
     extremum = np.minimum if operator == "all" else np.maximum
     low, high = reduce(extremum, [part.low for part in parts]), reduce(extremum, [part.high for part in parts])
     return _BooleanRobustness(low, high, parts)

@@ -1,6 +1,6 @@
 """Readers of signals: distances from the robot to objects, points, goals, pedestrians, and its plan.
 
-Unless stated otherwise, functions return one distance in m per sample of the truth (n,).
+Unless stated otherwise, functions return one distance (n,) in m for each sample of the truth.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def distance_remaining(query: SignalQuery) -> Array:
         raise SignalUnavailable("no belief was recorded")
     believed = belief.at(clock)[:, :2]
     remaining = goal_distance(query)
-    for first, last, points in _plans(query.trace, clock):
+    for first, last, points in _newest_plans(query.trace, clock):
         remaining[first:last] = _project_on_path(believed[first:last], points)[1]
     return remaining
 
@@ -100,7 +100,7 @@ def plan_deviation(query: SignalQuery) -> Array:
     """
     poses = true_poses(query.trace)
     deviation = np.zeros(len(poses))
-    plans = _plans(query.trace, query.trace.truth.ticks)
+    plans = _newest_plans(query.trace, query.trace.truth.ticks)
     if not plans:
         raise SignalUnavailable("no plan was recorded")
     for first, last, points in plans:
@@ -108,14 +108,14 @@ def plan_deviation(query: SignalQuery) -> Array:
     return deviation
 
 
-def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
+def _newest_plans(trace: Trace, ticks: Ticks) -> list[tuple[int, int, Array]]:
     """Return the plans, each with the range of samples at which it was the newest plan.
 
-    A tuple contains the first sample, the sample after the last one, and the points (m, 2) of the plan.
+    A tuple contains the index of the first sample, the index after the last sample, and the points (m, 2) of the plan.
     """
     plans = [plan for plan in trace.plans if len(plan.points)]
-    begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
-    ends = [*begins, len(clock)][1:]
+    begins: list[int] = np.searchsorted(ticks, [plan.tick for plan in plans]).tolist()
+    ends = [*begins, len(ticks)][1:]
     followed = [k for k, end in enumerate(ends) if begins[k] < end]
     return [(begins[k], ends[k], plans[k].points[:, :2]) for k in followed]
 

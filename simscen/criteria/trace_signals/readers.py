@@ -66,17 +66,17 @@ def yaw_rate(query: SignalQuery) -> Array:
 
 def acceleration(query: SignalQuery) -> Array:
     """Return the change of the speed over ground since the previous sample, per time, in m/s²."""
-    return _differences(query.trace, ground_speed(query), 1)
+    return _finite_difference(query.trace, ground_speed(query), 1)
 
 
 def angular_acceleration(query: SignalQuery) -> Array:
     """Return the change of the yaw rate since the previous sample, per time, in rad/s²."""
-    return _differences(query.trace, yaw_rate(query), 1)
+    return _finite_difference(query.trace, yaw_rate(query), 1)
 
 
 def jerk(query: SignalQuery) -> Array:
     """Return the magnitude of the jerk in m/s³: |v[k+1] - 2 v[k] + v[k-1]| / dt² of the speed over ground v."""
-    return np.abs(_differences(query.trace, ground_speed(query), 2))
+    return np.abs(_finite_difference(query.trace, ground_speed(query), 2))
 
 
 def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
@@ -164,13 +164,13 @@ def time(query: SignalQuery) -> Array:
 
 def command_speed(query: SignalQuery) -> Array:
     """Return the commanded speed in m/s; 0 before the first command."""
-    command = _commanded(query.trace)
+    command = _newest_command(query.trace)
     return np.hypot(command[:, 0], command[:, 1])
 
 
 def command_turn_rate(query: SignalQuery) -> Array:
     """Return the magnitude of the commanded turn rate in rad/s; 0 before the first command."""
-    return np.abs(_commanded(query.trace)[:, 2])
+    return np.abs(_newest_command(query.trace)[:, 2])
 
 
 def in_region(query: SignalQuery) -> Array:
@@ -184,7 +184,9 @@ def in_region(query: SignalQuery) -> Array:
 def in_collision(query: SignalQuery) -> Array:
     """Return whether the robot touches something, or the object of the query."""
     return _as_numbers(
-        _between(query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with"))
+        _mask_between_events(
+            query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with")
+        )
     )
 
 
@@ -198,13 +200,15 @@ def goal_active(query: SignalQuery) -> Array:
         EventKind.NAVIGATION_ENDED,
         EventKind.GOAL_ACCEPTED,
     )
-    return _as_numbers(_between(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal")))
+    return _as_numbers(_mask_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal")))
 
 
 def recovery_active(query: SignalQuery) -> Array:
     """Return whether the recovery behavior of the query, or any recovery behavior, is active."""
     return _as_numbers(
-        _between(query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery"))
+        _mask_between_events(
+            query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery")
+        )
     )
 
 
@@ -213,29 +217,31 @@ def is_active(query: SignalQuery) -> Array:
     intervals = [
         (span.start, span.end + (not span.has_end_event)) for span in spans(query.trace, _label(query.arguments))
     ]
-    return _as_numbers(_flags(query.trace, intervals))
+    return _as_numbers(_interval_mask(query.trace, intervals))
 
 
 def has_just_started(query: SignalQuery) -> Array:
     """Return whether the fault or event of the query has started since the previous sample."""
     starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
-    return _as_numbers(_flags(query.trace, starts))
+    return _as_numbers(_interval_mask(query.trace, starts))
 
 
 def collision_count(query: SignalQuery) -> Array:
     """Return the number of contacts that have begun so far."""
-    return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.COLLISION_STARTED)])
+    return _count_until_samples(query.trace, [event.tick for event in query.trace.of_kind(EventKind.COLLISION_STARTED)])
 
 
 def replan_count(query: SignalQuery) -> Array:
     """Return the number of plans that were made so far for another reason than a new goal."""
     plans = query.trace.of_kind(EventKind.PLAN_MADE)
-    return _count(query.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"])
+    return _count_until_samples(
+        query.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"]
+    )
 
 
 def recovery_count(query: SignalQuery) -> Array:
     """Return the number of recoveries that have started so far."""
-    return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
+    return _count_until_samples(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
 
 
 def true_poses(trace: Trace) -> Array:
@@ -257,7 +263,7 @@ def _covariance(trace: Trace) -> Array:
     return sample_and_hold(trace, belief, "belief")[:, 3:]
 
 
-def _commanded(trace: Trace) -> Array:
+def _newest_command(trace: Trace) -> Array:
     """Return the newest command (n, 3): vx, vy (m/s) and wz (rad/s); zeros before the first command."""
     clock, command = sample_ticks(trace), check_samples(trace.command, "the command", trace)
     if not len(command):
@@ -265,7 +271,7 @@ def _commanded(trace: Trace) -> Array:
     return np.where((clock >= command.ticks[0])[:, np.newaxis], command.at(clock), 0.0)
 
 
-def _differences(trace: Trace, values: Array, order: int) -> Array:
+def _finite_difference(trace: Trace, values: Array, order: int) -> Array:
     """Return the first or second time derivative (n,) of `values` (n,), computed by finite differences.
 
     `order` is 1 or 2. Unevenly spaced values are resampled. Teleportation does not count as a change.
@@ -321,7 +327,7 @@ def _label(arguments: SignalArguments) -> str:
     return str(arguments.get("fault") or arguments["event"])
 
 
-def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
+def _mask_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
     """Return a mask (n,) of the samples between each event of the kind `start` and the next event that ends it.
 
     `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
@@ -335,7 +341,7 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
                 e.tick for e in trace.of_kind(*ends) if _is_end(e.kind, e.name, event.name) and e.tick > event.tick
             )
             intervals.append((event.tick, next(later, np.inf)))
-    return _flags(trace, intervals)
+    return _interval_mask(trace, intervals)
 
 
 def _is_end(kind: EventKind, name: str, started: str) -> bool:
@@ -343,7 +349,7 @@ def _is_end(kind: EventKind, name: str, started: str) -> bool:
     return name == started or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
-def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
+def _interval_mask(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
     """Return a mask (n,) of the samples in intervals from `start` to before `end`, both in ticks.
 
     An interval without a sample selects the next sample.
@@ -361,7 +367,7 @@ def _as_numbers(flags: Flags) -> Array:
     return flags.astype(np.float64)
 
 
-def _count(trace: Trace, ticks: list[int]) -> Array:
+def _count_until_samples(trace: Trace, ticks: list[int]) -> Array:
     """Return the number (n,) of `ticks` up to each sample."""
     return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), sample_ticks(trace), side="right").astype(
         np.float64
