@@ -58,7 +58,7 @@ class _Neighbors(NamedTuple):
 
 
 class Crowd:
-    """All pedestrians of a world, sorted by name. Their motion uses no random numbers."""
+    """All pedestrians of a world, sorted by name, and their motion, which uses no random numbers."""
 
     def __init__(self, walls: WallMap, plan_path: PathPlanner = plan_straight_path) -> None:
         self._walls, self._plan_path = walls, plan_path
@@ -107,7 +107,7 @@ class Crowd:
         walls = self._walls.nearest_points(positions)
         external = self._external_forces(people, reacting, intents, positions, velocities, surroundings, walls)
         moves, after = _integrate(intents, positions, velocities, external, seconds)
-        allowed = clip_moves(moves, self._limits(people, positions, surroundings, walls))
+        allowed = clip_moves(moves, self._move_limits(people, positions, surroundings, walls))
         clipped = (allowed != moves).any(axis=1)
         after[clipped] = allowed[clipped] / seconds
         for person, move, velocity, intent in zip(people, allowed, after, intents, strict=True):
@@ -119,7 +119,10 @@ class Crowd:
     def _reactions(
         self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
-        """Begin and end reactions to robots. Return the robot that each pedestrian reacts to (or None), and actions."""
+        """Begin and end reactions to robots.
+
+        Returns the robot that each pedestrian reacts to, or None, and the beginnings and ends as actions.
+        """
         reacting: list[ObservedRobot | None] = []
         actions: list[PedestrianAction] = []
         for person in people:
@@ -217,7 +220,7 @@ class Crowd:
         force = forces.wall_forces(away / distance[:, np.newaxis], distance - radii[person])
         return _sum_by_person(person, force, len(people))
 
-    def _limits(
+    def _move_limits(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> list[MoveLimits]:
         """Return limits of the moves of one step that prevent contact.
@@ -256,7 +259,7 @@ def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, su
 def _interactions(
     people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings
 ) -> npt.NDArray[np.bool_]:
-    """Return a matrix of whether a pedestrian (row) evades a pedestrian or robot (column) by social forces.
+    """Return whether each pedestrian (row) evades each pedestrian or robot (column) by social forces.
 
     The columns are all pedestrians, followed by all robots.
     """
@@ -318,7 +321,7 @@ def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
 
 
 def _nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
-    """Return the index of the nearest point for each pair of a pedestrian and a solid.
+    """Return the index of the nearest of the given points for each pair of a pedestrian and a solid.
 
     Point k belongs to the solid `solid[k]` and is `distance[k]` m away from the pedestrian `person[k]`.
     """

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians.forces import Indices
 
-CELL_M = 1.0
-"""Size of the grid cells for which nearby walls are cached."""
+WALL_CELL_M = 1.0
+"""Size of the grid cells for which the nearby wall segments are cached."""
 OBSTACLE_RANGE_M = 1.2
 """Distance from the center of a pedestrian within which walls and objects act on it."""
 SIGHT_CELL_M = 0.1
@@ -24,7 +24,7 @@ SIGHT_MARGIN_M = 0.3
 NearestPoints = tuple[Indices, Indices, Array]
 """Indices of pedestrians (k,), indices of solids (k,), and points (k, 2) in m on wall segments of these solids.
 
-Each row is the point of one nearby segment that is nearest to one pedestrian.
+Each row is the nearest point of one nearby wall segment to one pedestrian.
 """
 
 
@@ -89,7 +89,7 @@ class WallMap:
 
         Includes all segments within OBSTACLE_RANGE_M of a pedestrian, and some segments a little farther away.
         """
-        cells = np.floor(points / CELL_M).astype(np.int64).tolist()
+        cells = np.floor(points / WALL_CELL_M).astype(np.int64).tolist()
         candidates = [self._segments_near(column, row) for column, row in cells]
         point_index = np.repeat(np.arange(len(points)), [len(each) for each in candidates])
         segment_index = np.concatenate(candidates) if candidates else np.empty(0, dtype=np.int64)
@@ -100,10 +100,10 @@ class WallMap:
         )
 
     def _segments_near(self, column: int, row: int) -> Indices:
-        """Return the indices of segments that may be within OBSTACLE_RANGE_M of any point of a cell of CELL_M."""
+        """Return the indices of segments that may be within OBSTACLE_RANGE_M of any point of a cell of WALL_CELL_M."""
         if (column, row) not in self._segments_by_cell:
-            low = np.array([column, row]) * CELL_M
-            outside = np.maximum(np.maximum(self._low - low - CELL_M, low - self._high), 0.0)
+            low = np.array([column, row]) * WALL_CELL_M
+            outside = np.maximum(np.maximum(self._low - low - WALL_CELL_M, low - self._high), 0.0)
             self._segments_by_cell[column, row] = np.flatnonzero(
                 np.hypot(outside[:, 0], outside[:, 1]) <= OBSTACLE_RANGE_M
             )

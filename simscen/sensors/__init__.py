@@ -1,1 +1,1 @@
-"""Simulated sensors: lidar, wheel odometry, IMU, bumper, and camera, each with its own noise."""
+"""Simulated sensors: lidar, wheel odometry, and IMU with noise, and bumper and camera without noise."""

@@ -91,7 +91,7 @@ class PluginSensor:
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
     def _fail(self, problem: str) -> NoReturn:
-        """Raise RunError."""
+        """Raise RunError with the name of the sensor and the problem."""
         raise RunError(BROKEN_COMPONENT, f"{self._label} {problem}")
 
     @property

@@ -18,7 +18,8 @@ Kinematics = Callable[[EncoderIncrement], Displacement]
 """Returns the displacement for an encoder increment."""
 Variances = tuple[float, float, float]
 """Variances of the errors of a displacement: forward (m²), left (m²), and turn (rad²)."""
-_new = tuple.__new__  # creates a named tuple without the call overhead of its class
+_new = tuple.__new__
+"""Creates a named tuple without the call overhead of its class."""
 
 
 class WheelOdometrySensor:

@@ -1,4 +1,4 @@
-"""Interface of sensors, their constructor arguments, and random numbers for their noise."""
+"""Interface of sensors, what they are constructed from, and random numbers for their noise."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -58,7 +58,7 @@ class SensorView(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """Second argument of each sensor's constructor, after the sensor's specification.
+    """What a sensor is constructed from, besides its specification. Second argument of each sensor's constructor.
 
     name:     name of the sensor in the robot's file, which is also in its readings
     period:   time between two readings in ticks
