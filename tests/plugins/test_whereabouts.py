@@ -84,7 +84,7 @@ def test_pip_installs_the_same_files_as_the_fixture(tmp_path, yardwork) -> None:
         "from simscen.spec.registry import GROUPS, installed_types;"
         "print(*(e.value for g in GROUPS for e in installed_types(g)))"
     )
-    env = {**os.environ, "PYTHONPATH": f"{target}{os.pathep}{ROOT}"}
+    env = {**os.environ, "PYTHONPATH": f"{target}{os.pathsep}{ROOT}"}
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env).stdout
     assert found.split() == [
         entry.value
