@@ -95,8 +95,8 @@ def is_same_pose(first: Pose2, second: Pose2) -> bool:
 def _perform_plugin_action(action: Action, stage: Stage, origin: str) -> Effect:
     """Perform an action of a plugin and return its effect.
 
-    Raises RunError if the effect is not valid, or if it states a change but the action changed nothing. `origin` is
-    the end of the message, which names the plugin.
+    Raises RunError if the effect is not valid, or if it states a change but the action changed nothing. The error
+    message ends with `origin`, which names the plugin.
     """
     observed = _ObservedStage(stage)
     effect: object = action.perform(cast(Stage, observed))

@@ -88,7 +88,7 @@ class _WalkSettings(Spec):
             pose=pose,
             goals=goals,
             repeat=self.repeat,
-            speed=self.speed or _draw_speed(stage.rng(f"{_stream_owner(name, group)}, speed")),
+            speed=self.speed or _draw_speed(stage.rng(f"{_stream_prefix(name, group)}, speed")),
             radius=self.radius,
             height=self.height,
             behavior=self.behavior,
@@ -99,8 +99,8 @@ class _WalkSettings(Spec):
         )
 
 
-def _stream_owner(name: str, group: str | None) -> str:
-    """Return the prefix for names of random streams, from the group or, if `group` is None, from the person."""
+def _stream_prefix(name: str, group: str | None) -> str:
+    """Return the prefix of the names of a person's random streams. The members of a group share their streams."""
     return f"person {name}" if group is None else f"group {group}"
 
 
@@ -174,7 +174,7 @@ class Crowd(_WalkSettings, WorldAction):
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
         """Return a random free point of the start region for the person with this index; None if none was found.
 
-        The point is near `group_start`, the start of the group's first member. None: the person is the first member.
+        The point is near `group_start`, where the first member of the group starts. For the first member, it is None.
         """
         rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
         if group_start is None:
@@ -191,7 +191,7 @@ class Crowd(_WalkSettings, WorldAction):
         name, group = self.names[index], None
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
-        rng = stage.rng(f"{_stream_owner(name, group)}, goals")
+        rng = stage.rng(f"{_stream_prefix(name, group)}, goals")
         drawn = [_draw_goal(stage, rng, stage.region(region), self.radius) for region in self.goals]
         goals = tuple(goal for goal in drawn if goal is not None)
         if len(goals) < len(drawn):

@@ -64,6 +64,8 @@ class Slip(Spec, Fault):
 
 
 class _SlippingWheels(OdometryDistortion):
+    """Effect of `slip`."""
+
     changes_motion = True
 
     def __init__(self, slip: Slip, separation: float) -> None:
@@ -119,6 +121,8 @@ class Gain(Spec, Fault):
 
 
 class _ScaledCommands(FaultEffect):
+    """Effect of `gain`."""
+
     def __init__(self, gain: Gain, separation: float) -> None:
         self._gain, self._separation = gain, separation
 
@@ -170,6 +174,8 @@ class Saturation(Spec, Fault):
 
 
 class _LimitedCommands(FaultEffect):
+    """Effect of `saturation`."""
+
     def __init__(self, spec: Saturation, setting: FaultSetting) -> None:
         self._spec, self._setting = spec, setting
         self._previous: tuple[int, Twist] | None = None
@@ -238,6 +244,8 @@ class LowBattery(Spec, Fault):
 
 
 class _DrainingBattery(FaultEffect):
+    """Effect of `low_battery`."""
+
     def __init__(self, spec: LowBattery, setting: FaultSetting) -> None:
         self._spec, self._setting, self._start_tick = spec, setting, setting.now()
 

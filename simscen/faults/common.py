@@ -1,4 +1,4 @@
-"""Helpers of several faults: change lidar and camera distances, localizer corrections, and odometry."""
+"""Helpers for several faults: change distances of lidars and cameras, the localizer's correction, or odometry."""
 
 from abc import abstractmethod
 from collections.abc import Callable

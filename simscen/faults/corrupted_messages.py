@@ -56,6 +56,8 @@ class Garbage(Spec, Fault):
 
 
 class _RandomGarbage(FaultEffect):
+    """Effect of `garbage`."""
+
     def __init__(self, rng: np.random.Generator, garbage: Garbage) -> None:
         self._rng, self._garbage = rng, garbage
 
@@ -113,7 +115,7 @@ class Stuck(Spec, Fault):
 
 
 class _RepeatedMessage(FaultEffect):
-    """Repeats the first message that it receives or, if `command` is given, that command."""
+    """Effect of `stuck`. Repeats the first message that it receives, or `command` if it is given."""
 
     def __init__(self, command: Twist | None) -> None:
         self._command = command

@@ -43,6 +43,8 @@ class Delay(Spec, Fault):
 
 
 class _DelayedMessages(FaultEffect):
+    """Effect of `delay`."""
+
     def __init__(self, rng: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
         self._rng, self._delay, self._setting = rng, delay, setting
         self._readings, self._commands = _LatencyQueue[Reading](), _LatencyQueue[Twist]()

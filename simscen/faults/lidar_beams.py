@@ -33,6 +33,8 @@ class BeamDropout(Spec, Fault):
 
 
 class _LostBeams(FaultEffect):
+    """Effect of `beam_dropout`."""
+
     def __init__(self, rng: np.random.Generator, probability: float) -> None:
         self._rng, self._probability = rng, probability
 
@@ -71,6 +73,8 @@ class Sector(Spec, Fault):
 
 
 class _BlindSector(FaultEffect):
+    """Effect of `sector`."""
+
     def __init__(self, first: float, width: float) -> None:
         self._first, self._width = first, width
 
@@ -104,6 +108,8 @@ class RangeLimit(Spec, Fault):
 
 
 class _LimitedRange(FaultEffect):
+    """Effect of `range_limit`."""
+
     def __init__(self, max_range: float) -> None:
         self._max_range = max_range
 
@@ -150,6 +156,8 @@ class Ghost(Spec, Fault):
 
 
 class _GhostHits(FaultEffect):
+    """Effect of `ghost`."""
+
     def __init__(self, rng: np.random.Generator, ghost: Ghost) -> None:
         self._rng, self._ghost = rng, ghost
 

@@ -46,6 +46,8 @@ class Glass(Spec, Fault):
 
 
 class _TransparentObjects(FaultEffect):
+    """Effect of `glass`."""
+
     def __init__(self, rng: np.random.Generator, glass: Glass, setting: FaultSetting) -> None:
         self._rng, self._glass, self._simulator = rng, glass, setting.simulator
 
@@ -63,10 +65,10 @@ class Rain(Spec, Fault):
     """Rain weakens the returned light and adds range noise: distant or dark objects disappear (inf).
 
     At a rain rate of R mm/h, the extinction coefficient is α = 0.01 R^0.6 per meter. A surface with reflectivity ρ at
-    range z returns the fraction ρ exp(-2 α z) / z² of the light. The lidar detects the surface if this fraction is at
-    least that of a surface with 90 % reflectivity at its maximum range in clear air. Range errors have the standard
-    deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson, Predicting the influence of rain on
-    lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use `dust`.
+    range z returns the fraction ρ exp(-2 α z) / z² of the light. The lidar detects the surface if at least as much
+    light returns as from a surface with 90 % reflectivity at the lidar's maximum range in clear air. Range errors have
+    the standard deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson, Predicting the influence of
+    rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use `dust`.
 
     Example: `{sensor: lidar, rain: {rate: 25 mm/h, reflectivity: 50 %}}`
     """
@@ -88,6 +90,8 @@ class Rain(Spec, Fault):
 
 
 class _RainAttenuation(FaultEffect):
+    """Effect of `rain`."""
+
     def __init__(self, rng: np.random.Generator, rain: Rain) -> None:
         self._rng, self._rain = rng, rain
         self._relative_std = 0.02 * float((1 - np.exp(-rain.rate / MM_PER_HOUR)) ** 2)
@@ -129,6 +133,8 @@ class Dust(Spec, Fault):
 
 
 class _Particles(FaultEffect):
+    """Effect of `dust`."""
+
     def __init__(self, rng: np.random.Generator, mean_free_path: float) -> None:
         self._rng, self._mean_free_path = rng, mean_free_path
 

@@ -45,6 +45,8 @@ class Jump(Spec, Fault):
 
 
 class _ShiftedBelief(FaultEffect):
+    """Effect of `jump`."""
+
     def __init__(self, jump: Pose2) -> None:
         self._jump = jump
         self._error: Pose2 | None = None
@@ -79,6 +81,8 @@ class Shift(Spec, Fault):
 
 
 class _ShiftedMap(FaultEffect):
+    """Effect of `shift`."""
+
     def __init__(self, shift: Pose2) -> None:
         self._shift = shift
 
@@ -105,6 +109,8 @@ class Outdated(Spec, Fault):
 
 
 class _EditedMap(FaultEffect):
+    """Effect of `outdated`."""
+
     def __init__(self, spec: Outdated) -> None:
         self._spec = spec
 

@@ -22,7 +22,7 @@ MESSAGE_KINDS = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"
 
 
 class _MessageLoss(FaultEffect):
-    """Base class of effects that drop readings and commands."""
+    """Base class of effects that drop readings and commands. `is_lost` decides for each message."""
 
     def __init__(self) -> None:
         self._correction: Pose2 | None = None
@@ -55,6 +55,8 @@ class Off(Spec, Fault):
 
 
 class _Silence(_MessageLoss):
+    """Effect of `off`."""
+
     def is_lost(self) -> bool:
         return True
 
@@ -83,6 +85,8 @@ class Dropout(Spec, Fault):
 
 
 class _RandomLoss(_MessageLoss):
+    """Effect of `dropout`."""
+
     def __init__(self, rng: np.random.Generator, probability: float) -> None:
         super().__init__()
         self._rng, self._probability = rng, probability
@@ -112,6 +116,8 @@ class Intermittent(Spec, Fault):
 
 
 class _GilbertChannel(_MessageLoss):
+    """Effect of `intermittent`."""
+
     def __init__(self, rng: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
         super().__init__()
         self._rng, self._spec, self._setting = rng, spec, setting
@@ -156,6 +162,8 @@ class Slow(Spec, Fault):
 
 
 class _RateLimit(_MessageLoss):
+    """Effect of `slow`."""
+
     def __init__(self, rate: float, setting: FaultSetting) -> None:
         super().__init__()
         self._period_ticks, self._now = setting.clock.rate / rate, setting.now

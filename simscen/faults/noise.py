@@ -26,7 +26,7 @@ from simscen.spec.quantities import (
 
 
 class Noise(Spec, Fault):
-    """Gaussian noise in addition to that of the sensor: a failing or badly shielded sensor, vibration, poor light.
+    """Additional Gaussian noise: a failing or badly shielded sensor, vibration, poor light.
 
     Noisy ranges stay within the range limits of the lidar. Odometry errors grow with the square root of the driven
     distance and turn, and therefore do not depend on the message rate. On the localizer, each estimated pose has an
@@ -65,6 +65,8 @@ class Noise(Spec, Fault):
 
 
 class _NoisyValues(FaultEffect):
+    """Effect of `noise` on a lidar, camera, IMU, or the localizer."""
+
     def __init__(self, rng: np.random.Generator, noise: Noise) -> None:
         self._rng, self._noise = rng, noise
 
@@ -97,6 +99,8 @@ class _NoisyValues(FaultEffect):
 
 
 class _NoisyOdometry(OdometryDistortion):
+    """Effect of `noise` on odometry."""
+
     def __init__(self, rng: np.random.Generator, noise: Noise, setting: FaultSetting) -> None:
         super().__init__()
         self._rng, self._noise, self._clock = rng, noise, setting.clock

@@ -68,6 +68,8 @@ class Bias(Spec, Fault):
 
 
 class _BiasedOdometry(OdometryDistortion):
+    """Effect of `bias` on odometry."""
+
     def __init__(self, bias: Bias) -> None:
         super().__init__()
         self._bias = bias
@@ -78,6 +80,8 @@ class _BiasedOdometry(OdometryDistortion):
 
 
 class _BiasedReadings(FaultEffect):
+    """Effect of `bias` on a lidar, IMU, or camera."""
+
     def __init__(self, bias: Bias) -> None:
         self._bias = bias
 
@@ -115,6 +119,8 @@ class Scale(Spec, Fault):
 
 
 class _ScaledOdometry(OdometryDistortion):
+    """Effect of `scale` on odometry."""
+
     def __init__(self, factor: float) -> None:
         super().__init__()
         self._factor = factor
@@ -124,6 +130,8 @@ class _ScaledOdometry(OdometryDistortion):
 
 
 class _ScaledReadings(FaultEffect):
+    """Effect of `scale` on a lidar, IMU, or camera."""
+
     def __init__(self, factor: float) -> None:
         self._factor = factor
 
@@ -168,6 +176,8 @@ class Drift(Spec, Fault):
 
 
 class _DriftingOdometry(OdometryDistortion):
+    """Effect of `drift` on odometry."""
+
     def __init__(self, drift: Drift, setting: FaultSetting) -> None:
         super().__init__()
         self._drift, self._clock = drift, setting.clock
@@ -182,6 +192,8 @@ class _DriftingOdometry(OdometryDistortion):
 
 
 class _DriftingValues(FaultEffect):
+    """Effect of `drift` on a lidar, IMU, camera, or the localizer."""
+
     def __init__(self, drift: Drift, setting: FaultSetting) -> None:
         self._drift, self._setting, self._start_tick = drift, setting, setting.now()
         self._start_pose: Pose2 | None = None
@@ -243,6 +255,8 @@ class Extrinsic(Spec, Fault):
 
 
 class _WrongPose(FaultEffect):
+    """Effect of `extrinsic`."""
+
     def __init__(self, error: Pose3, setting: FaultSetting) -> None:
         self._error, self._simulator = error, setting.simulator
 
