@@ -88,14 +88,6 @@ UNFINISHED_KINDS = frozenset({"interrupted", "not-run"})
 """Error kinds of runs that were not finished. `last_failed` uses the outcome of such a run in an earlier session."""
 
 
-@dataclass(frozen=True)
-class LastFailed:
-    """Output folder of the newest session, and all runs whose latest outcome is a failure or an error."""
-
-    folder: Path
-    runs: frozenset[RunKey]
-
-
 def sessions_in(folder: Path) -> list[Path]:
     """Return the session output folders in `folder`, newest first, without symbolic links such as `latest`."""
     if not folder.is_dir():
@@ -108,7 +100,7 @@ def sessions_in(folder: Path) -> list[Path]:
     )
 
 
-def last_failed(folder: Path) -> LastFailed | None:
+def last_failed(folder: Path) -> frozenset[RunKey] | None:
     """Return the runs whose latest outcome is bad, from the sessions in `folder`; None if there are no sessions."""
     sessions = sessions_in(folder)
     if not sessions:
@@ -119,7 +111,7 @@ def last_failed(folder: Path) -> LastFailed | None:
         for key, good in _outcomes(session):
             outcomes[key.original] = outcomes.get(key.original, True) and good
         known = {**outcomes, **known}
-    return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
+    return frozenset(key for key, good in known.items() if not good)
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:

@@ -155,21 +155,21 @@ RUN_ALL = "all selected scenarios run"
 def failed_runs(
     scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path | None
 ) -> tuple[frozenset[RunKey] | None, str]:
-    """Return the runs of these scenarios that failed in the last session, and a message for the user.
+    """Return the runs of these scenarios that failed when they last ran, and a message for the user.
 
-    The runs are None if there is no last session, or no such run. The last session is searched in the parent folder of
+    The runs are None if there is no earlier session, or no such run. Sessions are searched in the parent folder of
     `out`, the output folder, or in simscen-out if `out` is None. If the options set seeds, other seeds do not count.
     """
     sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
-    last = last_failed(sessions_folder)
-    if last is None:
+    failed = last_failed(sessions_folder)
+    if failed is None:
         return None, f"there is no earlier session in {sessions_folder}: {RUN_ALL}"
-    if not last.runs:
-        return None, f"nothing failed in the last session, {last.folder}: {RUN_ALL}"
+    if not failed:
+        return None, f"no run in {sessions_folder} failed when it last ran: {RUN_ALL}"
     selected = {(scenario.title, scenario.stack_name): scenario for scenario in scenarios if scenario.spec.skip is None}
-    found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
-    missing = len(last.runs) - len(found)
-    text = f"{number_with_noun(len(last.runs), 'run')} failed in the last session"
+    found = frozenset(key for key in failed if _is_selected(key, selected.get((key.test, key.stack_name)), options))
+    missing = len(failed) - len(found)
+    text = f"{number_with_noun(len(failed), 'run')} failed when last run"
     if not found:
         return None, f"{text}, but none is selected: {RUN_ALL}"
     return found, text + (f": {len(found)} selected, {missing} not" if missing else "")

@@ -35,16 +35,16 @@ def test_only_failed_runs_are_repeated(simscen, project: Path) -> None:
     assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
     assert len(runs_of(project)) == 3
     ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed in the last session\n")
+    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed when last run\n")
     assert runs_of(project) == [("b", 1, "failed"), ("c", 1, "failed")]
     (project / "b.scenario.yaml").write_text(ROOM)
     (project / "new.scenario.yaml").write_text(FAILING)
     (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
     ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed in the last session: 1 selected, 1 not\n")
+    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed when last run: 1 selected, 1 not\n")
     assert runs_of(project) == [("b", 1, "passed")]
     ended = simscen("run", "a.scenario.yaml", "--lf")
-    assert ended.err == "simscen: 1 run failed in the last session, but none is selected: all selected scenarios run\n"
+    assert ended.err == "simscen: 1 run failed when last run, but none is selected: all selected scenarios run\n"
     assert runs_of(project) == [("a", 1, "passed")]
 
 
@@ -61,7 +61,7 @@ def test_failed_run_keeps_its_seed(simscen, project: Path) -> None:
 def test_sessions_are_searched_next_to_the_output_folder(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", "--out", "ci/1")
     ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
-    nothing = f"simscen: nothing failed in the last session, {project}/ci/1: all selected scenarios run\n"
+    nothing = f"simscen: no run in {project}/ci failed when it last ran: all selected scenarios run\n"
     assert (ended.code, ended.err) == (0, nothing)
 
 
