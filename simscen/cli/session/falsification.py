@@ -12,9 +12,10 @@ from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import JunitFamily, Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
 from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Format, Screen, open_screen
-from simscen.core.errors import Exit, InvalidInput, Problem
+from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.verdict import Status
@@ -93,7 +94,7 @@ Failures with equal signatures count as the same failure. The square is None for
 def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     """Run a search, write its reports and the failing scenarios, and return the exit code and the search.
 
-    Raises InvalidInput and UsageError.
+    Raises InvalidInput, UsageError, and NothingSelected.
     """
     falsification = Falsification(request)
     require_writable_junit(request.junit, request.out, [request.file])
@@ -214,6 +215,9 @@ class Falsification:
         if isinstance(loaded, list):
             self._problems = loaded
             return None
+        require_not_skipped(loaded)
+        if loaded.spec.expected is not None:
+            raise UsageError(f"{self._request.file} is marked with `expected`; remove it to search for failures")
         checked, problems = self._checker.check_variation(
             loaded.with_changes(variation=name, varied_values=variation.values)
         )

@@ -11,15 +11,15 @@ from itertools import count, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from simscen.cli.diagnostics import as_text, escaped, print_text
+from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
 from simscen.cli.session.run_session import open_output_folder
-from simscen.cli.session.selection import Selection, load_selection
+from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
 from simscen.cli.session.stacks import external_commands
 from simscen.cli.session.terminal import Format, Screen, open_screen
-from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
+from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
@@ -122,8 +122,7 @@ class _StudySession:
         first_number = None if self._space is None else next(_allowed_numbers(self._space, request.file))
         scenario = self._load([first_number])[0]
         acceptance = scenario.spec.acceptance
-        if scenario.spec.skip is not None:
-            raise NothingSelected(f"{scenario.title} is marked with `skip`: {escaped(scenario.spec.skip)}")
+        require_not_skipped(scenario)
         if acceptance is not None:
             claim = acceptance.pass_rate
             self._claim = claim if request.runs is None else claim.model_copy(update={"runs": request.runs})

@@ -183,6 +183,8 @@ def test_random_search_without_a_failure_bounds_the_failure_rate(tmp_path: Path)
         (RANGES + "  pairwise: {seed: [1, 2]}\n", [], "only the ranges of `sampled` can be searched"),
         (RANGES + "  require: ['robot.pose.x > 7']\n", [], "meets the conditions in `require`"),
         (RANGES.replace("[3, 6]", "[-5, -4]"), [], "error[SC301]"),
+        (RANGES + "skip: later\n", [], "is marked with `skip`: later"),
+        (RANGES + "expected: {fail: known}\n", [], "is marked with `expected`; remove it to search for failures"),
         (RANGES, ["--method", "sobol", "--probability", "0.1"], "--probability needs --method random"),
     ],
 )
@@ -191,5 +193,5 @@ def test_unsearchable_scenario_is_an_error(
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + ranges)
     done = simscen("falsify", "a.scenario.yaml", *options)
-    assert done.code == 2
+    assert done.code == (5 if "skip" in ranges else 2)
     assert message in done.err
