@@ -1,4 +1,7 @@
-"""Comparison of measured ranges with the ranges that are expected in the static world (without objects to find)."""
+"""Comparison of the measured ranges of scans with the ranges that are expected in the static world.
+
+The static world has walls and known obstacles, but not the objects that the reconstruction has to find.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Sca
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
-"""Tolerated difference between measured and expected range, for true poses and for estimated poses."""
+"""Tolerated difference between measured and expected range, if the poses of the drive are true or estimated."""
 BELIEVED_POSE_TOLERANCE_PER_M = 0.02
 """Additional tolerance for estimated poses per meter of range."""
 NOISE_SIGMAS = 4.0
@@ -63,13 +66,13 @@ class ComparedScans:
 
     @cached_property
     def is_short(self) -> Mask:
-        """Mask (n, beams) of beams that end before the static world, by more than the tolerance."""
+        """Mask (n, beams) of beams that end before the static world by more than the tolerance."""
         with np.errstate(invalid="ignore"):
             return self.is_hit & (self.scans.ranges < self._nearest - self.tolerance)
 
     @cached_property
     def passes_through(self) -> Mask:
-        """Mask (n, beams) of beams that end behind the static world, or return nothing although it is in range."""
+        """Mask (n, beams) of beams that end behind a wall, or return nothing although a wall is in range."""
         with np.errstate(invalid="ignore"):
             behind = self.is_hit & (self.scans.ranges > self._farthest + self.tolerance)
         return behind | (self.is_missing & (self._farthest + self.tolerance < self.scans.range_max))

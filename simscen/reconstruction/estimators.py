@@ -1,4 +1,4 @@
-"""Runs all estimators on a recorded drive. They find faults, objects, pedestrians, kidnappings, and incidents."""
+"""Runs all estimators on a recorded drive: they find faults, objects, pedestrians, kidnappings, and incidents."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from simscen.run.live_world.pedestrians import PedestrianMap
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world. In longer drives, every second, third, … scan is used."""
 SENSORS = ("lidar", "odom", "imu")
-"""Sensor names that the estimators use as targets of faults. The names in the robot file can differ."""
+"""Names of sensors in the faults that the estimators return. The names in the robot file can differ."""
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
 """Disturbances that no estimator looks for, as part of a message to the user."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
@@ -53,8 +53,8 @@ def run_estimators(
 ) -> EstimatedParts:
     """Return all parts of a scenario that the estimators find in a drive.
 
-    `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are robots
-    whose poses are in the log. Their hits in the scans are not reported as objects.
+    `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are the
+    other robots in the log. Scans of these robots are not reported as objects.
     """
     unknowns = [NEVER_ESTIMATED]
     is_calibrated = drive.has_true_poses and not is_map_built
@@ -80,7 +80,7 @@ def run_estimators(
 def _with_sensor_names_of_robot(
     faults: list[FoundFault], robot: RobotProperties, unknowns: list[str]
 ) -> list[FoundFault]:
-    """Return the faults with the sensor names of the robot file. Faults of missing sensors become `unknowns`."""
+    """Return the faults with the sensor names of the robot file. A fault of a missing sensor becomes an unknown."""
     if not robot.sensors:
         return faults
     found = []

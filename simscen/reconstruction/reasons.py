@@ -40,7 +40,7 @@ class FoundFault:
     """Fault that an estimator found in a log.
 
     Attributes:
-        target: Faulty part: a sensor such as "lidar", "odom", or "imu", or "wheels", "cmd_vel", or "localizer".
+        target: Faulty part: a sensor ("lidar", "odom", "imu"), "wheels", "cmd_vel", or "localizer".
         kind: YAML key of the fault, for example "off".
         values: Parameters of the fault by YAML key.
         begin: Start in s; None for the start of the drive.

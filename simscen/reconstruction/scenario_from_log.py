@@ -83,8 +83,9 @@ def _write_valid(
 ) -> tuple[ScenarioContents, EstimatedParts]:
     """Write the scenario without objects and faults that make it invalid, such as an object inside the robot.
 
-    An invalid pedestrian first becomes a scripted object. Other problems are added to the unknowns. Return the written
-    contents and the remaining parts. Raise InvalidInput if the scenario cannot be loaded.
+    An invalid pedestrian first becomes a scripted object. Omitted parts and remaining problems are added to the
+    unknowns, which the file lists for the user. Return the written contents and the remaining parts. Raise InvalidInput
+    if the scenario cannot be loaded.
     """
     while True:
         contents = scenario_contents(drive, given, estimated, name, log.name)
@@ -117,7 +118,7 @@ def _write_valid(
 
 
 def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
-    """Return the parts without the faults that the problems are about. Raise InvalidInput if there are none."""
+    """Return the parts without the faults that the problems mention. Raise InvalidInput if they mention no fault."""
     refusals = "\n".join(problem.message for problem in problems)
     refused = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
     if not refused:

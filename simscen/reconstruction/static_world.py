@@ -18,7 +18,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 MAP_WALL_HEIGHT_M = 1.0
 """Height of the walls that are made from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
-"""Distance to walls of points outside of the map."""
+"""Result of `StaticWorld.distance_to_walls` for points outside of the map."""
 
 
 class StaticWorld:
@@ -76,8 +76,8 @@ def offset_poses(poses: Array, offset: Pose2) -> Array:
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
     """Return the ends (n, beams, 2) of beams with `ranges` (n, beams) in m, in the same frame as `poses` (n, 3).
 
-    `poses` are those of the lidar, and `angles` (beams,) are in rad relative to it. The end of a beam is not finite if
-    its range is not.
+    `poses` are poses of the lidar. `angles` (beams,) are the directions of the beams in rad, relative to the lidar.
+    Beams without a finite range have no finite end.
     """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):

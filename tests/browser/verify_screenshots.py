@@ -9,8 +9,8 @@ from screenshots import IMAGES, ROOT, browser, save
 
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
-from simscen.reconstruction.verifying.comparison import compare_with_run
-from simscen.reconstruction.verifying.page import verification_page
+from simscen.reconstruction.verification.comparison import compare_with_run
+from simscen.reconstruction.verification.page import verification_page
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 

@@ -146,7 +146,7 @@ class GlobalSearch:
     def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
         """Factor, nearness table, free table, and mask of the coarse cells that contain a free cell.
 
-        A coarse cell consists of `factor` x `factor` map cells. Its values are the maxima of the values of these cells.
+        A coarse cell consists of `factor` x `factor` map cells, and has the largest of their values.
         """
         factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape

@@ -26,8 +26,8 @@ MAX_SLIP_DIFFERENCE = 0.1, 0.5
 """Largest difference that wheel slip can cause between motions by scan matching and by odometry: in m, and as a share
 of the motion by odometry. If both limits are exceeded, the scans show people who walk next to the robot."""
 KNOWN_STEP_STD_M = 0.012
-"""Maximum standard deviation of a motion by scan matching that the scans determine. If it is larger, as in a corridor
-that looks the same everywhere, odometry has determined the motion, and the excess counts as a systematic error."""
+"""If the standard deviation of a motion by scan matching is larger, as in a uniform corridor, odometry and not the
+scans determined the motion. The excess counts as a systematic error."""
 NO_NOISE: CovarianceTriangle = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Process noise of zero for `propagate_covariance`."""
 

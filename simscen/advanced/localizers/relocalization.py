@@ -1,7 +1,7 @@
 """Relocalization: detects that the particle filter is lost, and searches the map for the robot's pose.
 
 All distances driven include rotations (scan_memory.METERS_PER_RAD). Scores of poses are from GlobalSearch.score. The
-lead of a pose is its score minus the next best score, its gain is its score minus the score of the current pose.
+lead of a pose is its score minus the next best score. Its gain is its score minus the score of the current pose.
 """
 
 import math

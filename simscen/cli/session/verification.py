@@ -18,8 +18,8 @@ from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, RunError
 from simscen.reconstruction.scenario_from_log import Reconstruction
-from simscen.reconstruction.verifying.comparison import Verification, compare_with_run
-from simscen.reconstruction.verifying.page import verification_page
+from simscen.reconstruction.verification.comparison import Verification, compare_with_run
+from simscen.reconstruction.verification.page import verification_page
 
 PAGE_SUFFIX = ".verified.html"
 """Suffix of the file name of the page, after the name of the scenario."""

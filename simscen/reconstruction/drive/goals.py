@@ -1,4 +1,4 @@
-"""Finds the goals of a drive in a log, and cuts off the part of the drive before the first goal.
+"""Finds the goals of a drive in a log, and cuts off the time before the first goal.
 
 Goals are read from goal messages. Without goal messages, goals are the ends of plans. Without plans, goals are the
 stops and bends of the driven path.
@@ -145,7 +145,7 @@ def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 
 
 MIN_IDLE_S = 1.0
-"""Minimum time before the first goal that is cut off."""
+"""Minimum time before the first goal for cutting this time off."""
 LEAD_S = 0.5
 """Time to keep before the first motion, if goals are derived from the motion."""
 

@@ -41,7 +41,8 @@ class DriveOptions:
     """Options for reading a log.
 
     Attributes:
-        truth: Topic of the ground truth; "none" to ignore the ground truth; None for the default of simscen's logs.
+        truth: Topic of the ground truth; "none" to ignore the ground truth; None to use the ground truth of a simscen
+            log, and none in other logs.
         topics: Topics by role such as "odom", for roles whose topic is not the default.
         robot: Robot whose messages are read, in a simscen log with several robots.
     """
@@ -52,7 +53,10 @@ class DriveOptions:
 
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
-    """Read the drive from the first goal on in an MCAP file or a rosbag2 folder. Raises InvalidInput if unusable."""
+    """Read the drive in an MCAP file or a rosbag2 folder, from the first goal on.
+
+    Raises InvalidInput if the log is unusable.
+    """
     with unusable_log_as_invalid_input(path):
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
@@ -79,6 +83,7 @@ class _DriveReader:
             self._notes.append("the log is truncated; the scenario covers what it holds")
 
     def drive(self) -> RecordedDrive:
+        """Return the entire drive."""
         odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
         belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
         poses, source, is_truth = self._poses(odometry, belief)
@@ -118,6 +123,7 @@ class _DriveReader:
         return int(offset)
 
     def _seconds(self, logged: int) -> float:
+        """Convert a log time in ns to s since the start."""
         return (logged - self._start) / NS_PER_SECOND
 
     def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
@@ -186,6 +192,7 @@ class _DriveReader:
         return tree
 
     def _scans(self) -> Scans | None:
+        """Return the scans of the lidar frame with the most scans; None without scans."""
         messages = self._messages.of("scan")
         if not messages:
             return None

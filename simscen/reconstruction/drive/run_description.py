@@ -75,6 +75,7 @@ def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
 
 
 def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Array]]:
+    """Yield the entries of RunDescription.other_robots for all robots except `robot`."""
     for name, log in recorded.robots.items():
         if name != robot:
             truth, case = log.trace.truth, log.header.case

@@ -41,7 +41,8 @@ SMOOTHING_S = 0.5
 MIN_LIMIT_FALL_M_S = 0.05
 """Minimum decrease of the speed limit during the drive that is reported as a low battery."""
 MIN_ERROR_DECREASE = 0.02
-"""Minimum decrease by a lag of the mean squared difference between command and motion, in variances of the command."""
+"""Minimum decrease of the mean squared difference between command and motion for finding a lag, in variances of the
+command."""
 MIN_COMMAND_STD = 0.05
 """Minimum standard deviation of a commanded velocity, in m/s or rad/s, for estimating the lag."""
 
@@ -184,7 +185,7 @@ def _limit_or_gain(times: Array, commanded: Array, driven: Array) -> Iterator[Fo
 
 
 def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
-    """Fit a speed limit that first falls linearly and then is constant to `speeds` (n,) at `times` (n,).
+    """Fit a speed limit to `speeds` (n,) at `times` (n,) that first falls linearly and then is constant.
 
     Return the limit at time 0, the final limit, the time at which the fall ends, and the standard deviation.
     """

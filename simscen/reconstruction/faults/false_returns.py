@@ -30,7 +30,8 @@ MIN_FALSE_FRACTION = 0.015
 JUMP_M = 0.3
 """Minimum difference between the ranges of neighbor beams that end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""Number of beams beside a ghost at which the ghost must not be visible, and maximum range difference of one object."""
+"""Number of beams beside a ghost at which the ghost must not be visible, and maximum range difference between beams on
+one object."""
 MIN_GHOST_FRACTION = 0.3
 """Minimum fraction of the scans, from the first to the last scan with the ghost, that show the ghost."""
 MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS = 0.02, 2.0
@@ -109,7 +110,7 @@ def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
 
 
 def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
-    """Return whether the object at the range `distance` in the beams from `first` to `last` is usually wider.
+    """Return whether the object at the range `distance` is usually wider than the beams from `first` to `last`.
 
     `ranges` (n, beams) are nan for beams that do not end before the static world.
     """

@@ -25,8 +25,8 @@ ratio, the estimate starts at the nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
-"""Beams whose range differs by more from the expected range are ignored. While the mount is estimated, this limit is
-halved after each Gauss-Newton step, down to 0.1 m."""
+"""Difference between measured and expected range above which a beam is ignored. While the mount is estimated, this
+limit is halved after each Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
 """Minimum number of beams for estimating the mount."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)

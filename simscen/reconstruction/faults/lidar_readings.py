@@ -104,7 +104,7 @@ def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
         ):
             for first, last in runs:
                 blind[first : last + 1] = True
-                begin, stop = blind_sector(compared.scans.angles, first, last)
+                begin, stop = sector_limits_text(compared.scans.angles, first, last)
                 values = {"from": f"{begin} deg", "to": f"{stop} deg"}
                 if last >= len(blind):  # across the seam of a full circle
                     continue
@@ -119,7 +119,7 @@ def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
             )
 
 
-def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
+def sector_limits_text(angles: Array, first: int, last: int) -> tuple[str, str]:
     """Return the directions of two beams as text in degrees, with enough digits to tell neighbor beams apart."""
     spacing = float(np.degrees(abs(angles[1] - angles[0])))
     decimals = max(0, math.ceil(-math.log10(spacing)))
@@ -197,7 +197,7 @@ def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_k
 
 
 def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Window]:
-    """Return the time windows in which `mask` (n,) is true. A scan that is not usable counts as the previous one."""
+    """Return the time windows in which `mask` (n,) is true. An unusable scan has the value of the last usable scan."""
     held = mask.copy()
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
     held = held[newest] & usable[newest]

@@ -12,7 +12,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
-"""Minimum change of the error between two estimates, in position or heading, that counts as a jump."""
+"""Minimum change of the error of position or heading, from one estimate to the next, that counts as a jump."""
 MIN_OUTAGE_S, MIN_OUTAGE_PERIODS = 1.0, 6.0
 """Minimum duration of an outage to report: the larger of a time and a multiple of the period of the estimates."""
 MIN_CORRECTION_M_RAD = 1e-9
@@ -60,7 +60,7 @@ def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, index: int) -> Iterator[FoundFault]:
-    """Yield the jump of the poses `belief` (n, 3) at `index` if `belief` never returns to `truth` (n, 3)."""
+    """Yield the fault of a jump of the poses `belief` (n, 3) at `index` if they never return to `truth` (n, 3)."""
     begin, errors = float(drive.belief.times[index]), np.hypot(*(belief - truth)[:, :2].T)
     stays = float(errors[index:].min()) > MIN_JUMP_M and float(errors[:index].max()) < MIN_JUMP_M
     if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
@@ -116,5 +116,6 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
 
 
 def _distance(drive: RecordedDrive, begin: float, end: float) -> float:
+    """Return the straight distance in m, by odometry, between the positions at two times in s."""
     ends = drive.odometry.poses_at(np.array([begin, end]))
     return float(np.hypot(*(ends[1, :2] - ends[0, :2])))

@@ -20,8 +20,8 @@ MIN_GAP_PERIODS = 1.5
 MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
 """Minimum fraction, and minimum number, of lost messages to report."""
 MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
-"""Maximum difference, in periods, between a gap with lost messages and a multiple of the period, and minimum fraction
-of gaps that meet this limit."""
+"""Maximum difference, in periods, between a gap with lost messages and a multiple of the period. At least
+MIN_MULTIPLE_FRACTION of the gaps must meet this limit."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
 """Minimum delay to report: the larger of a number of periods and a time."""
 MIN_OUTAGES_INTERMITTENT = 3
@@ -114,6 +114,7 @@ def _slow_fault(target: str, times: Array, period: float, end: float) -> FoundFa
 
 
 def _is_regular(steps: Array) -> bool:
+    """Return whether the times between messages, `steps` (n,), are nearly equal."""
     return float(np.std(steps)) <= 0.15 * float(np.mean(steps))
 
 

@@ -23,10 +23,10 @@ MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
 MIN_SLIP_FRACTION, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
 """Minimum part of the rolled distance that is lost in a step with slip (fraction, m), and minimum duration of slip."""
 MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
-"""Minimum standard deviations after 1 m and after 1 rad to report."""
+"""Minimum standard deviations of the odometry after 1 m and after 1 rad to report."""
 MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
-"""Minimum difference between the lost fractions during slip and in the rest of the drive, and minimum rolled distance
-for computing a lost fraction."""
+"""Minimum difference between the lost fraction during slip and the lost fraction in the rest of the drive, and minimum
+rolled distance for computing a lost fraction."""
 REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
 """Maximum motion in a step at rest, and minimum number of steps at rest for estimating a drift."""
 LONG_FRACTION = 0.75
@@ -46,7 +46,7 @@ def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = F
     slip = list(_slip(steps, wheel_separation))
     yield from slip
     if not slip:
-        yield from _systematic(steps, skids)
+        yield from _systematic_faults(steps, skids)
 
 
 def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
@@ -102,7 +102,7 @@ def _follows_commands(steps: MotionSteps, window: Window) -> bool:
     return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
 
 
-def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
+def _systematic_faults(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
     """Yield faults of the whole drive: scale or bias by least squares, drift at rest, and noise."""
     measured, true = steps.measured, steps.true
     forward = _fit(true[:, :1], measured[:, 0])
@@ -211,7 +211,7 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     if len(times) < MIN_BINS:
         return
     bias = float(np.median(errors))
-    begin, end, slope, remaining = _ramp(times, errors)
+    begin, end, slope, remaining = _fit_ramp(times, errors)
     constant = float(np.sum((errors - errors.mean()) ** 2))
     scatter = math.sqrt(remaining / max(1, len(times) - 4))
     grown = abs(slope) * (end - begin)
@@ -243,7 +243,7 @@ def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     return edges[:-1][kept], total[kept] / count[kept], (np.diff(yaw) / BIN_S)[kept]
 
 
-def _ramp(times: Array, errors: Array) -> tuple[float, float, float, float]:
+def _fit_ramp(times: Array, errors: Array) -> tuple[float, float, float, float]:
     """Fit a ramp to `errors` (n,) in rad/s. Return start and end in s, slope in rad/s², and sum of squared errors."""
     best = (float(times[0]), float(times[-1]), 0.0, float(np.sum((errors - errors.mean()) ** 2)))
     stride = max(1, len(times) // 40)

@@ -20,9 +20,9 @@ MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
 """Maximum distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
 TRUE_WALL_DISTANCE_M = 0.12
-"""A hit that is nearer to a wall belongs to the wall. For true poses."""
+"""Distance from a wall below which a hit belongs to the wall, if the poses of the drive are true."""
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""The same for estimated poses: a constant, and an addition per m of range."""
+"""The same distance for estimated poses: a constant, and an addition per m of range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,10 @@ def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: b
 
 
 def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[ScanCluster]:
-    """Yield the clusters of `beams` (k,) of the scan `row`. In a scan of 360°, a cluster can contain both ends."""
+    """Yield the clusters of `beams` (k,) of the scan `row`.
+
+    In a scan of 360°, the first and the last beam can be in the same cluster.
+    """
     if len(beams) < MIN_HITS:
         return
     step = abs(float(compared.scans.angles[1] - compared.scans.angles[0])) if len(compared.scans.angles) > 1 else 0.0
@@ -106,7 +109,8 @@ def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[Sca
 
 
 FREE_MARGIN_M, MIN_VISIBLE_FRACTION = 0.25, 0.3
-"""Minimum distance of the end of a beam behind a free point, and minimum fraction of visible points in a scan."""
+"""Minimum distance from a free point to the end of the beam through it, and minimum fraction of visible points in a
+scan."""
 
 
 def fraction_seen_free(compared: ComparedScans, points: Array, rows: Indices) -> Array:

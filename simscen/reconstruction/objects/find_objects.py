@@ -21,7 +21,8 @@ from simscen.reconstruction.static_world import StaticWorld, offset_poses
 MIN_DISPLACEMENT_M = 0.4
 """Minimum displacement of a moving object."""
 MIN_FREED_FRACTION = 0.5
-"""Minimum fraction of a moving object's first hits that are free later, or of its farthest hits that were free."""
+"""An object has moved if more than this fraction of its first hits is free later, or of its farthest hits was free
+before."""
 SEEN_FREE_FRACTION = 0.6
 """Minimum fraction of an object's points through which beams pass while the object is absent."""
 COMPARED_CLUSTERS = 5
@@ -33,8 +34,7 @@ MERGE_DISTANCE_M = 0.3
 MIN_CLUSTERS_STANDING = 10
 """Minimum number of clusters of a standing object."""
 PART_MARGIN_M, PART_FRACTION = 0.15, 0.5
-"""Maximum distance from a known object, and minimum fraction of clusters within this distance, for a track that belongs
-to the known object."""
+"""A track is part of a known object if more than PART_FRACTION of its clusters are within PART_MARGIN_M of it."""
 MIN_SIZE_M = 0.06
 """Minimum length of the longest side, or of the radius, of an object."""
 MAX_OBJECT_SPEED_M_S = 4.0
@@ -84,7 +84,7 @@ def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> 
 
 
 def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
-    """Return whether an object moved, instead of only its visible part. `usable` are indices of usable scans."""
+    """Return whether an object moved, and not only its visible part. `usable` are indices of usable scans."""
     shape = fit_shape(track.clusters, is_moving=True)
     centers = shape.poses[:, :2]
     start = np.median(centers[:COMPARED_CLUSTERS], axis=0)
@@ -113,6 +113,7 @@ def median_of_three(values: Array) -> Array:
 
 
 def _median_fraction(fractions: Array) -> float:
+    """Return the median of the fractions that are not nan; 0 if all are."""
     return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
@@ -190,6 +191,7 @@ def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices)
 
 
 def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
+    """Return the keyframe with the pose of this index."""
     x, y, yaw = shape.poses[index].tolist()
     return float(shape.times[index]), x, y, yaw
 

@@ -1,4 +1,7 @@
-"""Simulates pedestrians in a recorded drive. The robot and other objects move as in the log."""
+"""Simulation of pedestrians in a recorded drive, in which the robot and other objects move as in the log.
+
+It shows whether a fitted pedestrian walks like the recorded person.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ NEAR_M = 4.0
 Walker = tuple[float, WalkingPedestrian]
 """Time in s at which a pedestrian appears, and the pedestrian."""
 IsGivenUp = Callable[[float, tuple[float, float]], bool]
-"""Returns for a time in s and the position of a pedestrian whether the pedestrian is too far from the track."""
+"""Function (time in s, position of a pedestrian) that returns whether to end the simulation."""
 
 
 class PedestrianTrial:

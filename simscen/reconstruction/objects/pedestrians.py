@@ -52,7 +52,7 @@ SPEED_FACTORS = (0.93, 1.07)
 
 @dataclass(frozen=True)
 class _Reaction:
-    """Possible reaction of a person to the robot: behavior, duration in s, and kinds of obstacles that are not seen."""
+    """Possible reaction of a person to the robot: behavior, duration in s, and kinds of obstacles that are ignored."""
 
     behavior: Behavior = "regular"
     duration: float = 0.0
@@ -124,6 +124,7 @@ class _Track:
 
     @property
     def length(self) -> float:
+        """Length in m."""
         return float(np.hypot(*np.diff(self.positions, axis=0).T).sum())
 
     @property
@@ -227,7 +228,7 @@ def body_radius(thing: FoundObject) -> float:
 
 
 def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
-    """Return the end (2,) of a track, or a point beyond the end if the track ends in motion: pedestrians brake."""
+    """Return the end (2,) of a track. If it ends in motion, return a point beyond: pedestrians brake before a goal."""
     end: Array = track.positions[-1]
     motion = end - track.position_at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
     distance = float(np.hypot(*motion))

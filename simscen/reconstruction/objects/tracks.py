@@ -16,8 +16,8 @@ GATE_M, GATE_M_S = 0.25, 0.8
 MAX_UNSEEN_S = 2.0
 """Maximum time without a cluster in a track."""
 CENTER_WEIGHT = 0.3
-"""Weight of the distance between centers, relative to the distance between hits, in the distance of a cluster from a
-track."""
+"""The distance of a cluster from a track is the distance between hits plus this weight times the distance between
+centers."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
 """Number of clusters from which the velocity is computed, and upper limit of the speed."""
 MOVING_SPEED_M_S = 0.3
@@ -59,7 +59,7 @@ class ObjectTrack:
             self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
 
     def distance_to(self, cluster: ScanCluster) -> float:
-        """Return the distance in m between a cluster and the prediction of the track; inf if their centers are far."""
+        """Return the distance in m of a cluster from the prediction of the track; inf above MAX_CENTER_DISTANCE_M."""
         last = self.clusters[-1]
         predicted = last.points + self.velocity * (cluster.time - last.time)
         if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:

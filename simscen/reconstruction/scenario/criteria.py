@@ -25,8 +25,8 @@ STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
 """Ratio of the limit to the measured time to stop, and maximum time between a fault and a stop as a reaction."""
 REST_SPEED_M_S = 0.01
 """Speed in m/s, and turn rate in rad/s, below which the robot is at rest."""
-NO_SENSORS = ("cmd_vel", "wheels", "localizer")
-"""Targets of faults that are no sensors."""
+NON_SENSOR_TARGETS = ("cmd_vel", "wheels", "localizer")
+"""Targets of faults that are not sensors."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
 def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
     """Yield a limit for the time to stop after a sensor outage, if the robot stopped after an outage."""
     for fault in faults:
-        if fault.kind != "off" or fault.target in NO_SENSORS or fault.begin is None or fault.duration is None:
+        if fault.kind != "off" or fault.target in NON_SENSOR_TARGETS or fault.begin is None or fault.duration is None:
             continue
         stop = time_to_rest(drive, fault.begin, fault.begin + fault.duration)
         if stop is not None and 0.05 < stop < MAX_STOP_S:

@@ -1,4 +1,4 @@
-"""Finds the incidents of a drive: contacts, standstills with a goal, wrong localization, failed or unfinished goals."""
+"""Finds the incidents of a drive: contacts, standstills, wrong localization, failed goals, and unfinished goals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValu
 from simscen.reconstruction.reasons import windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
-"""Radius and minimum duration of the stay of a stuck robot with a goal, as in Nav2's progress checker."""
+"""A robot with a goal is stuck if it stays in a circle of this radius for this time, as in Nav2's progress checker."""
 MAX_COMMAND_HOLD_S = 0.5
 """Maximum time for which a base executes a command if no new command arrives."""
 LOST_ERROR_M = 0.5
@@ -48,6 +48,7 @@ def find_incidents(drive: RecordedDrive) -> list[Incident]:
 
 
 def _position(drive: RecordedDrive, time: float) -> tuple[float, float]:
+    """Return the position (x, y) of the robot in m at a time in s."""
     x, y, _ = drive.poses.poses_at(np.array([time]))[0].tolist()
     return x, y
 

@@ -170,6 +170,7 @@ def _velocities(poses: TimedValues) -> TimedValues:
 
 
 def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
+    """Return the value of the key `sensors`."""
     sensors: dict[str, Any] = {}
     if drive.scans is not None:
         sensors["lidar"] = {"lidar": _lidar(drive.scans, lidar_noise)}
@@ -180,6 +181,7 @@ def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
 
 
 def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
+    """Return the value of the key `lidar`. `noise` is the standard deviation of the ranges in m."""
     beams = min(len(scans.angles), MAX_BEAMS)
     step = abs(float(scans.angles[1] - scans.angles[0])) if beams > 1 else 0.01
     view = beams * step
@@ -200,7 +202,7 @@ def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
 
 
 def _rate(times: Array, usual: float) -> float:
-    """Return the divisor of the tick rate nearest to the rate of a signal, or to `usual` without a rate, in Hz."""
+    """Return the divisor of the tick rate, in Hz, nearest to the rate of a signal (`usual` if unknown)."""
     measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else usual
     divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
     return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

@@ -1,4 +1,7 @@
-"""Formats a reconstructed scenario as YAML, with a comment that gives the reason for each part."""
+"""Formats a reconstructed scenario as YAML, with a comment that gives the reason for each part.
+
+The private generators yield the lines of one part of the file.
+"""
 
 from __future__ import annotations
 
@@ -252,6 +255,7 @@ def _scripted_object(thing: FoundObject) -> Iterator[str]:
 
 
 def _fault_entry(fault: FoundFault) -> dict[str, Any]:
+    """Return a fault as an entry of `faults`."""
     entry: dict[str, Any] = {"sensor": fault.target, fault.kind: dict(fault.values)}
     if fault.begin is not None:
         entry["when"] = {"time": f"{fault.begin:.2f} s"}
@@ -261,6 +265,7 @@ def _fault_entry(fault: FoundFault) -> dict[str, Any]:
 
 
 def _pose(pose: Pose2) -> str:
+    """Return a pose in YAML's flow style."""
     return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {math.degrees(pose.yaw):.1f} deg}}"
 
 
@@ -271,6 +276,7 @@ def _text(text: str) -> str:
 
 
 def _entry(key: str, value: Any) -> list[str]:
+    """Return a key and its value as lines of YAML."""
     if isinstance(value, str):
         return [f"{key}: {_text(value)}"]
     return to_yaml({key: value}, CompactDumper).rstrip("\n").split("\n")

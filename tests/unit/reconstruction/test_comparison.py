@@ -7,13 +7,13 @@ import synthetic_drives as drives
 
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
-from simscen.reconstruction.verifying.comparison import (
+from simscen.reconstruction.verification.comparison import (
     Verification,
     compare_drives,
     compare_incidents,
     fraction_seen_alike,
 )
-from simscen.reconstruction.verifying.page import verification_page
+from simscen.reconstruction.verification.page import verification_page
 
 STUCK = Incident("stuck", 10.0, (3.0, 2.0), "the robot stayed", "stuck")
 

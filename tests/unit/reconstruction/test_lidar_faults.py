@@ -10,7 +10,7 @@ from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.faults.false_returns import glass_fault
 from simscen.reconstruction.faults.lidar_calibration import mount_error, range_error_faults
-from simscen.reconstruction.faults.lidar_readings import blind_sector
+from simscen.reconstruction.faults.lidar_readings import sector_limits_text
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.scenario.robot_file import RobotProperties
 from simscen.reconstruction.static_world import StaticWorld
@@ -57,7 +57,7 @@ def test_blind_directions_are_a_sector():
 
 def test_a_blind_sector_of_a_fine_lidar_has_two_ends():
     angles = np.radians(np.linspace(-29.4, 29.4, 377))
-    begin, end = blind_sector(angles, 0, 2)
+    begin, end = sector_limits_text(angles, 0, 2)
     assert float(begin) < float(end)
     assert [float(begin), float(end)] == pytest.approx(np.degrees(angles[[0, 2]]), abs=0.06)
 

@@ -19,8 +19,8 @@ from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
-WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
-"""RGBA colors of occupied cells, of unknown cells, and of cells with a lidar return that is not from a wall."""
+WALL_COLOR, UNKNOWN_COLOR, NEW_HIT_COLOR = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
+"""RGBA colors of occupied cells, unknown cells, and cells with a lidar return that is not from a wall."""
 WALL_DISTANCE_M = 0.15
 """Maximum distance from a wall of a return that belongs to the wall."""
 TARGET_SCANS, TARGET_POINTS = 300, 600
@@ -31,7 +31,7 @@ MARGIN_M, MIN_ASPECT = 1.0, 0.45
 """Distance between the edge of a map and the drawn points, and minimum ratio of the shorter to the longer side."""
 FONT_FRACTION = 0.026
 """Height of the text in a map as a fraction of the larger side."""
-CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
+CHART_WIDTH, CHART_HEIGHT, LEFT_MARGIN, BOTTOM_MARGIN = 420.0, 150.0, 40.0, 18.0
 """Size of a chart, and size of the left and bottom margins with labels, in units of the SVG."""
 TICK_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 """Possible distances between the ticks of an axis in the unit of the axis, or between the time marks of a path in s."""
@@ -39,7 +39,7 @@ TICK_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0
 
 @dataclass(frozen=True)
 class Box:
-    """Drawn rectangle of the world: lowest x and y in the map frame, width, and height in m."""
+    """Rectangle of the world that a drawing shows: lowest x and y in the map frame, width, and height in m."""
 
     x: float
     y: float
@@ -134,6 +134,7 @@ def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
 
 
 def _object(thing: FoundObject, box: Box) -> Iterator[str]:
+    """Yield the outline or the path of an object, and its name."""
     _, x, y, yaw = thing.keyframes[0]
     if thing.is_moving:
         yield f'<polyline class="object" points="{_points(np.array(thing.keyframes)[:, 1:3])}"/>'
@@ -149,6 +150,7 @@ def _object(thing: FoundObject, box: Box) -> Iterator[str]:
 
 
 def _points(poses: Array) -> str:
+    """Return the positions of poses (n, 2 or more) as the attribute `points` of a polyline."""
     step = max(1, len(poses) // TARGET_POINTS)
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in poses[::step, :2].tolist())
 
@@ -157,11 +159,11 @@ def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
     """Return the data URL of a PNG with the map and the lidar returns that are not from walls."""
     grid = world.grid
     colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
-    colors[grid.cells == UNKNOWN] = UNSEEN
-    colors[grid.cells == OCCUPIED] = WALL
+    colors[grid.cells == UNKNOWN] = UNKNOWN_COLOR
+    colors[grid.cells == OCCUPIED] = WALL_COLOR
     cells = grid.cell_of(_returns_off_the_map(world, drive))
     cells = cells[grid.inside(cells)]
-    colors[cells[:, 0], cells[:, 1]] = NEW_HIT
+    colors[cells[:, 0], cells[:, 1]] = NEW_HIT_COLOR
     out = io.BytesIO()
     Image.fromarray(colors[::-1]).quantize(16).save(out, "PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(out.getvalue()).decode()}"
@@ -190,21 +192,21 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
     series = [line for line in series if len(line.times)]
     end = max((float(line.times[-1]) for line in series), default=1.0) or 1.0
     top = max(0.1, *(float(np.max(line.values)) for line in series)) if series else 1.0
-    across, up = CHART_WIDTH - LEFT - 10.0, CHART_HEIGHT - BOTTOM - 8.0
+    across, up = CHART_WIDTH - LEFT_MARGIN - 10.0, CHART_HEIGHT - BOTTOM_MARGIN - 8.0
     parts = []
     for value in _ticks(top, 5):
-        y = CHART_HEIGHT - BOTTOM - up * value / top
-        parts.append(f'<line class="axis" x1="{LEFT:g}" y1="{y:.1f}" x2="{CHART_WIDTH - 10:g}" y2="{y:.1f}"/>')
+        y = CHART_HEIGHT - BOTTOM_MARGIN - up * value / top
+        parts.append(f'<line class="axis" x1="{LEFT_MARGIN:g}" y1="{y:.1f}" x2="{CHART_WIDTH - 10:g}" y2="{y:.1f}"/>')
         parts.append(
-            f'<text class="tick" x="{LEFT - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {escape(unit)}</text>'
+            f'<text class="tick" x="{LEFT_MARGIN - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {escape(unit)}</text>'
         )
     for value in _ticks(end, 7):
-        x = LEFT + across * value / end
+        x = LEFT_MARGIN + across * value / end
         parts.append(f'<text x="{x:.1f}" y="{CHART_HEIGHT - 4:g}" font-size="11">{value:g} s</text>')
     for line in series:
         step = max(1, len(line.times) // TARGET_POINTS)
         points = " ".join(
-            f"{LEFT + across * time / end:.1f},{CHART_HEIGHT - BOTTOM - up * value / top:.1f}"
+            f"{LEFT_MARGIN + across * time / end:.1f},{CHART_HEIGHT - BOTTOM_MARGIN - up * value / top:.1f}"
             for time, value in zip(line.times[::step].tolist(), line.values[::step].tolist(), strict=True)
         )
         parts.append(f'<polyline class="path line {line.name}" points="{points}"/>')

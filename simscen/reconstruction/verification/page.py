@@ -7,13 +7,13 @@ from html import escape
 
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.static_world import StaticWorld
-from simscen.reconstruction.verifying.comparison import (
+from simscen.reconstruction.verification.comparison import (
     Verification,
     common_times,
     distances_between,
     nearest_returns,
 )
-from simscen.reconstruction.verifying.drawings import Series, box_around, chart, drive_map
+from simscen.reconstruction.verification.drawings import Series, box_around, chart, drive_map
 from simscen.report.display_text import csp_hash
 
 STYLE = """
@@ -113,6 +113,7 @@ def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verifica
 
 
 def _legend(has_objects: bool, has_incidents: bool) -> Iterator[str]:
+    """Yield the list items of the legend."""
     line = '<line class="{}" x1="0" y1="6" x2="24" y2="6"/>'
     symbols = [
         (line.format("path log"), "path in the log"),
@@ -152,10 +153,12 @@ def _charts(verified: Verification) -> Iterator[str]:
 
 
 def _figure(label: str, series: Sequence[Series]) -> str:
+    """Return a chart in m with a caption."""
     return f"<figure><figcaption>{escape(label)}</figcaption>{chart(label, series, 'm')}</figure>"
 
 
 def _table(verified: Verification) -> Iterator[str]:
+    """Yield the table of compared quantities."""
     yield '<h2>Numbers</h2>\n<div class="wide" role="region" aria-label="Numbers" tabindex="0">'
     yield '<table>\n<tr><th scope="col">quantity</th><th scope="col">log</th><th scope="col">run</th>'
     yield '<th scope="col">difference</th></tr>'

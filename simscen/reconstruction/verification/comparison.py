@@ -23,7 +23,7 @@ SAME_POSITION_M = 0.3
 SAME_RANGE_M = 0.2
 """Maximum difference between two ranges that count as equal."""
 MIN_SCANS = 3
-"""Minimum number of scans with a range at most as long as the nearest return of a drive."""
+"""Number of scans that must confirm the nearest return of a drive, so that single errors are ignored."""
 MAX_INCIDENT_DISTANCE_M, MAX_INCIDENT_TIME_S = 1.0, 5.0
 """Maximum distance and time between two incidents of the same kind that count as the same incident."""
 
@@ -99,14 +99,14 @@ class Verification:
         return all(incident.is_reproduced for incident in self.incidents)
 
 
-def compare_with_run(made: Reconstruction, log: Path) -> Verification:
+def compare_with_run(reconstruction: Reconstruction, log: Path) -> Verification:
     """Compare the recorded drive with the log of a run of the scenario. Raises InvalidInput for an unusable log."""
     repeated = read_drive(log, DriveOptions())
-    incidents, others = compare_incidents(find_incidents(made.drive), find_incidents(repeated))
+    incidents, others = compare_incidents(find_incidents(reconstruction.drive), find_incidents(repeated))
     verdicts = (attached_result(log) or {}).get("verdicts", [])
     failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
-    quantities = [*compare_drives(made.drive, repeated)]
-    return Verification(made.drive, repeated, log, quantities, incidents, others, failed)
+    quantities = [*compare_drives(reconstruction.drive, repeated)]
+    return Verification(reconstruction.drive, repeated, log, quantities, incidents, others, failed)
 
 
 def compare_incidents(
@@ -152,11 +152,13 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
 
 
 def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
+    """Return the row of a quantity with one number for the log and one for the run."""
     difference = round(run - log, 2) + 0.0  # no minus sign before a zero
     return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{difference:+.2f} {unit}")
 
 
 def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> ComparedQuantity:
+    """Return the row of the goal with this index."""
     first, second = recorded.goals[number], repeated.goals[number]
     name = f"goal {first.name or f'goal-{number + 1}'}"
     difference = "" if first.ended is None or second.ended is None else f"{second.ended - first.ended:+.2f} s"
@@ -164,6 +166,7 @@ def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> Comp
 
 
 def _outcome(goal: RecordedGoal) -> str:
+    """Return status, time, and error of a goal as text."""
     end = "" if goal.ended is None else f" at {goal.ended:.2f} s"
     return f"{goal.status}{end}{f' ({goal.error})' if goal.error else ''}"
 
