@@ -9,6 +9,7 @@ class RobotFrames:
     """Names of the frames of one robot in the log.
 
     With several robots, frames have the robot's name as a prefix, except `map` and the frames of moving objects.
+    `odom`, `base`, and `truth` are the names of the frames ODOM, BASE, and TRUTH.
     """
 
     def __init__(self, robot: str = "") -> None:
@@ -25,7 +26,7 @@ class RobotFrames:
         return self.log_frame(sensor_frame(sensor))
 
     def stack_frame(self, frame: str) -> str:
-        """Return the name in the robot's stack of a frame of the log: without the prefix."""
+        """Return the name in the robot's stack of a frame in the log, which is the name without the prefix."""
         return frame.removeprefix(self._prefix)
 
 

@@ -33,7 +33,8 @@ class NotSimscenLog(ValueError):
 class LogContents:
     """Collects the records of a log. Methods raise ValueError or KeyError if the log is damaged.
 
-    With `with_sensors`, also collects the messages that are not part of a Trace.
+    With `with_sensors`, also collects the messages that are not part of a Trace. For a log of several robots, `robots`
+    has the contents of each robot by name.
     """
 
     def __init__(self, with_sensors: bool = False) -> None:
@@ -43,7 +44,7 @@ class LogContents:
         self.stack: dict[str, str] = {}
         """Facts about the external stack, as in stack.json. With several robots, the keys have the robot's name."""
         self._with_sensors = with_sensors
-        self._facts: dict[str, str] = {}
+        self._metadata: dict[str, str] = {}
         self._files: dict[str, bytes] = {}
         self._rows = TraceRows()
         self._last_tick = 0
@@ -63,10 +64,10 @@ class LogContents:
             case records.Message():
                 self._add_message(record)
             case records.Metadata(name="simscen"):
-                self._set_facts(record.metadata)
-            case records.Metadata(name=log_header.END):
+                self._set_metadata(record.metadata)
+            case records.Metadata(name=log_header.END_RECORD):
                 if self.end is not None:
-                    raise ValueError(f"it has two metadata records `{log_header.END}`{_MERGED}")
+                    raise ValueError(f"it has two metadata records `{log_header.END_RECORD}`{_MERGED}")
                 self.end = int(record.metadata["tick"])
                 self._counts.set_expected(record.metadata)
                 for name, contents in self.robots.items():
@@ -86,32 +87,33 @@ class LogContents:
     def header(self) -> LogHeader:
         """Return the header of the log. Raises NotSimscenLog if the log has none."""
         if self.robots:
-            if unknown := [name for name in self._files if name.endswith(f"/{log_header.CASE}")]:
+            if unknown := [name for name in self._files if name.endswith(f"/{log_header.CASE_FILE}")]:
                 raise ValueError(f"it has {unknown[0]}, but its list of robots is {', '.join(self.robots)}")
             return self._joint_header({name: contents.header() for name, contents in self.robots.items()})
-        if not self._facts or log_header.CASE not in self._files:
+        if not self._metadata or log_header.CASE_FILE not in self._files:
             raise NotSimscenLog("it has no description of its run")
         return LogHeader(
-            name=self._facts["scenario"],
-            seed=int(self._facts["seed"]),
-            case=log_header.case_from_json(self._files[log_header.CASE]),
-            scenario=str(self._files.get(log_header.SCENARIO, b""), "utf-8"),
+            name=self._metadata["scenario"],
+            seed=int(self._metadata["seed"]),
+            case=log_header.case_from_json(self._files[log_header.CASE_FILE]),
+            scenario=str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8"),
             map=self._map,
             robot_description=self._robot_description,
             frames=self._frames,
             files=self._other_files(),
-            facts=log_header.extra_facts(self._facts),
+            facts=log_header.extra_facts(self._metadata),
         )
 
     def _joint_header(self, robots: dict[str, LogHeader]) -> LogHeader:
-        """Return the header of a log of several robots, from the headers of the robots."""
+        """Return the header of a log of several robots, from the headers of the single robots."""
         first = next(iter(robots.values()))
-        text = str(self._files.get(log_header.SCENARIO, b""), "utf-8")
+        text = str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8")
         headers = {name: replace(header, scenario=text) for name, header in robots.items()}
         return replace(first, scenario=text, files=self._other_files(), robots=headers)
 
     def _other_files(self) -> dict[str, bytes]:
-        return {name: data for name, data in self._files.items() if name not in log_header.OWN_FILES}
+        """Return the attachments without the RESERVED_FILES."""
+        return {name: data for name, data in self._files.items() if name not in log_header.RESERVED_FILES}
 
     def trace(self) -> Trace:
         """Return the Trace of the only or first robot. If the run was aborted, the Trace ends with the last message."""
@@ -129,29 +131,33 @@ class LogContents:
         return {name: contents.trace() for name, contents in self.robots.items()}
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence that the log lacks because messages were removed. An aborted run lacks none."""
+        """Return the evidence that the log lacks because messages were removed; complete if the run was aborted."""
         return LogCoverage() if self.end is None else self._counts.coverage()
 
     def result(self) -> str:
         """Return the result of the run as JSON; "" if the log has none."""
-        return str(self._files.get(log_header.RESULT, b""), "utf-8")
+        return str(self._files.get(log_header.RESULT_FILE, b""), "utf-8")
 
-    def _set_facts(self, facts: dict[str, str]) -> None:
-        if facts.get("format") != log_header.FORMAT:
-            raise NotSimscenLog(f"its format is {facts.get('format')}, this simscen reads {log_header.FORMAT}")
-        if self._facts:
+    def _set_metadata(self, metadata: dict[str, str]) -> None:
+        """Process the metadata record "simscen" and create the contents of its robots."""
+        if metadata.get("format") != log_header.FORMAT_VERSION:
+            raise NotSimscenLog(
+                f"its format is {metadata.get('format')}, this simscen reads {log_header.FORMAT_VERSION}"
+            )
+        if self._metadata:
             raise ValueError(f"it has two metadata records `simscen`{_MERGED}")
-        self._facts = facts
-        self._time = self.sensors.time = SimTime(int(facts["tick_rate"]))
-        names = json.loads(facts.get(log_header.ROBOTS, "[]"))
+        self._metadata = metadata
+        self._time = self.sensors.time = SimTime(int(metadata["tick_rate"]))
+        names = json.loads(metadata.get(log_header.ROBOTS_KEY, "[]"))
         if not isinstance(names, list) or len({name for name in names if isinstance(name, str)}) < len(names):
-            raise ValueError(f"its list of robots is {facts[log_header.ROBOTS]}")
+            raise ValueError(f"its list of robots is {metadata[log_header.ROBOTS_KEY]}")
         for name in names:
             contents = self.robots[name] = LogContents(self._with_sensors)
             contents.sensors.frames = frame_names.RobotFrames(name)
-            contents._set_facts({**log_header.robot_metadata(facts, name), log_header.ROBOTS: "[]"})
+            contents._set_metadata({**log_header.robot_metadata(metadata, name), log_header.ROBOTS_KEY: "[]"})
 
     def _set_stack(self, facts: dict[str, str]) -> None:
+        """Process the metadata record STACK_RECORD."""
         if self.stack:
             raise ValueError(f"it has two metadata records `{log_header.STACK_RECORD}`{_MERGED}")
         self.stack = facts
@@ -160,14 +166,14 @@ class LogContents:
 
     def _add_attachment(self, file: records.Attachment) -> None:
         robot, _, name = file.name.partition("/")
-        is_case = robot in self.robots and name == log_header.CASE
+        is_case = robot in self.robots and name == log_header.CASE_FILE
         files, name = (self.robots[robot]._files, name) if is_case else (self._files, file.name)
         if name in files:
             raise ValueError(f"it has two attachments {file.name}{_MERGED}")
         files[name] = file.data
 
     def _add_message(self, message: records.Message) -> None:
-        if not self._facts:
+        if not self._metadata:
             raise NotSimscenLog("it has no metadata record `simscen`")
         self._last_tick = self._time.tick(message.log_time)
         self._counts.add_message(message.channel_id, message.log_time)
@@ -205,6 +211,7 @@ class LogContents:
             self._handlers[channel.id] = handlers[0] if len(handlers) == 1 else _call_all(handlers)
 
     def _sensor_handler(self, topic: str, message_type: str) -> Handler | None:
+        """Return the handler that stores the messages of a topic in `sensors`; None if they are not stored."""
         if (topic, message_type) == topics.ROSOUT[:2]:
             return lambda tick, data: self.sensors.lines.append((tick, data))
         return self.sensors.handler(topic, message_type)
@@ -251,8 +258,8 @@ class LogContents:
 
     def _set_map(self, _: int, data: bytes) -> None:
         grid = decode.occupancy_grid(MessageReader(data))[1]
-        origin = Pose2(*json.loads(self._facts[log_header.ORIGIN]))  # exact, unlike the numbers in the message
-        self._map = OccupancyGrid(grid.cells, float(self._facts[log_header.RESOLUTION]), origin)
+        origin = Pose2(*json.loads(self._metadata[log_header.ORIGIN_KEY]))  # exact, unlike the numbers in the message
+        self._map = OccupancyGrid(grid.cells, float(self._metadata[log_header.RESOLUTION_KEY]), origin)
 
     def _set_robot_description(self, _: int, data: bytes) -> None:
         self._robot_description = MessageReader(data).string()

@@ -16,18 +16,18 @@ from simscen.core.geometry import Pose3
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey
 
-FORMAT = "1"
+FORMAT_VERSION = "1"
 """Version of the log format. Logs of another version are rejected."""
 STACK_RECORD = "simscen.stack"
 """Metadata record at the end of the log that describes the external stacks."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Keys of `LogHeader.facts`: value of the option --stack, name of the stack if several are compared, and variation."""
-ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
+"""Keys of `LogHeader.facts`: value of the option --stack, name of the stack if stacks are compared, and variation."""
+ROBOTS_KEY, RESOLUTION_KEY, ORIGIN_KEY = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
-END, COUNT_PREFIX = "simscen.end", "messages:"
+END_RECORD, COUNT_PREFIX = "simscen.end", "messages:"
 """Metadata record at the end of a complete log, and the prefix of its keys for the number of messages of a topic."""
-OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
+RESERVED_FILES = CASE_FILE, SCENARIO_FILE, RESULT_FILE = "case.json", "scenario.yaml", "result.json"
 """Names of attachments that are reserved for simscen."""
 _MEDIA_TYPES = {
     ".json": "application/json",
@@ -53,10 +53,10 @@ class LogHeader:
         scenario: Resolved YAML text of the scenario.
         map: Map that the stack receives; None without a map.
         robot_description: URDF of the robot.
-        frames: Poses of the sensors on the robot's base. Scans contain the poses of lidars that are missing here.
+        frames: Poses of the sensors on the robot's base, by sensor name. The scans of other lidars contain their pose.
         sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
         files: Attachments by name.
-        facts: Additional metadata.
+        facts: Additional metadata as text by key.
         robots: Headers of several robots by name; empty for a single robot. Other attributes belong to the first robot.
     """
 
@@ -74,7 +74,7 @@ class LogHeader:
 
     @property
     def key(self) -> RunKey:
-        """Key of the run."""
+        """Scenario, seed, variation, and stack, which identify the run."""
         return RunKey(self.name, self.seed, self.facts.get(VARIATION_FACT, ""), self.facts.get(STACK_NAME_FACT, ""))
 
 
@@ -102,23 +102,33 @@ def media_type(name: str) -> str:
 
 def run_metadata(header: LogHeader, clock: Clock) -> dict[str, str]:
     """Return the metadata record "simscen", which includes the exact resolution and origin of each map."""
-    metadata = {"format": FORMAT, "scenario": header.name, "seed": str(header.seed), "tick_rate": str(clock.rate)}
-    metadata |= {ROBOTS: json.dumps(list(header.robots))} if header.robots else _map_facts(header)
+    metadata = {
+        "format": FORMAT_VERSION,
+        "scenario": header.name,
+        "seed": str(header.seed),
+        "tick_rate": str(clock.rate),
+    }
+    metadata |= {ROBOTS_KEY: json.dumps(list(header.robots))} if header.robots else _map_facts(header)
     for name, robot_header in header.robots.items():
         metadata |= {f"{name}.{fact}": value for fact, value in _map_facts(robot_header).items()}
     return metadata | {f"{_FACT_PREFIX}{name}": value for name, value in header.facts.items()}
 
 
 def _map_facts(header: LogHeader) -> dict[str, str]:
+    """Return the exact resolution and origin of the map as metadata; empty without a map."""
     if header.map is None:
         return {}
     x, y, yaw = header.map.origin
-    return {RESOLUTION: repr(float(header.map.resolution)), ORIGIN: json.dumps([x, y, yaw])}
+    return {RESOLUTION_KEY: repr(float(header.map.resolution)), ORIGIN_KEY: json.dumps([x, y, yaw])}
 
 
 def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str]:
     """Return the metadata record "simscen" for one of several robots, with the resolution and origin of its map."""
-    own = {fact: run_metadata[f"{robot}.{fact}"] for fact in (RESOLUTION, ORIGIN) if f"{robot}.{fact}" in run_metadata}
+    own = {
+        fact: run_metadata[f"{robot}.{fact}"]
+        for fact in (RESOLUTION_KEY, ORIGIN_KEY)
+        if f"{robot}.{fact}" in run_metadata
+    }
     return {**run_metadata, **own}
 
 
@@ -135,11 +145,11 @@ def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
 
 def attachments(header: LogHeader) -> dict[str, bytes]:
     """Return the attachments of the log by name. Raises ValueError if one of `header.files` has a reserved name."""
-    cases = {f"{name}/{CASE}": case_to_json(robot.case).encode() for name, robot in header.robots.items()}
-    files = cases or {CASE: case_to_json(header.case).encode()}
+    cases = {f"{name}/{CASE_FILE}": case_to_json(robot.case).encode() for name, robot in header.robots.items()}
+    files = cases or {CASE_FILE: case_to_json(header.case).encode()}
     if header.scenario:
-        files[SCENARIO] = header.scenario.encode()
-    if reserved := sorted(set(header.files) & set(OWN_FILES)):
+        files[SCENARIO_FILE] = header.scenario.encode()
+    if reserved := sorted(set(header.files) & set(RESERVED_FILES)):
         raise ValueError(f"the file name {reserved[0]} is reserved in a log")
     return files | dict(header.files)
 

@@ -1,4 +1,4 @@
-"""Readers of MCAP files: of all records, or of an attached result."""
+"""Readers of all records of an MCAP file, or only of its attached result."""
 
 import errno
 import json
@@ -16,7 +16,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from simscen.record.log_header import RESULT
+from simscen.record.log_header import RESULT_FILE
 
 MAX_RECORD_BYTES = 1 << 28
 """Maximum size of a record or decompressed chunk."""
@@ -36,7 +36,7 @@ def attached_result(path: Path) -> dict[str, Any] | None:
     try:
         with open_log(path) as stream:
             attachments = make_reader(stream).iter_attachments()
-            found = next((file for file in attachments if file.name == RESULT), None)
+            found = next((file for file in attachments if file.name == RESULT_FILE), None)
             data = json.loads(found.data) if found is not None else None
     except (OSError, McapError, ValueError, struct.error):
         return None

@@ -12,7 +12,7 @@ from simscen.record import log_header
 from simscen.record.log_file import LogFile
 from simscen.record.log_header import LogHeader, scenery_from_header
 from simscen.record.mcap_writer import McapWriter, Sink
-from simscen.record.publishers.channels import LogPublisher, NamespacedPublisher
+from simscen.record.publishers.message_sinks import LogPublisher, NamespacedPublisher
 from simscen.record.publishers.robot import RobotPublisher
 
 
@@ -37,7 +37,12 @@ class Recorder:
         first = next(iter(headers))
         self.robots = {
             name: RobotPublisher(
-                NamespacedPublisher(out, name) if name else out, time, robot, scenery, name, clock=name == first
+                NamespacedPublisher(out, name) if name else out,
+                time,
+                robot,
+                scenery,
+                name,
+                publishes_clock=name == first,
             )
             for name, robot in headers.items()
         }
@@ -59,13 +64,13 @@ class Recorder:
         `result` is the content of result.json. `stack` are the facts about external stacks. Both are optional.
         """
         if result:
-            self._writer.add_attachment(log_header.RESULT, "application/json", result.encode())
+            self._writer.add_attachment(log_header.RESULT_FILE, "application/json", result.encode())
         if stack:
             self._writer.add_metadata(log_header.STACK_RECORD, dict(stack))
         counts = {
             f"{log_header.COUNT_PREFIX}{topic}": str(n) for topic, n in sorted(self._writer.message_counts().items())
         }
-        self._writer.add_metadata(log_header.END, {"tick": str(end_tick), **counts})
+        self._writer.add_metadata(log_header.END_RECORD, {"tick": str(end_tick), **counts})
         self._writer.finish()
         if self._file is not None:
             self._file.finish()

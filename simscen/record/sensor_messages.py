@@ -29,7 +29,7 @@ class SensorMessages:
         costmaps: Messages by topic.
         mounts: Poses of lidars on the base, by frame.
         lines: Messages of /rosout, including simscen's own lines.
-        stamped: Whether stamps count from the start of the run. If False, only ticks of logging are meaningful.
+        stamped: Whether stamps count from the start of the run. If False, only the ticks of logging are meaningful.
         frames: Names of the robot's frames in the log. Decoded messages have the frame names of the stack instead.
     """
 
@@ -58,7 +58,7 @@ class SensorMessages:
             return _append_to(self.costmaps.setdefault(topic, []))
         return None
 
-    def scan(self, data: bytes) -> Scan:
+    def decode_scan(self, data: bytes) -> Scan:
         """Decode a LaserScan. The scan of a tilted lidar is projected to the floor."""
         scan = decode.laser_scan(MessageReader(data))
         frame = self.frames.stack_frame(scan.frame)
@@ -67,11 +67,11 @@ class SensorMessages:
         tilted = None if mount.is_level else mount
         return level_scan(Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
-    def cloud(self, data: bytes) -> Array:
+    def decode_particles(self, data: bytes) -> Array:
         """Decode a ParticleCloud to poses (n, 3) x, y, yaw."""
         return to_planar(decode.particle_cloud(MessageReader(data)))
 
-    def path(self, data: bytes) -> Array:
+    def decode_path(self, data: bytes) -> Array:
         """Decode a Path to points (n, 2) x, y."""
         return decode.path(MessageReader(data)).poses[:, :2]
 
@@ -80,7 +80,7 @@ class SensorMessages:
         decoded = [(tick, decode.log_line(MessageReader(data))) for tick, data in self.lines]
         return [(tick, line) for tick, line in decoded if line.name != EVENT_LOGGER]
 
-    def costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:
+    def decode_costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:
         """Decode an OccupancyGrid to its frame and the grid."""
         frame, grid = decode.occupancy_grid(MessageReader(data))
         return self.frames.stack_frame(frame), grid

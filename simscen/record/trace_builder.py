@@ -1,7 +1,7 @@
 """Builder of the Trace (signals and events) of a run, and the tables in which the signals are collected.
 
-A TraceBuilder collects signals from moments (records of single ticks), and the log reader from messages. Both store
-the quaternions of the log and convert them to yaw with the same function, so that both traces are equal to the bit.
+A TraceBuilder collects signals from moments (records of single ticks), and the log reader from messages. Both convert
+the same quaternions to yaw with the same function, so that both traces are equal to the bit.
 """
 
 import math
@@ -21,7 +21,7 @@ from simscen.record.messages import event_text
 from simscen.record.messages.encode_arrays import planar_poses
 from simscen.record.trace_thinning import Thinning
 
-_tick = struct.Struct("d").pack
+_pack_tick = struct.Struct("d").pack
 
 
 class SignalBuffer:
@@ -41,7 +41,7 @@ class SignalBuffer:
 
     def append(self, tick: int, values: Array) -> None:
         """Append a row with the `width` numbers of an array of any shape."""
-        self.rows += _tick(tick)
+        self.rows += _pack_tick(tick)
         self.rows += values.tobytes()
 
     def extend(self, ticks: Ticks, values: Array) -> None:
@@ -62,7 +62,7 @@ class SignalBuffer:
 
 
 def exact_planar_poses(points: Array) -> Array:
-    """Return poses (n, 7) of points (n, 3) x, y, yaw. The result is equal to Pose3.planar to the last bit."""
+    """Return poses (n, 7) of points (n, 3) x, y, yaw, equal to the poses of Pose3.planar to the last bit."""
     # The log contains the poses of Pose3.planar. The sine of numpy is slightly different.
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
@@ -159,7 +159,7 @@ class TraceBuilder:
     """Builds the Trace of a robot from its moments. The Trace is equal to the Trace that `read_log` reads."""
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """`thinning` selects the samples to keep. It can be shared with the RobotPublisher of the same robot."""
+        """Start an empty trace. `thinning` selects the samples to keep. A RobotPublisher of the robot can share it."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()

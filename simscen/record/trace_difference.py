@@ -15,7 +15,7 @@ _COLUMNS = {
     "odometry": _POSE,
     "command": ("vx", "vy", "wz"),
 }
-"""Names of the columns of each signal. Signals that are missing here are poses."""
+"""Names of the columns of each signal. All other signals are poses."""
 
 Difference = tuple[int, str]
 """Tick and description of a difference."""
@@ -39,36 +39,39 @@ def first_difference(first: Trace, second: Trace) -> str | None:
 def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
     """Yield the first difference of each signal, all differences of plans and events, and a difference of the ends."""
     for name in ("truth", "velocity", "clearance", "odometry"):
-        yield from _in_samples(name, getattr(first, name), getattr(second, name))
+        yield from _sample_differences(name, getattr(first, name), getattr(second, name))
     empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     for name in sorted({*first.objects, *second.objects}):
-        yield from _in_samples(f"object {name}", first.objects.get(name, empty), second.objects.get(name, empty))
-    yield from _in_samples("scan", *(Samples(t.scans, np.empty((len(t.scans), 0))) for t in (first, second)))
+        yield from _sample_differences(
+            f"object {name}", first.objects.get(name, empty), second.objects.get(name, empty)
+        )
+    scans = (Samples(trace.scans, np.empty((len(trace.scans), 0))) for trace in (first, second))
+    yield from _sample_differences("scan", *scans)
     for name in ("belief", "command"):
-        yield from _in_samples(name, getattr(first, name), getattr(second, name))
+        yield from _sample_differences(name, getattr(first, name), getattr(second, name))
     for a, b in zip(first.plans, second.plans, strict=False):
         if a.tick != b.tick or a.points.tobytes() != b.points.tobytes():
             yield min(a.tick, b.tick), f"plan: {len(a.points)} against {len(b.points)} poses, or second poses"
-    yield from _missing("plan", [p.tick for p in first.plans], [p.tick for p in second.plans])
+    yield from _length_difference("plan", [p.tick for p in first.plans], [p.tick for p in second.plans])
     for event, other_event in zip(first.events, second.events, strict=False):
         if repr(event) != repr(other_event):
             yield (
                 min(event.tick, other_event.tick),
                 f"event: {event.kind} {event.name} against {other_event.kind} {other_event.name}",
             )
-    yield from _missing("event", [e.tick for e in first.events], [e.tick for e in second.events])
+    yield from _length_difference("event", [e.tick for e in first.events], [e.tick for e in second.events])
     if first.end != second.end:
         yield min(first.end, second.end), f"end of the run: tick {first.end} against {second.end}"
 
 
-def _in_samples(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
+def _sample_differences(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
     """Yield the first row that differs in at least one bit (nan equals nan, but 0.0 differs from -0.0)."""
     n = min(len(first), len(second))
     a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (first, second))
     differs = a.view(np.int64) != b.view(np.int64)
     rows = np.flatnonzero(differs.any(axis=1) | (first.ticks[:n] != second.ticks[:n]))
     if not len(rows):
-        yield from _missing(name, first.ticks.tolist(), second.ticks.tolist())
+        yield from _length_difference(name, first.ticks.tolist(), second.ticks.tolist())
         return
     row = int(rows[0])
     tick = int(min(first.ticks[row], second.ticks[row]))
@@ -81,7 +84,7 @@ def _in_samples(name: str, first: Samples, second: Samples) -> Iterator[Differen
     yield tick, f"{name}.{label}: {float(a[row, column])!r} against {float(b[row, column])!r}"
 
 
-def _missing(name: str, first: list[int], second: list[int]) -> Iterator[Difference]:
+def _length_difference(name: str, first: list[int], second: list[int]) -> Iterator[Difference]:
     """Yield a difference at the first additional tick if one list of ticks is longer."""
     if len(first) != len(second):
         longer = max(first, second, key=len)

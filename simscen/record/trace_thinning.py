@@ -58,6 +58,7 @@ class Thinning:
         return self._selected
 
     def _select_objects(self, tick: int, objects: Mapping[str, Pose3]) -> Mapping[str, Pose3]:
+        """Return the poses to keep. If all objects have moved, skip the comparison of single poses."""
         if type(objects) is PosesAtTick and self._have_all_moved(objects):
             self._all_kept, self._previous_poses = (tick, objects), objects
             return objects
@@ -76,6 +77,7 @@ class Thinning:
         return previous.predicted is predicted and previous.row == objects.row - 1 and predicted.all_moved[objects.row]
 
     def _changed_objects(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
+        """Return the poses that have changed, or were last kept a period of STANDSTILL_RATE_HZ ago."""
         kept = dict[str, Pose3]()
         is_stationary = objects is self._previous_poses
         if is_stationary and tick < self._standstill_due_tick:

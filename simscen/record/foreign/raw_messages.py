@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from mcap import records
 
-from simscen.record.log_header import ROBOTS
+from simscen.record.log_header import ROBOTS_KEY
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, open_log
 from simscen.record.mcap_writer import MAGIC
@@ -97,7 +97,7 @@ def is_simscen_log(path: Path) -> bool:
 def recorded_robots(path: Path) -> tuple[str, ...]:
     """Return the names of several robots in a log of simscen; () for other logs."""
     try:
-        return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS, "[]")))
+        return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS_KEY, "[]")))
     except Exception:
         return ()
 

@@ -1,4 +1,4 @@
-"""Reader of logs of real robots."""
+"""Reader of a real robot's log: converts messages on standard topics to a Trace, and lists missing evidence."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class SensorMessageCollector:
 
     def _add(self, message: RawMessage) -> None:
         if (message.topic, message.type) == topics.MAP[:2]:
-            self.map = self._sensors.costmap(message.data)[1]
+            self.map = self._sensors.decode_costmap(message.data)[1]
         elif self._sensors.handler(message.topic, message.type) is not None:
             self._check(message)
             self._messages.append(message)
@@ -118,10 +118,10 @@ class SensorMessageCollector:
         """Raise ValueError for an invalid message."""
         match message.type:
             case topics.SCAN_TYPE:
-                self._sensors.scan(message.data)
+                self._sensors.decode_scan(message.data)
             case topics.PARTICLES.type:
-                self._sensors.cloud(message.data)
+                self._sensors.decode_particles(message.data)
             case topics.LOCAL_PLAN.type:
-                self._sensors.path(message.data)
+                self._sensors.decode_path(message.data)
             case _:
-                self._sensors.costmap(message.data)
+                self._sensors.decode_costmap(message.data)

@@ -18,10 +18,8 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 MIN_MESSAGES_AROUND_STEP = 20
 """Minimum number of messages before and after the change of a clock."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""Maximum ratio of the permanent change of the offset (stamp minus time of logging) to its change at one message.
-
-A larger ratio means that the recorder caught up or lost messages, and that no clock was set.
-"""
+"""When a clock is set, the offset (stamp minus time of logging) changes permanently at one message. If the permanent
+change is more than this ratio times the change at the message, the recorder caught up or lost messages instead."""
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between stamps of two topics at the same time. A larger difference means different clocks."""
 

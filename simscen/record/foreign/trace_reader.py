@@ -75,10 +75,8 @@ def _count(number: int) -> str:
 MAX_TRUTH_GAP_S = 1.0
 """Maximum time without ground truth for complete evidence."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
-"""If the first ground truth or scan comes between these times after the first message, the recorder subscribed late.
-
-The log is then judged from the first ground truth or scan on.
-"""
+"""If the first ground truth or the first scan comes between these times after the first message, the recorder
+subscribed late. The log is then judged from this ground truth or scan on."""
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
 """Maximum distance that the robot drives before the first pose of AMCL, for complete evidence."""
 MAX_LISTED_TOPICS = 12
@@ -95,7 +93,7 @@ _ALWAYS_MISSING: dict[Evidence, str] = {
 """Evidence that logs of real robots never contain, with the reason."""
 
 _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan": Evidence.PLANS}
-"""Evidence that the topic with a role contains."""
+"""Evidence that a topic contains, by its role (purpose)."""
 
 
 class ForeignTraceReader:

@@ -22,7 +22,11 @@ from simscen.record.localization_logs.rows import (
 def read_csv_rows(path: Path) -> LocalizationRows:
     """Read a CSV file. Raises UnusableLog for an invalid row.
 
-    The first cell of a row is its kind: odom, scan, truth, or mount.
+    The first cell of a row is its kind. The other cells are:
+
+    odom, truth:  time, x, y, yaw
+    scan:         time, first angle, angle increment, minimum range, maximum range, ranges
+    mount:        x, y, yaw of the lidar on the base, for the scans that follow
     """
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:

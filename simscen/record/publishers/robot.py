@@ -23,7 +23,7 @@ from simscen.record.messages.encode_arrays import (
     TransformBatchPacker,
     TransformsPacker,
 )
-from simscen.record.publishers.channels import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
+from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.trace_thinning import Thinning, Throttle
@@ -58,8 +58,8 @@ class EventPublisher:
 class RobotPublisher:
     """Publishes the moments of a robot.
 
-    `header` and `scenery` describe the run. `robot` is the name of the robot; "" for a single robot. `clock` states
-    whether to publish simulated time on /clock.
+    `header` and `scenery` describe the run. `robot` is the name of the robot; "" for a single robot. If
+    `publishes_clock`, simulated time is published on /clock.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class RobotPublisher:
         header: LogHeader,
         scenery: Scenery,
         robot: str = "",
-        clock: bool = True,
+        publishes_clock: bool = True,
     ) -> None:
         self._time, frames = time, RobotFrames(robot)
         self.thinning = thinning = Thinning(time.rate)
@@ -79,7 +79,7 @@ class RobotPublisher:
             out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), header.map))
         if header.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, messages.string(header.robot_description))
-        self._truth = TruthPublisher(out, time, thinning, frames, clock)
+        self._truth = TruthPublisher(out, time, thinning, frames, publishes_clock)
         self._sensors = SensorPublisher(out, time, thinning, header.frames, header.sensors, frames)
         self._stack = StackPublisher(out, time, thinning, frames)
         self._events = EventPublisher(out, time, header.case)
@@ -162,15 +162,15 @@ MAX_CACHED_WRITERS = 16
 class TruthPublisher:
     """Publishes the ground truth: pose, velocity, and clearance of the robot, and poses of moving objects.
 
-    Poses are also published on /tf. `clock` states whether to publish simulated time on /clock.
+    Poses are also published on /tf. If `publishes_clock`, simulated time is published on /clock.
     """
 
     def __init__(
-        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, clock: bool = True
+        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, publishes_clock: bool = True
     ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
-        self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if clock else truth
+        self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if publishes_clock else truth
         self._without_tf = out.batch_writer(self._common_layouts)
         self._writers: dict[tuple[str, ...], BatchWriter] = {}
         self._pack_transforms, self._tf_writer = TransformsPacker(), out.topic_writer(topics.TF)

@@ -23,7 +23,7 @@ from simscen.record.messages.encode_markers import (
     outline_edges,
     rectangle_triangles,
 )
-from simscen.record.publishers.channels import MessageSink
+from simscen.record.publishers.message_sinks import MessageSink
 
 OBJECT_COLOR: Color = (0.0, 0.41, 0.58, 1.0)
 PEDESTRIAN_COLOR: Color = (0.48, 0.24, 0.51, 1.0)

@@ -1,4 +1,4 @@
-"""Publisher of sensor readings and their transforms."""
+"""Publisher of sensor readings, of odometry on /tf, and of the poses of sensors on /tf_static."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readin
 from simscen.record import frame_names, topics
 from simscen.record.messages import encode
 from simscen.record.messages.encode_arrays import LaserScanPacker, TransformsPacker
-from simscen.record.publishers.channels import BatchWriter, MessageSink, TopicWriter
+from simscen.record.publishers.message_sinks import BatchWriter, MessageSink, TopicWriter
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 
@@ -37,7 +37,7 @@ class SensorPublisher:
             topics with their first reading.
 
     Attributes:
-        declared: Sensor names and topics of all `sensors`.
+        sensor_topics: Pairs of sensor name and topic for all `sensors`.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class SensorPublisher:
         self._mounts = dict(mounts)
         self._map_from_odom: Pose3 | None = None
         kinds = sensors or {}
-        self.declared = [(name, topic) for name, kind in kinds.items() for topic in self._topics_of(name, kind)]
+        self.sensor_topics = [(name, topic) for name, kind in kinds.items() for topic in self._topics_of(name, kind)]
         self._publish_mounts(0)
 
     def set_map_from_odom(self, map_from_odom: Pose3) -> None:

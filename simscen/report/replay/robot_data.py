@@ -46,11 +46,11 @@ def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str
 
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
     """Return the scans of one lidar. Scans with another number of beams than the first scan are omitted."""
-    first = sensors.scan(messages[0][1])
+    first = sensors.decode_scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
     indices = evenly_spaced(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
-    scans = [(messages[k][0], sensors.scan(messages[k][1])) for k in indices]
+    scans = [(messages[k][0], sensors.decode_scan(messages[k][1])) for k in indices]
     scans = [(tick, scan) for tick, scan in scans if len(scan.ranges) == len(first.ranges)]
     columns.note_reduction(f"scans on {one_line(topic)}", len(scans), len(messages))
     columns.note_reduction(f"beams of a scan on {one_line(topic)}", beams, len(first.ranges))
@@ -75,7 +75,7 @@ def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str,
     if not sensors.particles:
         return None
     indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
-    clouds = [(sensors.particles[k][0], sensors.cloud(sensors.particles[k][1])) for k in indices]
+    clouds = [(sensors.particles[k][0], sensors.decode_particles(sensors.particles[k][1])) for k in indices]
     subsets = [cloud[evenly_spaced(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
     table = np.concatenate(subsets)
     columns.note_reduction("particle clouds", len(clouds), len(sensors.particles))
@@ -98,7 +98,9 @@ def local_plans_data(sensors: SensorMessages, columns: PackedColumns) -> dict[st
     """Return the controller's local plans; None without local plans."""
     indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
-    return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in indices], columns)
+    return _paths(
+        [(sensors.local_plans[k][0], sensors.decode_path(sensors.local_plans[k][1])) for k in indices], columns
+    )
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
@@ -137,13 +139,13 @@ def _costmap(
     topic: str, messages: LoggedMessages, sensors: SensorMessages, trace: Trace, columns: PackedColumns
 ) -> dict[str, Any]:
     """Return the grids of a topic. A grid with the origin and size of the previous grid is stored as differences."""
-    _, first = sensors.costmap(messages[0][1])
+    _, first = sensors.decode_costmap(messages[0][1])
     indices = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
     columns.note_reduction(f"grids on {one_line(topic)}", len(indices), len(messages))
     grids = []
     previous: OccupancyGrid | None = None
     for tick, data in (messages[k] for k in indices):
-        frame, grid = sensors.costmap(data)
+        frame, grid = sensors.decode_costmap(data)
         is_same_grid = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
         cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and is_same_grid else grid.cells
         origin = grid.origin if frame == frame_names.MAP else map_from_odom(trace, tick).compose(grid.origin)

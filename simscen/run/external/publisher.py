@@ -17,7 +17,7 @@ from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frame_names, topics
 from simscen.record.messages import encode, encode_arrays
-from simscen.record.publishers.channels import BatchWriter, Layouts, TopicWriter
+from simscen.record.publishers.message_sinks import BatchWriter, Layouts, TopicWriter
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
@@ -42,7 +42,7 @@ class StepPublisher:
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = SimTime(tick_rate)
         self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
-        self.sensor_topics = self._sensors.declared
+        self.sensor_topics = self._sensors.sensor_topics
         """Pairs of a sensor name and a topic with readings of that sensor."""
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:

@@ -106,9 +106,9 @@ def test_log_contains_both_costmaps_at_a_limited_rate(out: Path) -> None:
     for topic, period in (("/global_costmap/costmap", 480), ("/local_costmap/costmap", 240)):
         messages = log.sensors.costmaps[topic]
         assert (np.diff([tick for tick, _ in messages]) >= period).all()
-        frame, grid = log.sensors.costmap(messages[-1][1])
+        frame, grid = log.sensors.decode_costmap(messages[-1][1])
         assert frame == ("map" if topic.startswith("/global") else "odom")
         assert set(np.unique(grid.cells).tolist()) <= {-1, *range(101)}
-    _, wide = log.sensors.costmap(log.sensors.costmaps["/global_costmap/costmap"][-1][1])
+    _, wide = log.sensors.decode_costmap(log.sensors.costmaps["/global_costmap/costmap"][-1][1])
     assert log.header.map is not None and wide.shape == log.header.map.shape
     assert (wide.cells[log.header.map.cells == 100] == 100).all() and 99 in wide.cells

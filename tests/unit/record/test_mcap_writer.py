@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.record import topics
 from simscen.record.mcap_writer import McapWriter
 from simscen.record.messages import encode
-from simscen.record.publishers.channels import BatchWriter, LogPublisher
+from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher
 from simscen.record.topics import load_message_types
 
 TEXT = load_message_types()["std_msgs/msg/String"]

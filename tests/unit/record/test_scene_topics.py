@@ -137,4 +137,4 @@ def test_mounts_and_scans_of_several_robots_are_read_without_their_prefix(tmp_pa
         assert set(log.header.frames) == {"camera", "lidar", "rear lidar"}
         assert set(log.trace.objects) == {"cart", "a box"}
         _, scan = log.sensors.scans["/scan"][0]
-        assert log.sensors.scan(scan).mount == Pose2(0.1, 0.0, 0.0)
+        assert log.sensors.decode_scan(scan).mount == Pose2(0.1, 0.0, 0.0)

@@ -1,6 +1,6 @@
-"""Destinations of published messages: a log, or the namespace of a robot in a log.
+"""Message sinks, the destinations of published messages: a log, or the namespace of a robot in a log.
 
-TopicWriter and BatchWriter are faster interfaces to a destination, for topics with many messages.
+TopicWriter and BatchWriter are faster interfaces to a sink, for topics with many messages.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ Layouts = Sequence[tuple[Topic, Template]]
 
 
 class MessageSink(Protocol):
-    """Destination of messages, such as a log or an external stack."""
+    """Destination of published messages, such as a log or an external stack."""
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
         """Publish a serialized message at `time` nanoseconds."""
@@ -66,7 +66,7 @@ class BatchWriter:
 
 
 class LogPublisher:
-    """Destination that writes messages to a log. The first message on a topic opens the topic's channel."""
+    """Message sink that writes to a log. The first message on a topic opens the topic's channel."""
 
     def __init__(self, writer: McapWriter) -> None:
         self._writer = writer
@@ -136,7 +136,7 @@ class _ChunkBatchWriter(BatchWriter):
 
 
 class NamespacedPublisher:
-    """Destination that writes the messages of a robot to a log, in the namespace `/ROBOT` (except /clock)."""
+    """Message sink that writes the messages of a robot to a log, in the namespace `/ROBOT` (except /clock)."""
 
     def __init__(self, out: LogPublisher, robot: str) -> None:
         self._out, self._robot = out, robot
