@@ -1,1 +1,1 @@
-"""Editor of scenario and world files, `simscen edit`: a local web page with the map and the text of a file."""
+"""Editor of scenario and world files, `simscen edit`: a local web page that shows a file as text and on a map."""

@@ -1,4 +1,4 @@
-"""Checks of an edited text, which need not be saved. They are the checks of `simscen validate`."""
+"""Checks of the text in the editor, also before it is saved. They are the checks of `simscen validate`."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ MAX_WORLDS = 8
 
 @dataclass
 class TextChecks:
-    """Loads and checks texts of one file.
+    """Loads and checks versions of the text of one file.
 
     lenient:  value of the option --lenient
     stack:    stack that replaces the stack of the scenario; None to keep it

@@ -35,7 +35,7 @@ class EditedFile:
         return PathSandbox.around(self.root, self.world_path).display_name(self.path)
 
     def library(self, text: str) -> Library:
-        """Return a reader of the files in these folders. It returns `text` as the content of the edited file."""
+        """Return a reader of the files in these folders, which reads `text` instead of the edited file."""
         return Library(PathSandbox.around(self.root, self.world_path), unsaved={self.path: text})
 
 
@@ -110,7 +110,7 @@ class Document:
             return NEW
 
     def _content_of_version(self, version: str) -> Content:
-        """Return the current content of the file with the current `version`. Its text is "" if it cannot be read."""
+        """Return the current content of the file, given its version. The text is "" if it cannot be read."""
         text = read_text(self.path, self.display_name) if version != NEW else ""
         return Content(text if isinstance(text, str) else "", version)
 
@@ -121,4 +121,5 @@ class Document:
 
 
 def _version(raw: bytes) -> str:
+    """Return the version of a file with this content."""
     return hashlib.sha256(raw).hexdigest()

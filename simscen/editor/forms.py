@@ -1,7 +1,7 @@
-"""Forms for editing the values of a file, made from its JSON Schema.
+"""Forms for editing the values of a file, made from the JSON Schema of this kind of file.
 
 `keys` are the path to a value in the file: keys of mappings and indices of lists. `data` is the content of the file as
-dicts, lists, and scalars.
+dicts, lists, and scalars. A field is an input of a form for one value.
 """
 
 import json
@@ -34,7 +34,7 @@ def schema_of_kind(kind: str) -> Schema:
 
 
 def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
-    """Return the schema of the value at `keys`; {} for an unknown key. `root` is the schema of the file."""
+    """Return the schema of the value at `keys`; {} for an unknown key. `root` is the schema of the whole file."""
     schema = resolve_schema(root, root, data)
     for key in keys:
         child = value_at(data, (key,))
@@ -44,7 +44,7 @@ def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
 
 
 def child_schema(schema: Schema, key: Key) -> Schema:
-    """Return the schema of the value of a key, or of the item with an index; {} if the schema has none."""
+    """Return the schema of the value or item at `key` of a mapping or list; {} if the schema has none."""
     if isinstance(key, int):
         prefix = schema.get("prefixItems", [])
         found = prefix[key] if key < len(prefix) else schema.get("items", {})
@@ -83,13 +83,13 @@ def value_at(data: Any, keys: Sequence[Key]) -> Any:
 
 
 def alternatives(schema: Schema) -> list[str]:
-    """Return the keys of which a mapping must have exactly one, such as kinds of triggers; [] without such keys."""
+    """Return the keys exactly one of which a mapping must have, such as kinds of triggers; [] without such keys."""
     options = [one.get("required", []) for one in schema.get("oneOf", []) if isinstance(one, dict)]
     return [option[0] for option in options if len(option) == 1]
 
 
 def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
-    """Return the schema without the keys `without`, merged with a branch. Its own description has priority."""
+    """Return the schema without the keys `without`, merged with a branch. The schema's own description has priority."""
     outer = {key: value for key, value in schema.items() if key not in without}
     description = outer.get("description") or branch.get("description", "")
     return {**outer, **branch, "description": description}
@@ -98,8 +98,8 @@ def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> S
 def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
     """Yield the branches of allOf, oneOf, and anyOf that apply to the data.
 
-    Branches whose condition is true come first, then references to schemas with the `type` of the data. The first
-    reference is the default at the end.
+    First come the branches with a true condition, then the references to schemas with the `type` of the data. The last
+    one is the default: the first reference.
     """
     unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
     conditional = [union for union in unions if "if" in union and "then" in union]
@@ -129,13 +129,13 @@ def _applies(condition: Schema, data: Any) -> bool:
 
 
 MAX_REFERENCES = 8
-"""Maximum number of references and conditions in sequence."""
+"""Maximum number of references and conditions that are resolved for one value."""
 MAX_DEPTH = 4
-"""Maximum depth of nested fields in a form."""
+"""Maximum number of levels of nested fields in a form."""
 MAX_ITEMS = 12
-"""Maximum number of items of a list in a form. Longer lists have no fields."""
+"""Maximum number of items for which a list has fields. A longer list has none."""
 MAX_TEXT_FIELD_CHARACTERS = 60
-"""Maximum length of a string in a field with one line."""
+"""Maximum length of a string in a single-line field."""
 FIRST_VALUE_OF_KEY = {
     "name": "new",
     "description": "description",
@@ -143,7 +143,7 @@ FIRST_VALUE_OF_KEY = {
     "through": [[0, 0]],
     "points": [[0, 0], [1, 0]],
 }
-"""Initial values of new keys, with priority over the schema."""
+"""Initial values of new keys, by key. They have priority over the schema."""
 
 Keys = tuple[Key, ...]
 _EXAMPLE_OF_QUANTITY = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")

@@ -15,9 +15,9 @@ from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedWorld
 
 LIDAR_HEIGHT_M = 0.2
-"""Height of the horizontal section through the world that yields its map."""
+"""Height of the horizontal section through the world from which its map is made."""
 PREFERRED_CLEARANCE_M = 0.5
-"""Preferred minimum distance of start and goal from walls. If no position has it, smaller distances are tried."""
+"""Minimum distance of start and goal from walls, if possible. Otherwise smaller distances are tried."""
 MAX_CANDIDATES = 200
 """Maximum number of free positions from which start and goal are chosen."""
 
@@ -68,7 +68,7 @@ def _pose_text(pose: Pose2) -> str:
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
-    """Return two free positions that are far apart and have a path between them; two origins without free space."""
+    """Return two free poses that are far apart and have a path between them; two origins without free space."""
     points = _free_points(built)
     if not len(points):
         return Pose2(0.0, 0.0), Pose2(0.0, 0.0)
@@ -83,7 +83,7 @@ def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
 
 
 def _free_points(built: BuiltWorld) -> Array:
-    """Return at most MAX_CANDIDATES free positions (n, 2) in m, if possible with PREFERRED_CLEARANCE_M."""
+    """Return at most MAX_CANDIDATES free positions (n, 2) in m, if possible PREFERRED_CLEARANCE_M from walls."""
     from scipy import ndimage
 
     grid = built.map

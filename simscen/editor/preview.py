@@ -1,4 +1,4 @@
-"""Shortest paths and clearances of a scenario's robots, which the editor page shows while the user drags an object."""
+"""Preview for the editor page: shortest paths and clearances of the robots, shown while the user drags an object."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ MAX_CLEARANCE_M = 1000.0
 
 
 def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
-    """Return JSON data with the footprint, legs, and clearances at start and goals of each robot, by its key.
+    """Return JSON data: footprint, legs, and clearances at the start and the goals, by path of the robot in the file.
 
     If the text has problems, there are no robots, and `reason` is the first problem.
     """
@@ -75,7 +75,7 @@ def _static_solids(scene: Scene) -> tuple[Solid, ...]:
 
 
 def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
-    """Return the points and the length in m of the shortest path; a straight line and None without a path."""
+    """Return the points and the length in m of the shortest path; without one, a straight line and the length None."""
     path = paths.path(start, goal)
     if path is None:
         return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}

@@ -1,4 +1,4 @@
-"""Local HTTP server of the editor. It answers only requests whose URL contains its secret token."""
+"""Local HTTP server of the editor. It answers only requests with its secret token in the URL."""
 
 import json
 import re
@@ -22,7 +22,7 @@ _WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
 
 
 class OpenFiles:
-    """Editor sessions of the main file and of the world files that it refers to.
+    """Editor sessions of the main file, and of the world files to which it refers or referred.
 
     The page of world file number n has the path `world-n/`. The number of a world file never changes. The session of a
     world file starts when its page is first requested.
@@ -62,7 +62,7 @@ class OpenFiles:
                 if path is None:
                     return None
                 try:
-                    self._sessions[number] = self.main.open_other(replace(self.main.file, path=path, kind="world"))
+                    self._sessions[number] = self.main.open_world(replace(self.main.file, path=path, kind="world"))
                 except InvalidInput:
                     return None
             return self._sessions[number]
@@ -127,6 +127,8 @@ class EditorServer(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
+    """Handler of the requests of a browser: pages and files by GET, requests of the page by POST."""
+
     server: EditorServer
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "simscen", ""

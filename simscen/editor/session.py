@@ -1,6 +1,6 @@
-"""Answers to the requests of the editor page.
+"""Session of the editor: answers the requests of the editor page about one file.
 
-The page holds the edited text and sends it as `text` with each request. The page also shows a map of the world.
+The page holds the edited text, and sends it as `text` with each request. The page also shows a map of the world.
 """
 
 import threading
@@ -30,15 +30,16 @@ from simscen.run.process.jobs import Backend
 Data = dict[str, Any]
 """JSON object."""
 CommandResolver = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
-"""Function that returns a scenario with the commands of its external stacks, and problems with these commands."""
+"""Function that adds the commands of external stacks to a scenario. It returns the scenario and the problems found."""
 
 
 def _without_commands(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
+    """Return the scenario unchanged. This is the CommandResolver if no commands are configured."""
     return loaded, []
 
 
 class RequestRefused(Exception):
-    """The request cannot be answered. `status` is the HTTP status, `data` are additional keys of the answer."""
+    """The request cannot be answered. `status` is the HTTP status, `data` has additional keys of the answer."""
 
     def __init__(self, message: str, status: int = 400, data: Data | None = None) -> None:
         super().__init__(message)
@@ -67,7 +68,7 @@ class EditorSession:
         new_text:          text of a file that does not exist yet; "" for an existing file
         lenient:           value of the option --lenient
         stack:             stack that replaces the stack of the scenario; None to keep it
-        resolve_commands:  returns the scenario with the commands of external stacks
+        resolve_commands:  adds the commands of external stacks before a run
         """
         self.file = file
         self.runs = TrialRuns(backend_factory)
@@ -94,8 +95,8 @@ class EditorSession:
             "run-stop": self.run_stop,
         }
 
-    def open_other(self, file: EditedFile) -> "EditorSession":
-        """Return a session for another file with the same options. Raises InvalidInput if the file cannot be read."""
+    def open_world(self, file: EditedFile) -> "EditorSession":
+        """Return a session for a world file of this scenario. Raises InvalidInput if the file cannot be read."""
         return EditorSession(file, self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
@@ -155,7 +156,7 @@ class EditorSession:
         return form_data(self.file.kind, text, parts.tree.plain, tuple(keys))
 
     def preview(self, request: Data) -> Data:
-        """Return the paths and clearances of the robots after `edits`."""
+        """Return the shortest paths and the clearances of the robots after `edits`."""
         if self.file.kind != "scenario":
             return {"reason": "", "robots": {}}
         text = self._edited_text(_text(request), request.get("edits", []))
@@ -225,7 +226,7 @@ class EditorSession:
         }
 
     def _problem_data(self, problem: Problem, objects: list[MapObject], source: SourceNode | None, text: str) -> Data:
-        """Return a problem as JSON data. `source` is the syntax tree of the text; None if it is invalid."""
+        """Return a problem as JSON data. `source` is the syntax tree of the text; None if the text is invalid."""
         is_own = problem.path == self.file.display_name
         return {
             "path": problem.path,
@@ -251,6 +252,7 @@ def _text(request: Data) -> str:
 
 
 def _first_message(problems: list[Problem]) -> str:
+    """Return the message of the first problem, with its line and column."""
     first = min(problems)
     return f"{first.line}:{first.col}: {first.message}" if first.line else first.message
 

@@ -1,4 +1,4 @@
-"""Trial runs of the text in the editor, which need not be saved."""
+"""Trial runs of the text in the editor, also before it is saved."""
 
 import shutil
 import tempfile
@@ -28,8 +28,8 @@ class _Canceled(Exception):
 
 
 @dataclass
-class Trial:
-    """State of one run, which is updated during the run.
+class TrialRun:
+    """Trial run with its state, which is updated during the run.
 
     Attributes:
         number: Number of the run, starting at 1.
@@ -70,26 +70,29 @@ class Trial:
 
 
 class TrialRuns:
-    """Runs scenarios one after the other. `backend_factory` creates the backend that starts the process of a run."""
+    """All trial runs of an editor session, which are executed one after the other.
+
+    `backend_factory` creates the backend that starts the process of a run.
+    """
 
     def __init__(self, backend_factory: Callable[[], Backend]) -> None:
         self._backend_factory = backend_factory
         self._folder: Path | None = None
-        self._trials: list[Trial] = []
+        self._trials: list[TrialRun] = []
         self._lock = threading.Lock()
 
-    def start(self, loaded: LoadedScenario) -> Trial:
+    def start(self, loaded: LoadedScenario) -> TrialRun:
         """Cancel all earlier runs, start a run in a thread, and return its state."""
         for trial in self._trials:
             trial.is_canceled = True
         self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
         number = len(self._trials) + 1
-        trial = Trial(number, self._folder / str(number), loaded.spec.time_limit)
+        trial = TrialRun(number, self._folder / str(number), loaded.spec.time_limit)
         self._trials.append(trial)
         threading.Thread(target=self._run, args=(loaded, trial), daemon=True).start()
         return trial
 
-    def trial(self, number: int) -> Trial | None:
+    def trial(self, number: int) -> TrialRun | None:
         """Return the state of the run with a number; None if there is no such run."""
         return self._trials[number - 1] if 0 < number <= len(self._trials) else None
 
@@ -103,7 +106,7 @@ class TrialRuns:
         if has_ended:
             self._lock.release()
 
-    def _run(self, loaded: LoadedScenario, trial: Trial) -> None:
+    def _run(self, loaded: LoadedScenario, trial: TrialRun) -> None:
         """Wait for earlier runs, simulate a scenario, and write its progress and result to `trial`."""
 
         def listen(event: SessionEvent) -> None:
@@ -122,7 +125,7 @@ class TrialRuns:
         except (SimscenError, OSError) as error:
             trial.state, trial.message = "error", one_line(str(error))
 
-    def _finish(self, trial: Trial, result: RunResult) -> None:
+    def _finish(self, trial: TrialRun, result: RunResult) -> None:
         """Write the result to `trial`."""
         lines = result.lines or (0,) * len(result.verdicts)
         for verdict, line in zip(result.verdicts, lines, strict=False):

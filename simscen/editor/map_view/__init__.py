@@ -1,1 +1,1 @@
-"""Map of the editor: objects, background, and edits of the text by changes on the map."""
+"""Map of the editor: its objects, its background, and the conversion of changes on the map to edits of the text."""

@@ -35,7 +35,7 @@ class Backgrounds:
     def background(self, source: LoadedWorld | None) -> dict[str, Any]:
         """Return the background of a world as JSON data.
 
-        id:        text that changes with the files of the map or SDF world; "" for a world without such files
+        id:        ID that changes when a file of the map or SDF world changes; "" without such files
         bounds:    lowest x, lowest y, highest x, highest y in m; None without a background
         image:     image of the map
         segments:  lines (x, y, x, y) in m of the SDF world
@@ -61,6 +61,7 @@ class Backgrounds:
         return self._cached
 
     def _image_or_segments(self, source: LoadedWorld) -> dict[str, Any]:
+        """Return the background without `id`; {} for an invalid world."""
         try:
             if source.map is not None:
                 return _image_part(load_map(source.map))
@@ -69,6 +70,7 @@ class Backgrounds:
             return {}  # `validate` reports it
 
     def _segments_part(self, source: LoadedWorld) -> dict[str, Any]:
+        """Return `bounds` and `segments` of an SDF world; {} for a world without solids."""
         from simscen.worlds.geometry.cross_section import section_segments
         from simscen.worlds.geometry.triangulation import merge_solids
 

@@ -53,7 +53,7 @@ def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) ->
 def _pose_edits(
     keys: Keys, x: float, y: float, yaw: float | None, source: SourceNode | None, order: tuple[str, ...]
 ) -> Iterator[Edit]:
-    """Yield edits that set x, y, and yaw of an existing mapping, or that set a new mapping.
+    """Yield edits that set x, y, and yaw of the mapping at `keys`, or that replace another value by such a mapping.
 
     `yaw` is None to keep the heading.
     """
@@ -73,7 +73,7 @@ def _pose_edits(
 
 
 def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
-    """Yield edits that set numbers of a list, such as [x, y] or [t, x, y, yaw]. `axes` has the new numbers by index."""
+    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `axes` are the new numbers by index."""
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
         for index, value in axes.items():

@@ -1,6 +1,6 @@
 """Objects on the map of the editor, and functions that read them from the data of a world.
 
-The data are dicts, lists, and scalars that need not be valid. Values that cannot be read are ignored. `keys` are the
+The data are dicts, lists, and scalars. They need not be valid; values that cannot be read are ignored. `keys` are the
 path to a value in the file.
 """
 
@@ -62,9 +62,9 @@ class MapObject:
         radius: Radius in m of a circle around the first handle; None for no circle.
         radius_keys: Path to the radius if it can be changed; otherwise ().
         region: Name of the region that the object refers to; "" for none.
-        follows: Name of a moving object that is the center of the circle; "" for the first handle.
+        follows: Name of the moving object at the center of the circle; "" if the center is the first handle.
         moves_as_one: Whether dragging the object moves all its handles.
-        origin: First point (x, y) in m of the line, before the handles; None if the line starts at the first handle.
+        origin: Start (x, y) in m of the line, before the first handle; None if the line starts at the first handle.
         points_keys: Path to the list of the handles if handles can be added and removed; otherwise ().
         width: Width of the line in m.
     """
@@ -107,7 +107,7 @@ def mapping(value: Any) -> dict[str, Any]:
 
 
 def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return one handle for a pose or the name of a place; () for other values."""
+    """Return the handle for a pose or the name of a place, as a tuple; () for other values."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "pose", *found, value),) if found else ()
@@ -123,7 +123,7 @@ def point_handles(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 
 
 def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return one handle for a point [x, y] or the name of a place; () for other values."""
+    """Return the handle for a point [x, y] or the name of a place, as a tuple; () for other values."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "point", found[0], found[1], None, value),) if found else ()
@@ -157,7 +157,7 @@ def outline(thing: Mapping[str, Any]) -> list[Corners]:
 
 
 def circle(radius: float) -> Corners:
-    """Return a circle with a radius in m around the origin as a polygon."""
+    """Return a circle around the origin as a polygon. The radius is in m."""
     turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
 
@@ -165,7 +165,7 @@ def circle(radius: float) -> Corners:
 def motion_path(
     value: Any, keys: Keys, label: str, places: Places, origin: Handle | None = None
 ) -> Iterator[MapObject]:
-    """Yield an object for the path of a motion through waypoints or keyframes; nothing for another motion.
+    """Yield an object for the path of a motion through waypoints or keyframes; nothing for another value.
 
     `origin` is the start position of the moving object.
     """
@@ -180,10 +180,10 @@ def motion_path(
 
 
 def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
-    """Return the ID of the object whose YAML contains a problem; "" if no object does.
+    """Return the ID of the object to which a problem in the text belongs; "" if there is none.
 
-    Of several objects, returns the one with the shortest YAML. A problem at a key belongs to the value in the same
-    line. `source` is the syntax tree of `text`.
+    If several objects contain the problem, the one with the shortest YAML is chosen. A problem at a key belongs to the
+    value in the same line. `source` is the syntax tree of `text`.
     """
     if not problem.line or source is None:
         return ""
@@ -207,10 +207,10 @@ def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
 
 
 def world_objects(world: Any, keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield the objects in the data of a world at `keys` of the file."""
+    """Yield the objects of a world. `world` is its data, at `keys` of the file."""
     data = mapping(world)
     yield from _regions(data, keys)
-    yield from _lines(data, keys, places)
+    yield from _walls_ramps_doors(data, keys, places)
     for key, kind in (("obstacles", "obstacle"), ("objects", "object")):
         for index, thing in enumerate(items(data.get(key))):
             yield from _object(mapping(thing), (*keys, key, index), kind, places)
@@ -226,8 +226,8 @@ def _regions(data: dict[str, Any], keys: Keys) -> Iterator[MapObject]:
         yield MapObject(own, "region", name, corners, line="closed", moves_as_one=True, points_keys=own)
 
 
-def _lines(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield walls, ramps, and doors."""
+def _walls_ramps_doors(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
+    """Yield the walls, ramps, and doors, which are lines with a width."""
     for index, wall in enumerate(map(mapping, items(data.get("walls")))):
         own = (*keys, "walls", index)
         corners = point_handles(wall.get("points"), (*own, "points"), places)
@@ -249,6 +249,7 @@ def _lines(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObje
 
 
 def _object(thing: dict[str, Any], keys: Keys, kind: str, places: Places) -> Iterator[MapObject]:
+    """Yield an obstacle or movable object, and its path if it moves."""
     handle = pose_handle(thing.get("pose"), (*keys, "pose"), places)
     label = str(thing.get("name", kind))
     yield MapObject(keys, kind, label, handle, outline(thing))

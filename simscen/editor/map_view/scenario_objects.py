@@ -1,6 +1,6 @@
 """Functions that read the objects on the map from the data of a scenario: robots, goals, events, zones, faults.
 
-The data are dicts, lists, and scalars that need not be valid. `keys` are the path to a value in the file.
+The data are dicts, lists, and scalars. They need not be valid. `keys` are the path to a value in the file.
 """
 
 from collections.abc import Iterator
@@ -26,13 +26,13 @@ from simscen.editor.map_view.map_objects import (
 SETTINGS = "settings"
 """Kind of the object for the top-level keys of the scenario."""
 KIND_OF_POSE_ACTION = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
-"""Kinds of the objects for actions with a pose."""
+"""Kind of the object on the map for each action with a pose."""
 COMBINED_TRIGGERS = {"all", "any"}
 """Triggers that contain a list of triggers."""
 
 
 def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject]:
-    """Yield the objects of a scenario without the objects of its world."""
+    """Yield the objects of a scenario, except the objects of its world."""
     yield MapObject((), SETTINGS, str(data.get("name", "scenario")))
     robots = mapping(data.get("robots"))
     if not robots:
@@ -61,6 +61,7 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
 
 
 def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    """Yield a robot, and its initial pose estimate if the scenario sets it."""
     yield MapObject(keys, "robot", label, pose_handle(robot.get("pose"), (*keys, "pose"), places))
     own = (*keys, "initial_estimate")
     if estimate := pose_handle(robot.get("initial_estimate"), own, places):
@@ -82,7 +83,7 @@ def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapO
 
 
 def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
-    """Yield the triggers and actions of an event."""
+    """Yield the objects for the triggers and actions of an event."""
     yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
     actions = event.get("do")
     written: list[tuple[Keys, Any]] = [(("do", index), action) for index, action in enumerate(items(actions))]
@@ -161,6 +162,7 @@ def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]
 
 
 def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
+    """Yield the faults of a scenario or robot, and the objects for their triggers."""
     for index, fault in enumerate(map(mapping, items(data.get("faults")))):
         own = (*keys, "faults", index)
         label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_first_key(fault, ('name', 'sensor'))}"))
@@ -169,7 +171,7 @@ def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObj
 
 
 def _first_key(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
-    """Return the first key that is not in `without`, which is the kind of the criterion or fault."""
+    """Return the kind of a criterion or fault: its first key that is not in `without`."""
     return next((key for key in entry if key not in without), "entry")
 
 

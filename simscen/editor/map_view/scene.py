@@ -1,4 +1,4 @@
-"""Scene that the editor page shows for a text: objects of the scenario and its world, and the background."""
+"""Scene that the editor page shows for a text: objects of the scenario and of its world, and the background."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -80,7 +80,7 @@ def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> Loaded
 
 
 def map_objects(parts: SceneParts) -> list[MapObject]:
-    """Return at most MAX_OBJECTS objects of the map and the list of objects."""
+    """Return at most MAX_OBJECTS objects, for the map and the list of objects."""
     data, places = parts.tree.plain, world_places(parts.world_data)
     found: list[MapObject] = []
     if parts.file.kind == "scenario":
@@ -109,11 +109,12 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
 
 
 def _world_keys(parts: SceneParts) -> Keys:
+    """Return the path to the world in the edited file."""
     return () if parts.file.kind == "world" else ("world",)
 
 
 def _world_file(parts: SceneParts, edited_name: str) -> str:
-    """Return the name of the world file if it is not the edited file, and "" for a map or SDF file."""
+    """Return the name of the world file; "" if it is the edited file, a map, or an SDF file."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
@@ -155,7 +156,7 @@ def _handle_data(handle: Handle) -> dict[str, Any]:
 
 
 def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
-    """Return whether the object at `keys` can be edited in this text, and its line, or 0 if it is in another file.
+    """Return whether the object at `keys` can be edited in this text, and its line; 0 if it is in another file.
 
     `source` is the syntax tree of the text without inherited content; None if the text is invalid.
     """

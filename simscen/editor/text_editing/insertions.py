@@ -1,7 +1,7 @@
 """Insertion and removal of keys and list items of a YAML text, in the style of the existing entries.
 
-Functions return a Splice (replacement of a part of the text). In YAML's block style, each entry has its own line. In
-flow style, entries are in braces or brackets.
+The functions return a Splice, the replacement of a part of the text. In YAML's block style, each entry has its own
+line. In flow style, entries are in braces or brackets.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ INDENT = 2
 def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
     """Return the splice that adds a key with a value to a mapping.
 
-    `order` is the preferred order of keys. Without it, the new key is inserted at the end.
+    `order` is the preferred order of keys. A key that is not in `order` is inserted at the end.
     """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))
@@ -65,7 +65,7 @@ def dash_before(text: str, start: int) -> int:
 
 
 def _block_entry(key: str, value: Any, indent: int) -> str:
-    """Return the text of a new entry of a block mapping. Items of a list of mappings get their own lines."""
+    """Return the text of a new entry of a block mapping. In a list of mappings, each item gets its own line."""
     if isinstance(value, list) and any(isinstance(item, dict) for item in value):
         items = [f"\n{' ' * (indent + INDENT)}- {flow_text(item)}" for item in value]
         return f"{string_text(key)}:{''.join(items)}"

@@ -1,6 +1,6 @@
 """Edits of a YAML text that set a value, insert a list item, or remove a part, and preserve every other character.
 
-The new text is parsed to verify the edit. If any other value has changed, the edit is refused.
+The new text is parsed to verify the edit. If a value outside of the edit has changed, the edit is refused.
 """
 
 import copy
@@ -18,7 +18,7 @@ from simscen.loading.yaml.tree import Key
 
 @dataclass(frozen=True)
 class SetValue:
-    """Edit that sets the value at `keys`, and creates missing mappings around the value.
+    """Edit that sets the value at `keys`, and creates the missing mappings that contain it.
 
     `order` is the preferred order of keys, which determines the position of a new key.
     """
@@ -52,7 +52,7 @@ Edit = SetValue | AddItem | RemovePart
 
 
 class EditedText(NamedTuple):
-    """The text after edits, and the splices in their order. The indices of a splice refer to the text before it."""
+    """The text after edits, and the splices in the order in which they were applied."""
 
     text: str
     splices: tuple[Splice, ...]
@@ -85,7 +85,7 @@ def _parse(text: str) -> SourceNode:
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
-    """Return the splices of the leading edits that replace different scalars, and can share one syntax tree."""
+    """Return the splices of the first edits that replace different scalars, so that one syntax tree suffices."""
     found: list[Splice] = []
     for edit in edits:
         node = source_at(source, edit.keys) if isinstance(edit, SetValue) else None

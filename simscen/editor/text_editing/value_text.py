@@ -1,4 +1,4 @@
-"""Conversion of values to YAML text, if possible in the notation of the replaced text."""
+"""Conversion of values to YAML text, if possible in the notation of the text that they replace."""
 
 import json
 import math
@@ -16,7 +16,7 @@ MAX_DECIMALS = 6
 MAX_PADDED_DECIMALS = 3
 """Maximum number of decimal places to which trailing zeros are added."""
 NUMBER_TOLERANCE = 2e-6
-"""Maximum difference between equal numbers, in the unit of their text."""
+"""Difference up to which two numbers count as equal, in the unit of their text."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")

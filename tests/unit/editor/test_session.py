@@ -10,7 +10,7 @@ from simscen.cli.session.stacks import Stacks
 from simscen.core.external_command import ExternalCommand
 from simscen.editor.document import EditedFile
 from simscen.editor.session import EditorSession, RequestRefused
-from simscen.editor.trial_run import Trial
+from simscen.editor.trial_run import TrialRun
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.stacks.choice import StackChoice
 from simscen.run.process.jobs import Backend
@@ -213,9 +213,9 @@ def test_a_run_uses_the_stack_of_the_option_instead_of_that_of_the_text(
     session = EditorSession(file, _no_backend, stack=stacks.chosen[0], resolve_commands=stacks.with_command)
     started: list[LoadedScenario] = []
 
-    def start(loaded: LoadedScenario) -> Trial:
+    def start(loaded: LoadedScenario) -> TrialRun:
         started.append(loaded)
-        return Trial(1, tmp_path, 60.0)
+        return TrialRun(1, tmp_path, 60.0)
 
     monkeypatch.setattr(session.runs, "start", start)
     assert session.open({})["stack"] == "mine"

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.editor.checking import TextChecks
 from simscen.editor.document import EditedFile
-from simscen.editor.trial_run import Trial, TrialRuns
+from simscen.editor.trial_run import TrialRun, TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always_true
 from simscen.spec.registry import RegisteredType
@@ -71,7 +71,7 @@ def test_a_run_shows_its_progress_until_it_is_stopped(loaded: LoadedScenario) ->
 
 def test_a_new_run_stops_the_one_before_and_the_end_deletes_their_files(loaded: LoadedScenario) -> None:
     runs = TrialRuns(EndlessBackend)
-    trials: list[Trial] = []
+    trials: list[TrialRun] = []
     for _ in range(2):
         trials.append(runs.start(loaded))
         until(lambda: trials[-1].seconds > 1)
