@@ -1,1 +1,1 @@
-"""Benchmarks: speed of the simulator, quality of navigation and of localization."""
+"""Benchmarks of `simscen bench`: speed of the simulator, quality of navigation, and quality of localization."""

@@ -1,1 +1,1 @@
-"""Benchmark of localization on generated logs, and the evaluation of recorded logs."""
+"""Localization benchmark on generated logs, and evaluation of a localizer on recorded logs."""

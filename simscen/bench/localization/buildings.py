@@ -1,4 +1,4 @@
-"""Generate office floors for the localization benchmark. Walls, glass, and furniture are axis-aligned boxes."""
+"""Generator of office floors for the localization benchmark. Walls, glass, and furniture are axis-aligned boxes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ HEIGHT_M = 1.0
 
 
 def box_array(rows: Iterable[Sequence[float]]) -> Array:
-    """Return boxes as an array (n, 4). Each row has the smallest x, smallest y, largest x, and largest y in m."""
+    """Return boxes as an array (n, 4). A row has the smallest x, smallest y, largest x, and largest y of a box in m."""
     return np.array(list(rows), dtype=np.float64).reshape(-1, 4)
 
 
@@ -71,7 +71,7 @@ class Building:
     """An office floor. All lengths are in m.
 
     size:      length along x and depth along y
-    middle:    x of the border between the left and the right half, which only the corridor connects
+    middle:    x of the wall between the left and the right half. Only the corridor connects both halves
     walls:     boxes (n, 4), as in box_array
     glass:     boxes (n, 4) of the glass walls
     furniture: boxes (n, 4)
@@ -91,7 +91,7 @@ class Building:
 def generate_building(number: int, right_half_version: int = 0) -> Building:
     """Return the building with this number. The result depends on the arguments only.
 
-    Versions of the right half differ in rooms and furniture.
+    `right_half_version` selects the rooms and the furniture of the right half, to simulate a rebuilt floor.
     """
     streams = Streams(number)
     rng = streams.generator("floor")
@@ -116,7 +116,7 @@ def generate_building(number: int, right_half_version: int = 0) -> Building:
 def _generate_half(
     rng: np.random.Generator, ends: tuple[float, float], wall_ys: tuple[float, ...], thickness: float
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return walls, glass, furniture, rooms, and doors of one half of a Building.
+    """Return walls, glass, furniture, rooms, and doors, as in Building, of one half of a floor.
 
     `ends` are the smallest and largest x of the half. `wall_ys` are the y of outer wall, corridor wall, corridor wall,
     and outer wall, in ascending order.

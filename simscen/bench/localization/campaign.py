@@ -1,4 +1,7 @@
-"""Benchmark of `simscen bench localization`: runs AMCL with several parameter sets on the same generated logs."""
+"""Benchmark of `simscen bench localization`: runs AMCL with several parameter sets on the same generated logs.
+
+NEES is the normalized estimation error squared of a belief, and ANEES its average over several beliefs.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,13 +32,13 @@ PARAMETER_SETS: Mapping[str, AmclParameters] = {
     "scan_matching_amcl, consistent": ScanMatchingAmcl(parameters="consistent"),
 }
 LOGS_PER_BUILDING: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
-"""Number of logs of each building by circumstance, a key of CIRCUMSTANCES."""
+"""Number of logs of each building, by circumstance (a key of CIRCUMSTANCES)."""
 CONSISTENCY_CIRCUMSTANCES = ("clean", "slipping", "tracked", "outdated", "half")
-"""Circumstances for which `Consistency` is computed: all but an unknown start and kidnapping."""
+"""Circumstances for which `Consistency` is computed: all except an unknown start and kidnapping."""
 RELOCALIZATION_LIMIT_S = 60.0
 """Time limit for localizing the robot after an unknown start or a kidnapping."""
 LOST_M, FOUND_M = 1.0, 0.5
-"""Position error above which the robot is lost, and below which the robot is found again."""
+"""Position error above which the robot counts as lost, and below which it counts as found again."""
 CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
 """Times in a log at which the NEES is computed."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
@@ -55,7 +58,7 @@ class Trial:
     tracked:      whether the position error never exceeded LOST_M
     median:       median position error in m
     largest:      largest position error in m
-    found:        seconds from start or kidnapping until the robot was found for the rest of the log; None if never
+    found:        seconds from start or kidnapping until the robot was found and not lost again; None if never
     nees:         NEES at each of CHECK_TIMES_S
     ms:           CPU time per scan in ms
     slowest_ms:   CPU time of the slowest message in ms
@@ -82,7 +85,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class SuccessRate:
-    """Success on `count` of `of` logs. `interval` is for the rate `count / of`, by bootstrap over buildings."""
+    """Success on `count` out of `of` logs. `interval` is the bootstrap interval of the rate, over buildings."""
 
     count: int
     of: int
@@ -94,7 +97,7 @@ class Consistency:
     """Average NEES (ANEES) of a localizer: 3 if its covariances match its errors.
 
     anees:         ANEES over all logs and CHECK_TIMES_S
-    bounds:        95 % bounds of `anees` if the covariance is right on average, from `grouped_anees_bounds`
+    bounds:        95 % bounds of `anees` if the covariances are right on average, from `grouped_anees_bounds`
     inside:        fraction of the errors within the 95 % ellipsoid of the covariance
     moments:       ANEES over all logs at each of CHECK_TIMES_S
     moment_bounds: 95 % bounds of each of `moments` if the localizer is consistent, from `anees_bounds`
@@ -177,7 +180,7 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
-    """Return the first of `times` >= 0 with an error below FOUND_M and no later error above LOST_M; None if none."""
+    """Return the first of `times` >= 0 with an error below FOUND_M, after the last error above LOST_M; None if none."""
     lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
     begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
     near = np.flatnonzero(distance[begin:] < FOUND_M)
@@ -260,10 +263,10 @@ def anees_bounds(runs: int) -> tuple[float, float]:
 
 
 def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
-    """Return 95 % bounds of the mean of `groups` if the covariance is right on average.
+    """Return 95 % bounds of the mean of `groups` if the covariances are right on average.
 
-    Each of `groups` is the ANEES of one building. The bounds are Student's t interval for the logarithm of the mean
-    (delta method). NEES values of one building may be correlated. None with fewer than MIN_GROUPS buildings, and if the
+    `groups` has the ANEES of each building. NEES values of one building may be correlated. The bounds are Student's t
+    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, and if the
     mean is infinite or not positive.
     """
     count, mean = len(groups), float(np.mean(groups))

@@ -1,4 +1,4 @@
-"""Simulate a drive through a generated building: true poses, wheel odometry, people, and lidar ranges."""
+"""Simulation of a drive through a generated building: true poses, wheel odometry, people, and lidar ranges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ MAX_FAILED_GOALS = 30
 
 
 class EnclosedStart(ValueError):
-    """No path leads out of the room in which the robot is."""
+    """Furniture encloses the robot, so that no path leads to another room."""
 
 
 def drive_between_rooms(
@@ -59,7 +59,7 @@ def drive_between_rooms(
 def _waypoints(
     floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternates_halves: bool
 ) -> Iterator[Array]:
-    """Yield endlessly the vertices (2,) of shortest paths between random points in rooms. Raises EnclosedStart."""
+    """Yield without end the vertices (2,) of shortest paths between random points in rooms. Raises EnclosedStart."""
     position: Array | None = None
     right, failed = False, 0
     while True:
@@ -102,7 +102,7 @@ SLIP_DURATION_S = (0.3, 1.5)
 
 @dataclass(frozen=True)
 class OdometryErrors:
-    """Standard deviations of systematic errors of wheel odometry, which are drawn once for each log.
+    """Standard deviations of systematic errors of wheel odometry. The errors are drawn once for each log.
 
     scale:      relative error of distances, caused by a wrong wheel radius
     turn:       relative error of rotations, caused by a wrong wheel separation
@@ -119,13 +119,13 @@ class OdometryErrors:
 
 
 RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, has_slip=False)
-"""Odometry with the random errors of WheelOdometry, but without systematic errors and slip."""
+"""No systematic errors and no slip, only the random errors of WheelOdometry."""
 
 
 def simulate_odometry(
     truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
 ) -> Array:
-    """Return measured poses (k, 3) in the odom frame for true poses `truth` (k, 3) that are `seconds` apart."""
+    """Return the odometry poses (k, 3) in the odom frame for true poses `truth` (k, 3) that are `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     distance = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = 1 + rng.normal(0, errors.scale), 1 + rng.normal(0, errors.turn), rng.normal(0, errors.bend)
@@ -159,9 +159,9 @@ def _slip_factors(count: int, seconds: float, has_slip: bool, rng: np.random.Gen
 
 
 ROOM_WALK_M = 2.5
-"""Side of the square in which a person in a room walks. Its center is the center of the room."""
+"""Side of the square around the center of a room in which a person walks."""
 WALKING_SPEED_M_S = 1.1
-"""Walking speed. Each person has a random multiple of it, from 0.4 to 1.2."""
+"""Walking speed, which is multiplied by a random factor from 0.4 to 1.2 for each person."""
 
 
 def simulate_people(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
@@ -198,7 +198,7 @@ GLASS_TRANSMISSION = 0.8
 
 
 class PartlyTransparentScene:
-    """Ray caster for a building with glass."""
+    """Ray caster for a building with glass, which a beam passes with the probability GLASS_TRANSMISSION."""
 
     def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
         """Take the mesh without glass, and the mesh with glass."""
@@ -227,7 +227,7 @@ def beam_angles(spec: Lidar) -> Array:
 def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
     """Return the ranges (n, b) of scans among people. Beams that hit a leg end there.
 
-    `people` are poses (n, p, 3). `poses` (n, 3) are those of the lidar. `angles` (b,) are those of the beams in rad.
+    `people` are the poses (n, p, 3) of p people, `poses` (n, 3) of the lidar. `angles` (b,) of the beams are in rad.
     """
     offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
     legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]

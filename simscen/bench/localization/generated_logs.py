@@ -1,4 +1,4 @@
-"""Generate logs for the localization benchmark: sensor readings and true poses of a drive, and a map."""
+"""Generator of logs for the localization benchmark: sensor readings and true poses of a drive, and a map."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -32,19 +32,19 @@ from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 CELL_M = 0.05
+"""Cell size of the map."""
 MAP_MARGIN_M = 1.0
-"""Width of the map's margin around the floor."""
+"""Width of the margin of the map around the floor."""
 MAP_RANGE_M = 12.0
-"""Maximum range of beams for drawing the map. Only this part of a longer beam is used, as free space."""
+"""Maximum range of the beams that draw the map. A longer beam draws only free space, up to this range."""
 OCCUPIED_FRACTION = 0.25
-"""Minimum fraction of the beams through a cell that end in an occupied cell."""
+"""A cell becomes occupied if at least this fraction of the beams that reach it end in it."""
 
 
 def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, float]) -> OccupancyGrid:
-    """Draw a map like that of SLAM from scans with `ranges` (n, b) in m and beam `angles` (b,) in rad.
+    """Draw a map, as SLAM does, from scans with `ranges` (n, b) in m and beam `angles` (b,) in rad.
 
-    `poses` (n, 3) are those of the lidar. `size` is the length and depth of the floor in m. Cells without a beam are
-    unknown.
+    `poses` (n, 3) are lidar poses. `size` is the length and depth of the floor in m. Cells without a beam are unknown.
     """
     width, height = (int(np.ceil((edge + 2 * MAP_MARGIN_M) / CELL_M)) for edge in size)
     heading = poses[:, 2:] + angles
@@ -70,20 +70,21 @@ def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, floa
 
 
 def left_half(grid: OccupancyGrid, middle: float) -> OccupancyGrid:
-    """Return the map with unknown cells beyond x = `middle`, in m."""
+    """Return the map with unknown cells to the right of x = `middle` in m."""
     cells = grid.cells.copy()
     cells[:, int((middle - grid.origin.x) / grid.resolution) :] = UNKNOWN
     return OccupancyGrid(cells, grid.resolution, grid.origin)
 
 
 LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
-"""Number of beams over 180°, and scans per second, as in public logs with a SICK LMS. Drives use them in turn."""
+"""Number of beams over 180°, and scans per second, as of the SICK LMS in public logs. Drives use them in turn."""
 LIDAR_MOUNT = Pose2(0.1, 0.0, 0.0)
 """Pose of the lidar in the base frame."""
 PEOPLE_COUNT = 8
+"""Number of people on a floor."""
 LOG_DURATION_S, KIDNAPPED_AT_S = 90.0, 30.0
 MAPPING_POSE_STD = (0.02, 0.02, 0.004)
-"""Standard deviations (x in m, y in m, yaw in rad) of the errors of poses from which the map is drawn."""
+"""Standard deviations (x in m, y in m, yaw in rad) of the pose errors with which the map is drawn."""
 CIRCUMSTANCES = {
     "tracked": "known start",
     "clean": "known start, odometry with random errors only, no people, furniture as on the map",
@@ -93,8 +94,8 @@ CIRCUMSTANCES = {
     "half": "known start; the map ends at the middle of the floor",
     "kidnapped": "known start; after 30 s the robot is placed elsewhere",
 }
-"""Names and descriptions of the circumstances in which logs are generated."""
-UNCHANGED_WORLD = ("clean", "slipping")
+"""Circumstances in which logs are generated: name and description."""
+UNCHANGED_CIRCUMSTANCES = ("clean", "slipping")
 """Circumstances without people and with the furniture of the map."""
 
 
@@ -148,7 +149,7 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
         extruded_mesh(floor.walls, furniture), extruded_mesh(floor.walls, floor.glass, furniture)
     )
     ranges = scene.distances(lidar_poses, angles, lidar.max_range, rng)
-    if circumstance not in UNCHANGED_WORLD:
+    if circumstance not in UNCHANGED_CIRCUMSTANCES:
         people = simulate_people(floor, len(poses), scan_every * STEP_S, PEOPLE_COUNT, rng)
         ranges = occlude_by_people(people, lidar_poses, angles, ranges)
     ranges = add_lidar_noise(ranges, lidar, rng)
@@ -170,13 +171,13 @@ def _drive_in_furniture(
 ) -> tuple[Array, Array]:
     """Return the true poses (k, 3) of a drive, and boxes (n, 4) of the furniture.
 
-    If no furniture is given, the furniture is chosen for the circumstance. The choice is repeated while furniture
-    blocks the door of the robot's room.
+    Without `furniture`, the furniture is chosen for the circumstance. The choice is repeated as long as it blocks the
+    door of the robot's room.
     """
     while True:
         current = furniture
         if current is None:
-            current = floor.furniture if circumstance in UNCHANGED_WORLD else rearranged_furniture(floor, rng)
+            current = floor.furniture if circumstance in UNCHANGED_CIRCUMSTANCES else rearranged_furniture(floor, rng)
         try:
             return drive_between_rooms(floor, current, seconds, rng, circumstance in ("outdated", "half")), current
         except EnclosedStart:
@@ -197,7 +198,7 @@ def building_map(building: int) -> OccupancyGrid:
 
 
 def _readings(odometry: Array, ranges: Array, scan_every: int, lidar: Lidar) -> list[Odometry | Scan]:
-    """Return an odometry message for each pose; the first and then every `scan_every`-th is followed by a scan."""
+    """Return an odometry message for each pose, and a scan after the first and each further `scan_every`-th one."""
     readings: list[Odometry | Scan] = []
     increment = lidar.field_of_view / (lidar.beams - 1)
     for row, pose in enumerate(odometry.tolist()):

@@ -1,4 +1,4 @@
-"""Run a localizer on the readings of a log, and compare its beliefs (pose estimates) with reference poses."""
+"""Evaluation of a localizer on the readings of a log: runs it, and compares its beliefs with reference poses."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
 MAX_GAP_S = 1.0
-"""Maximum time between two consecutive reference poses for interpolation."""
+"""Time between two consecutive reference poses up to which poses are interpolated."""
 MAX_TIME_DIFFERENCE_S = 0.05
-"""Maximum time from a belief to the nearest reference pose, if the belief is in a gap longer than MAX_GAP_S."""
+"""Maximum time between a belief and the nearest reference pose in a gap longer than MAX_GAP_S."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class LocalizationResult:
 
 @dataclass(frozen=True)
 class LostInterval:
-    """Interval in s in which the robot was lost; `until` is None if the robot was lost to the end."""
+    """Interval in s in which the robot was lost. `until` is None if the robot was lost at the end."""
 
     since: float
     until: float | None
@@ -71,7 +71,7 @@ class PoseErrors:
     compared: float
 
     def figures(self) -> dict[str, float]:
-        """Return by name: median, RMSE, largest, and last position error in m, and RMSE of the yaw in rad."""
+        """Return by name the median, RMSE, largest, and last position error in m, and the RMSE of the yaw in rad."""
         return {
             "median": float(np.median(self.distance)),
             "rmse": float(np.sqrt(np.mean(self.distance**2))),

@@ -1,4 +1,4 @@
-"""Compare localizers on sparse logs: generated logs with only one scan every 1 m or 0.5 rad, as in public data sets."""
+"""Comparison of localizers on sparse logs: generated logs with a scan only every 1 m or 0.5 rad, as in public logs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -33,26 +33,26 @@ LOCALIZERS: Mapping[str, AmclParameters] = {
 SEED_COUNT = 5
 """Number of seeds with which each localizer runs on each log."""
 SCAN_SPACING_M, SCAN_SPACING_RAD = 1.0, 0.5
-"""Minimum translation or rotation between two scans of a sparse log."""
+"""Translation and rotation in a sparse log, one of which must be reached before the next scan."""
 DURATION_S = 180.0
 """Duration of a log before it is shortened to end after a turn."""
 END_TURN_RAD = 1.0
 """Minimum rotation over the last three scans of a log that ends after a turn."""
 MISSED_TURN_FRACTION, MISSED_TURN_STD_RAD = 0.05, 0.6
-"""Fraction of the scans with a yaw error of odometry after the scan, and standard deviation of this error.
+"""Fraction of the scans after which odometry misses a turn, and standard deviation of the missed angle.
 
 The odometry of the public log MIT CSAIL has such errors.
 """
-MISSED_TURNS = "as mapped, turns that odometry misses"
+MISSED_TURNS_KIND = "as mapped, turns that odometry misses"
 KINDS: Mapping[str, tuple[str, bool]] = {
     "as mapped, slipping wheels": ("slipping", False),
-    MISSED_TURNS: ("slipping", False),
+    MISSED_TURNS_KIND: ("slipping", False),
     "people, moved furniture, glass": ("tracked", False),
     "the same, ends after a turn": ("tracked", True),
     "half rebuilt": ("outdated", False),
     "half a map": ("half", False),
 }
-"""Kinds of sparse logs: name, circumstance (a key of CIRCUMSTANCES), and whether the log ends after a turn."""
+"""Kinds of sparse logs by name: circumstance (a key of CIRCUMSTANCES), and whether the log ends after a turn."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
 
 
 def with_missed_turns(log: Log) -> Log:
-    """Return the log with a random yaw error of the odometry after some scans (see MISSED_TURN_FRACTION)."""
+    """Return the log with odometry that misses a random turn after some scans (see MISSED_TURN_FRACTION)."""
     rng = Streams(log.building).generator("missed turns")
     readings: list[Odometry | Scan] = []
     previous, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
@@ -115,6 +115,7 @@ def with_missed_turns(log: Log) -> Log:
 
 
 def _is_spaced(last: Pose2, now: Pose2) -> bool:
+    """Return whether two odometry poses are SCAN_SPACING_M or SCAN_SPACING_RAD apart."""
     return last.distance(now) >= SCAN_SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SCAN_SPACING_RAD
 
 
@@ -123,7 +124,7 @@ def generate_sparse_log(kind: str, building: int) -> Log:
     """Generate the sparse log of a kind (a key of KINDS) in a building. The result depends on the arguments only."""
     circumstance, ends_after_turn = KINDS[kind]
     log = thin_scans(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
-    return with_missed_turns(log) if kind == MISSED_TURNS else log
+    return with_missed_turns(log) if kind == MISSED_TURNS_KIND else log
 
 
 def run_sparse_logs(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:

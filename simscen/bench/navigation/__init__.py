@@ -1,1 +1,1 @@
-"""Navigation benchmarks: generated worlds, experiments, and their scores."""
+"""Navigation benchmarks: worlds, experiments, and the scores of the results."""

@@ -29,6 +29,7 @@ ODOMETRY_LOCALIZER = "type: slip_ekf, rotation_noise: 0.5"
 SCAN_MATCHING_LOCALIZER = f"{{{ODOMETRY_LOCALIZER}, match_scans: true}}"
 """YAML of the same localizer with laser scan matching."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
+"""YAML of the costmap parameters for mapless drives."""
 TUNED_STACK = f"""\
   localizer: {SCAN_MATCHING_LOCALIZER}
   costmap: {COSTMAP}
@@ -72,7 +73,7 @@ pass:
 
 @dataclass(frozen=True)
 class BarnWorld:
-    """World file of the challenge, and the length in m of the reference path for the BARN score."""
+    """World file of the BARN challenge, and the length in m of the reference path for the BARN score."""
 
     file: Path
     reference_length: float
@@ -118,7 +119,7 @@ def _pose_yaml(pose: Pose2) -> str:
 CELL_SIZE_M = 0.15
 """Side of a grid cell. A filled cell contains a cylinder with this diameter."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
-"""Numbers of grid cells. The robot drives along a lane of ROWS x COLUMNS cells, from small to large y.
+"""Numbers of grid cells. The robot drives along y through a lane of ROWS rows and COLUMNS columns.
 
 The last FIELD_ROWS rows of the lane are the obstacle field. The first and the last column are walls of cylinders.
 """
@@ -127,9 +128,9 @@ HEIGHT_M = 1.0
 FILL_RANGE = (0.20, 0.35)
 """Range of the fraction of cells that are filled before smoothing."""
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
-"""Smoothing fills a cell with at least 5 filled neighbors (of 8), and clears a cell with at most 1."""
+"""Smoothing fills a cell with at least 5 filled neighbors (of 8), and clears a cell with at most 1 filled neighbor."""
 CROSSING_RADIUS_M = 0.37
-"""Radius of a disc that can cross every generated field, and every world of BARN."""
+"""Radius of a disc that can cross every world of BARN, and every field that is generated with this default."""
 MAX_ATTEMPTS = 1000
 """Maximum number of random draws for a field or a path."""
 
@@ -139,11 +140,11 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """Lane with the `centers` (n, 2) of its cylinders. `shortest` is the length in m of the shortest path to GOAL."""
+    """Lane with cylinders at `centers` (n, 2). `shortest_path_m` is the length of the shortest path to GOAL."""
 
     number: int
     centers: Array
-    shortest: float
+    shortest_path_m: float
 
     @property
     def density(self) -> float:
@@ -202,7 +203,7 @@ def _cylinder_centers(field: Cells) -> Array:
 
 
 def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float | None) -> bool:
-    """Return whether a disc of `crossing_radius` fits from START to GOAL, and a disc of `blocked_radius` does not."""
+    """Return whether a disc of `crossing_radius` can move from START to GOAL, but a disc of `blocked_radius` cannot."""
     from scipy import ndimage, spatial
 
     step = CELL_SIZE_M / 3
@@ -236,11 +237,11 @@ ARENA_HALF_WIDTH_M = 10.0
 MOVER_RADIUS_M = 0.5
 """Radius of a moving cylinder."""
 MOVER_COUNT_RANGE = (5, 24)
-"""Smallest and largest number of moving cylinders."""
+"""Smallest and largest number of moving cylinders in a field."""
 SPEEDS_M_S = (0.74, 1.23, 1.72)
 """Mean speeds of the easy, medium and hard worlds of DynaBARN."""
 MAX_SPEED_DEVIATION_M_S = 0.25
-"""Maximum difference between the mean speeds of cylinder and field, and between a cylinder's speed and mean speed."""
+"""Maximum deviation of a cylinder's mean speed from that of the field, and of its speed from its mean speed."""
 SPEED_STD_RANGE_M_S = (0.05, 0.25)
 """Range of the standard deviation of a cylinder's speeds."""
 DEGREE_RANGE = (1, 5)
@@ -255,9 +256,9 @@ DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """Cylinder that moves back and forth along `points` (n, 2) and passes them at `times` (n,) in s.
+    """Cylinder that moves back and forth along `points` (n, 2), which it passes at `times` (n,) in s.
 
-    The cylinder starts with the position that it has after `phase` seconds of this motion.
+    At the start of a run, the cylinder is where it is `phase` seconds after the beginning of this motion.
     """
 
     times: Array
@@ -267,7 +268,7 @@ class Mover:
 
 @dataclass(frozen=True, eq=False)
 class DynamicField:
-    """Field of moving cylinders. `speed` is the mean of their mean speeds in m/s, before random deviations."""
+    """Field of moving cylinders. Their mean speeds deviate randomly from `speed` in m/s."""
 
     number: int
     speed: float

@@ -1,4 +1,4 @@
-"""Experiments of `simscen bench nav`. An experiment is a list of scenario files with seeds.
+"""Experiments of `simscen bench nav`. An experiment is a list of drives: scenario files, each with its seeds.
 
 The functions `write_…` write scenario files to `folder` and return the experiments. All random values of a generated
 field or drive are derived from its number.
@@ -51,19 +51,19 @@ class Experiment:
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Width of the widest passage through a narrow field minus ROBOT_WIDTH_M. The true width is up to 0.1 m larger."""
+"""Guaranteed width of the passage through a narrow field, minus ROBOT_WIDTH_M. It is at most 0.1 m wider."""
 ROBOT_WIDTH_M = 0.42
 """Width of the Jackal across its wheels."""
-LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
+LOCALIZATION_EXPERIMENTS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
 """Names of the localization experiments."""
 
 
 def write_barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED_STACK
 ) -> Experiment:
-    """Write a drive in each world of BARN, which are in the folder `dataset`. Raises UsageError if it is invalid.
+    """Write a drive in each world of BARN. Raises UsageError if `dataset`, the folder with the worlds, is invalid.
 
-    `stack` are the YAML lines below `stack:`, and `variant` the name of this stack (empty for TUNED_STACK).
+    `stack` are the YAML lines below `stack:`. `variant` is the name of this stack; "" for TUNED_STACK.
     """
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []
@@ -102,7 +102,7 @@ def _field_drive(folder: Path, field: ObstacleField) -> Drive:
     world = write_text(folder / f"field_{field.number}.world.yaml", _world_text(field))
     text = barn.scenario_text(f"field {field.number}", world.name)
     file = write_text(folder / f"field_{field.number}.scenario.yaml", text)
-    return Drive(file, [field.number], field.shortest)
+    return Drive(file, [field.number], field.shortest_path_m)
 
 
 def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
@@ -114,7 +114,7 @@ def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experimen
         for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
             world = write_text(
-                folder / f"{stem}.world.yaml", _moving_world_text(barn.generate_dynamic_field(number, speed))
+                folder / f"{stem}.world.yaml", _dynamic_world_text(barn.generate_dynamic_field(number, speed))
             )
             text = barn.scenario_text(f"dynamic field {number}", world.name, start, goal, stack)
             file = write_text(folder / f"{stem}.scenario.yaml", text)
@@ -151,17 +151,17 @@ def corner_case_files(scenarios: Path) -> list[Path]:
 
 
 def corner_case_name(file: Path) -> str:
-    """Return the name of the experiment with a corner case."""
+    """Return the name of the experiment with the corner case in this scenario file."""
     return file.name.split(".")[0].replace("_", " ")
 
 
 def write_localization_experiments(
-    folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]
+    folder: Path, worlds: Path, tour_seeds: Sequence[int], lost_seeds: Sequence[int]
 ) -> list[Experiment]:
-    """Write the experiments LOCALIZATIONS in the house of the folder `worlds`.
+    """Write the experiments LOCALIZATION_EXPERIMENTS in the world house.world.yaml of the folder `worlds`.
 
-    The experiment "tour" has the seeds `seeds`. The other experiments have the seeds `lost`, and are omitted without
-    any.
+    The experiment "tour" has the seeds `tour_seeds`. The other experiments have the seeds `lost_seeds`, and are omitted
+    if there are none.
     """
 
     def experiment(name: str, *drives: Drive, is_measured: bool = False) -> Experiment:
@@ -170,16 +170,17 @@ def write_localization_experiments(
     def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:
         return Drive(write_text(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
-    directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
-    wrong_start = [drive(f"wrong_start_{n}", wrong_start_scenario(directions[n], n % 2 == 0), [n]) for n in lost]
-    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), is_measured=True)
-    if not lost:
+    names = LOCALIZATION_EXPERIMENTS
+    directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost_seeds}
+    wrong_start = [drive(f"wrong_start_{n}", wrong_start_scenario(directions[n], n % 2 == 0), [n]) for n in lost_seeds]
+    tour = experiment(names[0], drive("tour", tour_scenario(), tour_seeds), is_measured=True)
+    if not lost_seeds:
         return [tour]
     return [
         tour,
-        experiment(LOCALIZATIONS[1], *wrong_start, is_measured=True),
-        experiment(LOCALIZATIONS[2], drive("start_unknown", start_unknown_scenario(), lost)),
-        experiment(LOCALIZATIONS[3], drive("kidnapped", kidnapped_scenario(), lost)),
+        experiment(names[1], *wrong_start, is_measured=True),
+        experiment(names[2], drive("start_unknown", start_unknown_scenario(), lost_seeds)),
+        experiment(names[3], drive("kidnapped", kidnapped_scenario(), lost_seeds)),
     ]
 
 
@@ -191,7 +192,7 @@ def _world_text(field: ObstacleField) -> str:
     return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"
 
 
-def _moving_world_text(field: barn.DynamicField) -> str:
+def _dynamic_world_text(field: barn.DynamicField) -> str:
     lines = []
     for number, mover in enumerate(field.movers, start=1):
         keyframes = ", ".join(
@@ -215,7 +216,7 @@ def write_text(file: Path, text: str) -> Path:
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Write an experiment `name` with the same drives and other stack parameters: the value `stack` of `stack:`.
+    """Write a copy of an experiment, called `name`, with the parameters `stack` under the key `stack` of its scenarios.
 
     The scenarios in `folder` extend the original scenarios. The key `localizer` is ignored for mapless drives.
     """
@@ -263,9 +264,9 @@ pass:
 START = (0.8, 4.95, 0.0)
 """Start of all drives in the house, at its place `dock`: x and y in m, yaw in rad."""
 ESTIMATE_OFFSET_M, ESTIMATE_ROTATION_RAD = 0.5, math.radians(20.0)
-"""Error of a wrong initial estimate."""
+"""Position and yaw error of a wrong initial estimate."""
 
-GOALS = """\
+TOUR_GOALS = """\
 goals:
   - {pose: sofa, timeout: 120 s}
   - {pose: kitchen, timeout: 120 s}
@@ -280,7 +281,7 @@ simscen: 1
 name: tour of the house
 world: house.world.yaml
 robot: {{pose: dock}}
-{GOALS}pass:
+{TOUR_GOALS}pass:
   - goals_reached: {{}}
   - localization_error: {{rmse: 5 cm, after: 5 s}}
   - collisions: {{max: 0}}
@@ -311,7 +312,7 @@ pass:
 """
 
 
-SELF_LOCALIZATION = """\
+SELF_LOCALIZATION_LINES = """\
 goals:
   - {pose: kitchen, timeout: 200 s}
 time_limit: 210 s
@@ -330,11 +331,11 @@ simscen: 1
 name: start unknown
 world: house.world.yaml
 robot: {{pose: dock, initial_estimate: unknown}}
-{SELF_LOCALIZATION}"""
+{SELF_LOCALIZATION_LINES}"""
 
 
 def kidnapped_scenario() -> str:
-    """Return the scenario YAML of a drive in which the robot is kidnapped to the study after 3 m."""
+    """Return the scenario YAML of a drive in which the robot is kidnapped to the room "study" after 3 m."""
     return f"""\
 simscen: 1
 name: kidnapped
@@ -342,4 +343,4 @@ world: house.world.yaml
 robot: {{pose: dock}}
 events:
   - {{name: kidnapped, when: {{travelled: 3 m}}, do: {{kidnap: {{pose: {{x: 9.4, y: 7.3, yaw: 90 deg}}}}}}}}
-{SELF_LOCALIZATION}"""
+{SELF_LOCALIZATION_LINES}"""

@@ -14,7 +14,7 @@ from simscen.bench.navigation.experiments import Drive, Experiment, write_text
 from simscen.core.random_streams import Streams
 
 FINE_CELL_M = 0.05
-"""Cell size of the image on which a floor is drawn. The image is then reduced to the resolution of the map."""
+"""Cell size of the image on which a floor is drawn, before the image is reduced to the resolution of the map."""
 RESOLUTIONS_M = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
 """Resolutions of maps. Consecutive floor numbers use them in turn."""
 FLOOR_WIDTH_RANGE_M, FLOOR_DEPTH_RANGE_M = (20.0, 45.0), (12.0, 28.0)
@@ -59,7 +59,7 @@ def generate_office_map(number: int) -> tuple[Image, float]:
 
 
 def _draw_rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
-    """Draw rooms with doors and furniture along a corridor wall at `y`; above the wall for `side` 1, below for -1."""
+    """Draw rooms with doors and furniture along a corridor wall at `y`: above it for `side` 1, below it for -1."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     x = 0.0
     while x < width:
@@ -96,7 +96,7 @@ def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_w
 
 
 def _reduce_to_map(image: Image, resolution: float, rng: np.random.Generator) -> Image:
-    """Return the image with the resolution of the map in m. A few random free cells become unknown."""
+    """Return the image reduced to `resolution` in m. A few random free cells become unknown."""
     step = round(resolution / FINE_CELL_M)
     rows, columns = (size // step * step for size in image.shape)
     blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
@@ -116,10 +116,10 @@ def write_office_map(number: int, folder: Path) -> Path:
     return write_text(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")
 
 
-MEETING_WIDTH_RANGE_M, MEETING_LENGTH_M = (1.4, 2.4), 14.0
-"""Range of the width, and length of the corridors in which two robots meet."""
+MEETING_CORRIDOR_WIDTH_RANGE_M, MEETING_CORRIDOR_LENGTH_M = (1.4, 2.4), 14.0
+"""Range of the width, and length, of a corridor in which two robots meet."""
 RAMP_SLOPE_RANGE_DEG, RAMP_HEIGHT_RANGE_M = (2.0, 8.0), (0.03, 0.16)
-"""Ranges of slope and height of ramps, which stay below the lidar."""
+"""Ranges of slope and height of ramps. The height stays below the lidar."""
 HALL_WIDTH_M = 2.4
 """Width of the hall with the ramps."""
 
@@ -135,7 +135,7 @@ def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
 
 
 def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text_of: Callable[[int], str]) -> Experiment:
-    """Write the scenario `text_of(number)` to `<stem>_<number>.scenario.yaml` for each number, which is its seed."""
+    """Write the scenario `text_of(number)` to `<stem>_<number>.scenario.yaml` for each number, which is the seed."""
     drives = [
         Drive(write_text(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text_of(number)), [number])
         for number in numbers
@@ -144,8 +144,8 @@ def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text_of:
 
 
 def _meeting_scenario(number: int) -> str:
-    rng, length = Streams(number).generator("corridor"), MEETING_LENGTH_M
-    width = float(rng.uniform(*MEETING_WIDTH_RANGE_M))
+    rng, length = Streams(number).generator("corridor"), MEETING_CORRIDOR_LENGTH_M
+    width = float(rng.uniform(*MEETING_CORRIDOR_WIDTH_RANGE_M))
     max_offset = width / 2 - 0.35
     west, east = rng.uniform(-max_offset, max_offset, 2).tolist()
     return f"""\

@@ -14,7 +14,7 @@ from simscen.core.random_streams import Streams
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 WALL_MARGIN_M = 0.12
-"""Minimum distance of the robot's edge to walls on the shortest path."""
+"""Minimum distance between the robot's outline and walls on the shortest path."""
 MOVABLE_MARGIN_M = 1.5
 """Minimum distance of start and goal to doors and movable objects."""
 MAX_ATTEMPTS = 2000
@@ -34,9 +34,9 @@ class RandomDrive:
 def random_drives(
     built: BuiltWorld, radius: float, numbers: Iterable[int], min_length: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """Yield a random drive of a disc-shaped robot for each number. `radius` and `min_length` of the path are in m.
+    """Yield a random drive of a disc-shaped robot for each number, with a path of at least `min_length` in m.
 
-    The drive depends on the arguments and its number only. A number is skipped if no drive is found for it.
+    A drive depends only on its number, the world, `radius` in m, and `min_length`. A number without a drive is skipped.
     """
     paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
@@ -61,7 +61,7 @@ def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
 ROBOT_RADIUS_M = 0.22
 """Radius of the default robot, a TurtleBot."""
 MIN_AVERAGE_SPEED_M_S = 0.2
-"""Average speed on the shortest path from which the time limit is computed."""
+"""Average speed on the shortest path that a robot needs to arrive within the time limit."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
     "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),
@@ -72,7 +72,7 @@ FAULTS = {
     "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
     "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
 }
-"""Name and YAML of each fault, and the values that replace … for each of STRENGTHS."""
+"""Faults by name: YAML, and the values by which … in the YAML is replaced, one for each of STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
 FIRST_FAULTY_DRIVE = 1_000_000
 """Smallest number of a drive with a fault. Drives without faults have smaller numbers."""
@@ -109,7 +109,7 @@ def write_degraded_sensing(
 ) -> list[Experiment]:
     """Write one experiment for each of STRENGTHS. It has one drive for each world and each of FAULTS.
 
-    `worlds` and `world_path` are as in `write_random_goals`. The drives depend on `first`, which is also their seed.
+    `worlds` and `world_path` are as in `write_random_goals`. `first` is the seed of all runs, and selects the drives.
     """
     faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
     drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}

@@ -17,11 +17,11 @@ from simscen.judge.metrics.compute import barn_score
 Interval = tuple[float, float]
 """Lower and upper limit of a 95 % confidence interval."""
 TIME_LIMIT_REACHED = "time limit"
-"""Reason in `RunResult.ended` of a run that reached its time limit."""
+"""Value of `RunResult.ended` of a run that reached its time limit."""
 
 
 class DriveOutcome(str, Enum):
-    """Outcome of a trial. FAILED is a failure without collision and timeout. ERROR means that the run was aborted."""
+    """Outcome of a trial. FAILED is any failure other than a collision or timeout. ERROR is an aborted run."""
 
     SUCCESS = "success"
     COLLISION = "collision"
@@ -154,7 +154,7 @@ def mean(values: Sequence[float | None]) -> float | None:
 class ClusteredMean:
     """Mean of the values of trials with a confidence interval from a cluster bootstrap over worlds.
 
-    Each trial has the same weight. `values_by_world` has the values of all trials in one world after the other.
+    Each trial has the same weight. `values_by_world` has one tuple for each world, with the values of its trials.
     """
 
     values_by_world: tuple[tuple[float, ...], ...]
@@ -210,14 +210,14 @@ class ClusteredMean:
 
 
 TrialPair = tuple[Trial, Trial]
-"""Trial of the reference stack, and trial of the compared stack in the same drive with the same seed."""
+"""Trials of the reference stack and of the compared stack, in the same drive and with the same seed."""
 
 
 @dataclass(frozen=True)
 class Difference:
     """Mean over trial pairs of the compared stack's value minus the reference stack's value.
 
-    `interval` is that of the mean; None with fewer than five worlds.
+    `interval` is the confidence interval of this mean; None with fewer than five worlds.
     """
 
     mean: float

@@ -11,7 +11,7 @@ from typing import Any
 class Measurement:
     """Measured `value` in `unit`, which is "" for a ratio or count.
 
-    `rounds` are the values of repeated measurements, and `value` is their median. Empty for a single measurement.
+    `rounds` are the values of repeated measurements; () for a single one. `value` is their median.
     """
 
     value: float

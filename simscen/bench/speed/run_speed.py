@@ -1,4 +1,4 @@
-"""Measure the CPU time of a run and of its parts, and of the baseline: PyBullet without simscen in the same world."""
+"""Measurement of the CPU time of a run and its parts, and of a baseline: PyBullet alone in the same world."""
 
 import gc
 import statistics
@@ -30,9 +30,9 @@ PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 """Scenario of most speed benchmarks: a robot drives among racks and a moving cart in a hall."""
 SEED = 1
 ProgressCallback = Callable[[str], None]
-"""Function that is called with the name of each measurement at its start."""
+"""Function that is called at the start of each measurement, with its name."""
 OBSTACLE_FIELD_BEAMS = 720
-"""Number of beams of a scan in measure_obstacle_field."""
+"""Number of beams of a scan in `measure_obstacle_field`."""
 
 
 class RunTimes(NamedTuple):
@@ -147,9 +147,9 @@ def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> RunT
 
 
 def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
-    """Let `watch` measure the parts of a run, and return no further listeners.
+    """Let `watch` measure the parts of a run. Return no further listeners.
 
-    `listeners` are those that the run has already: trace (the recorded states) and log.
+    `listeners` are the listeners of the run so far: trace (the recorded states) and log.
     """
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
@@ -211,7 +211,7 @@ def _unit_vectors(beams: int) -> Array:
 
 
 def random_cylinders(count: int) -> list[Solid]:
-    """Return `count` cylinders with a radius of 7.5 cm at random positions, at least 1 m from the origin."""
+    """Return `count` cylinders with a radius of 7.5 cm at random positions at least 1 m from the origin."""
     rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
     positions = rng.uniform(-edge, edge, (4 * count + 40, 2))

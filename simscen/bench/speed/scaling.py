@@ -1,4 +1,4 @@
-"""Measure the CPU time per simulated second of scenarios of different sizes.
+"""Measurement of the CPU time per simulated second of scenarios of different sizes.
 
 `measure_growth` measures variants of the scenario PATROL, `measure_worlds` measures drives in large worlds.
 """
@@ -40,8 +40,9 @@ QUANTITIES = {
     "particles": (500, 2000, 8000),
     "robots": (2, 4),
 }
-"""Quantities of PATROL and their values. Each variant changes one quantity."""
+"""Values of the quantities that are varied. Each variant of PATROL changes one quantity."""
 ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
+"""Robot of PATROL."""
 OBJECTS_PER_ROW = 25
 """Number of crates in a row. All rows are outside of the hall of PATROL."""
 UNIT = "ms per simulated second"
@@ -117,6 +118,7 @@ def _robots(count: int) -> str:
 
 
 HOUSE = PATROL.with_name("house.scenario.yaml")
+"""Scenario of a patrol of the rooms of a house."""
 MOVABLE_COUNT = 40
 """Number of movable meshes in the hall."""
 STATIC_COUNT, MOVING_COUNT = 4980, 20
@@ -168,6 +170,7 @@ def measure_worlds(rounds: int) -> Iterator[WorldCost]:
 
 
 def _measure_world(name: str, file: Path, rounds: int) -> WorldCost:
+    """Measure `rounds` runs of a scenario file. `name` describes its world."""
     gc.collect()  # the memory of the previous world must not count
     start = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
@@ -267,7 +270,7 @@ def write_warehouse(folder: Path) -> Path:
 
 
 def _box_or_drum(number: int) -> str:
-    """Return the YAML of a drum for every fourth number, otherwise of a box. The width is 0.5 to 0.65 m."""
+    """Return the YAML of a shape 0.5 to 0.65 m wide: a drum for every fourth number, otherwise a box."""
     width = 0.5 + 0.05 * (number % 4)
     return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 

@@ -1,4 +1,4 @@
-"""Measure the overhead of runs (setup, process, and external stack), and the time of a session with many runs."""
+"""Measurement of the overhead of runs (setup, process, external stack), and of the time of a session with many runs."""
 
 import gc
 import statistics
@@ -76,7 +76,7 @@ class Overhead:
 
 
 class _BeatTimer:
-    """Listener that counts the beats (recorded ticks) of a run, and measures their CPU time."""
+    """Listener that counts the beats (recorded ticks) of a run, and measures the CPU time up to the last beat."""
 
     def attach(self, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
         """Start the timer, and return the timer as a further listener of the run."""
@@ -263,14 +263,14 @@ class ExternalStackCost:
 def measure_external(rounds: int) -> ExternalStackCost:
     """Run PATROL `rounds` times with the stack in this process, and `rounds` times with the stack in another one."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    in_process = [_wait_per_cycle(prepared) for _ in range(rounds)]
-    external = [_wait_per_cycle(with_external_reference(prepared)) for _ in range(rounds)]
+    in_process = [_wait_per_beat(prepared) for _ in range(rounds)]
+    external = [_wait_per_beat(with_external_reference(prepared)) for _ in range(rounds)]
     return ExternalStackCost(
         in_process[0][0], statistics.median(us for _, us in in_process), statistics.median(us for _, us in external)
     )
 
 
-def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
+def _wait_per_beat(prepared: PreparedScenario) -> tuple[int, float]:
     """Return the number of beats of a run, and the mean wall time in µs that the run waits for the stack per beat."""
     watch, timer = Stopwatch(), _BeatTimer()
 

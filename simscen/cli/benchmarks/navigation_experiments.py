@@ -111,7 +111,7 @@ def _other_names(group: str, scenarios: Path) -> list[str]:
         case "corner cases":
             return [experiments.corner_case_name(file) for file in experiments.corner_case_files(scenarios)]
         case "localization":
-            return [f"localization, {name}" for name in experiments.LOCALIZATIONS]
+            return [f"localization, {name}" for name in experiments.LOCALIZATION_EXPERIMENTS]
         case _:
             return []
 

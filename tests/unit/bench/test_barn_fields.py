@@ -23,7 +23,7 @@ def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
 
 
 def test_the_shortest_path_is_no_shorter_than_the_straight_line() -> None:
-    assert 10.0 <= generate_obstacle_field(1).shortest < 20.0
+    assert 10.0 <= generate_obstacle_field(1).shortest_path_m < 20.0
 
 
 @pytest.mark.slow
@@ -53,4 +53,4 @@ def test_narrow_field_width_matches_an_independent_library() -> None:
 
 
 def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
-    assert generate_obstacle_field(3).shortest == generate_obstacle_field(3, CROSSING_RADIUS_M).shortest
+    assert generate_obstacle_field(3).shortest_path_m == generate_obstacle_field(3, CROSSING_RADIUS_M).shortest_path_m
