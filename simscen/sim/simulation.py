@@ -16,8 +16,8 @@ from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.contact.collisions import PreStepMotion
 from simscen.sim.objects.actors import Actors
-from simscen.sim.objects.idle_objects import SAMPLE_COUNT, SAMPLE_PERIOD_TICKS
 from simscen.sim.objects.proximity import ACTIVATION_PERIOD_S, EARLY_QUERY_DISTANCE_M
+from simscen.sim.objects.rest import SAMPLE_COUNT, SAMPLE_PERIOD_TICKS
 from simscen.sim.robots.robot import Robot, Scene
 from simscen.sim.scene.camera import RenderScene
 from simscen.sim.scene.terrain import Terrain

@@ -114,7 +114,7 @@ def _create_concave_body(client: int, vertices: Array, faces: Faces) -> int:
 
 
 def create_concave_shape(client: int, mesh: Mesh) -> int:
-    """Create the shape of a triangle mesh: a surface without an inside."""
+    """Create the shape of a triangle mesh, which can be concave. It is hollow: a body inside it does not touch it."""
     vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
     shape: int = pybullet.createCollisionShape(
         pybullet.GEOM_MESH,
@@ -194,7 +194,7 @@ def create_body_shape(client: int, solids: Sequence[Solid], is_pushable: bool, t
 
 
 def is_hollow(solids: Sequence[Solid], is_pushable: bool) -> bool:
-    """Return whether `create_body_shape` creates a surface without an inside."""
+    """Return whether `create_body_shape` creates a triangle mesh, which is hollow (see `create_concave_shape`)."""
     return not are_primitives(solids) and not is_pushable
 
 

@@ -71,8 +71,8 @@ class Clearance:
         """Radius in m of the robot's bounding sphere around its base frame."""
         self.contact_radius = self.bounding_radius + CLEARANCE_RANGE_M
         """Radius in m around its base frame within which actors must be able to collide."""
-        self.query_radius = max(self.contact_radius, self.bounding_radius + max_range)
-        """Radius in m around its base frame within which actors must be measurable."""
+        self.distance_radius = max(self.contact_radius, self.bounding_radius + max_range)
+        """Radius in m around its base frame within which actors must be in the engine, to measure their distances."""
         # Wheels can also hit the solids that they roll on.
         touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
         self._static_distance = StaticDistance(static, touching, max_range)

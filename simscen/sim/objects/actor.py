@@ -51,7 +51,7 @@ class Actor:
     max_speed:        upper bound in m/s of the speed of any of its points on the path
     bounding_radius:  radius in m of its bounding sphere around the origin
     cylinder_radius:  radius in m of its bounding cylinder around the vertical axis
-    surface:          its surface in the body frame if its collision shape is a surface without an inside, else None
+    surface:          its surface in the body frame if its collision shape is a hollow triangle mesh, else None
     """
 
     body: Body
@@ -189,7 +189,7 @@ class ActorBuilder:
         actor.collides = True
 
     def add_without_collisions(self, actor: Actor, tick: int) -> None:
-        """Create an actor in the engine that can be measured and rendered but not collide, unless it exists."""
+        """Create an actor in the engine, only to measure distances and for rendering, unless it is in the engine."""
         if actor.body_id is None:
             self._create(actor, tick)
             engine.disable_collisions(self._client, actor.id)

@@ -16,8 +16,9 @@ from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.static_distance import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
-from simscen.sim.objects.idle_objects import BroadPhase, RestDetector, RestPoses
+from simscen.sim.objects.broad_phase import BroadPhase
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
+from simscen.sim.objects.rest import RestDetector, RestPoses
 
 NEVER = 2**62
 """A tick after the end of every run."""
@@ -96,7 +97,7 @@ class Actors:
         return not self._deferred_count
 
     def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
-        """Let the deferred actors near robots collide, and create the actors that robots can measure.
+        """Let the deferred actors near robots collide, and add actors to the engine to measure their distances.
 
         Returns the names of these actors by body id.
         """
@@ -224,12 +225,12 @@ class Actors:
             return NEVER
         broad_phase = self._broad_phase
         if tick >= broad_phase.valid_until and broad_phase.update(
-            tick, robot_speed(), self.poses(tick), self._is_asleep(tick)
+            tick, robot_speed(), self.poses(tick), self._are_pushable_asleep(tick)
         ):
             self._resting_since = None
         return -1 if broad_phase.near_contact else broad_phase.valid_until
 
-    def _is_asleep(self, tick: int) -> bool:
+    def _are_pushable_asleep(self, tick: int) -> bool:
         """Return whether all pushable actors sleep in the engine, and no robot can have touched any of them."""
         is_resting = self._resting_since is not None and tick - self._resting_since > self._ticks_until_asleep
         return is_resting and tick <= min(self._no_contact_before.values())
@@ -273,7 +274,7 @@ class Actors:
         """Return the poses of all actors, sorted by name; queries the engine at most once per tick."""
         if self._poses_tick == tick:
             return self._poses
-        if self._poses_tick is None or (self._pushable and not self._is_asleep(tick)):
+        if self._poses_tick is None or (self._pushable and not self._are_pushable_asleep(tick)):
             self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
             self._scheduled_poses.invalidate()
             if self._resting_since is None or not all(actor.is_resting for actor in self._pushable):
@@ -300,7 +301,7 @@ class Actors:
 
     def prefetch_poses(self, tick: int, period: int) -> None:
         """Precompute poses of scripted actors for calls of `poses` every `period` ticks from the current `tick` on."""
-        if self._scripted and self._poses_tick is not None and (not self._pushable or self._is_asleep(tick)):
+        if self._scripted and self._poses_tick is not None and (not self._pushable or self._are_pushable_asleep(tick)):
             self._scheduled_poses.compute(tick, period, self._poses)
 
     def bodies_and_poses(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
@@ -347,7 +348,7 @@ class Actors:
         `ground_distance` m, measured in the ground plane.
         """
         poses = self.poses(tick)
-        asleep_since = self._resting_since if not self._pushable or self._is_asleep(tick) else None
+        asleep_since = self._resting_since if not self._pushable or self._are_pushable_asleep(tick) else None
         max_step = self._scripted_speed / self._tick_rate
         nearby = self._nearby.get(robot_id)
         if nearby is None or nearby.asleep_since != asleep_since or not nearby.covers(point, distance, tick, max_step):
@@ -384,6 +385,6 @@ class Actors:
         self.poses(tick)
         # A body that is hit by a heavier one leaves with up to twice its speed.
         factor = 2 if len(self._pushable) > 1 else 1
-        if self._is_asleep(tick):
+        if self._are_pushable_asleep(tick):
             return max(self._scripted_speed, FALL_SPEED_M_S) * factor
         return max(self._scripted_speed, *(actor.speed_bound(self._client) for actor in self._pushable)) * factor

@@ -1,4 +1,4 @@
-"""Selects the actors (movable objects) that a robot can touch or measure, to save computing time for all others."""
+"""Selects the actors (movable objects) near robots. Only these must collide, or have their distances measured."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -100,12 +100,13 @@ def find_nearby(
 class ProximityQuery(NamedTuple):
     """Position of a robot and two radii in m.
 
-    Actors within `radius` must be able to collide. Actors within `observed_radius` must be measurable.
+    Actors within `collision_radius` must be able to collide. Actors within `distance_radius` must be in the engine, so
+    that the engine can measure their distances to the robot.
     """
 
     point: Vector
-    radius: float
-    observed_radius: float
+    collision_radius: float
+    distance_radius: float
 
 
 class DeferredActors:
@@ -127,15 +128,15 @@ class DeferredActors:
         self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
     def activate_near(self, queries: Iterable[ProximityQuery]) -> tuple[list[Actor], list[Actor]]:
-        """Return the newly activated actors, and the actors that must now be measurable but cannot collide.
+        """Return the newly activated actors, and the other actors that must be added to the engine to be measured.
 
         The results are valid until a robot has moved by REQUERY_DISTANCE_M.
         """
         is_near, is_measured = np.zeros((2, len(self._actors)), dtype=np.bool_)
-        for point, radius, observed_radius in queries:
+        for point, collision_radius, distance_radius in queries:
             distances = self._distances(point) - REQUERY_DISTANCE_M
-            is_near[self._owners[distances <= radius]] = True
-            is_measured[self._owners[distances <= observed_radius]] = True
+            is_near[self._owners[distances <= collision_radius]] = True
+            is_measured[self._owners[distances <= distance_radius]] = True
         is_near &= self._is_deferred
         self._is_deferred &= ~is_near
         is_measured &= self._is_deferred & ~self._is_measured

@@ -303,7 +303,7 @@ class Robot:
     def make_query(self) -> ProximityQuery:
         """Return a query for the deferred actors near the robot."""
         self._query_point = self._state().pose.position
-        return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.query_radius)
+        return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.distance_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
         """Add bodies that the robot can touch; `names` has their names by body id (None: a wall)."""

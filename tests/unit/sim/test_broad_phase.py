@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.sim.objects.actor import SPEED_HORIZON_S
-from simscen.sim.objects.idle_objects import NEAR_CONTACT_S, BoundingDiscs, find_candidates
+from simscen.sim.objects.broad_phase import NEAR_CONTACT_S, BoundingDiscs, find_candidates
 
 
 def test_bodies_do_not_meet_within_the_guaranteed_time():

@@ -9,7 +9,7 @@ from simulation_helpers import box
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath, Solid, Sphere
-from simscen.sim.objects.idle_objects import RestDetector
+from simscen.sim.objects.rest import RestDetector
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 BALL = (Solid(Sphere(0.1), Pose3(z=0.1), "ball"),)
