@@ -129,8 +129,9 @@ def contact_points(
 ) -> list[ContactPoint]:
     """Return the current contacts of a robot, one for each touched object, sorted by name; without the ground.
 
-    `names` maps the ids of all bodies that count to names. The name of a static body is None; then `static_solid_at`
-    returns the name of the solid at a point. `tick_seconds` is the duration of a tick.
+    `names` has the names of the other bodies by id. Contacts with bodies that it does not contain are ignored. The name
+    of a static body is None; `static_solid_at` then returns the name of the solid at a point. `tick_seconds` is the
+    duration of a tick.
     """
     found: dict[str, ContactPoint] = {}
     for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
@@ -175,7 +176,7 @@ def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> E
 
 
 def _velocity_at(motion: BaseMotion, point: Vector) -> Vector:
-    """Return the velocity in m/s of the point of a robot that is at `point`."""
+    """Return the velocity in m/s of the part of a robot that is at `point`."""
     (vx, vy, vz), (wx, wy, wz) = motion.linear, motion.angular
     x, y, z = (point[i] - motion.origin[i] for i in range(3))
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

@@ -1,4 +1,4 @@
-"""Measures the distance from a robot to the static world, and tests whether a closed surface encloses a point.
+"""Measures the distance from a robot to the static world, and finds the static solids that enclose a point.
 
 The static mesh is split into parts. A separate PyBullet client measures the distance to each part near the robot.
 """
@@ -11,13 +11,14 @@ from heapq import heappop, heappush, heapreplace
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose3, Vector
+from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, is_convex, submesh
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim.body import outline
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
+from simscen.sim.contact.triangles import LINE_TILT, encloses, encloses_along_line, point_to_triangles
 from simscen.sim.scene.mesh_parts import parts_of
 
 RELIST_DISTANCE_M = 4.0
@@ -32,8 +33,6 @@ NEAREST_SLACK_M = 0.005
 """Additional search distance for the part that was nearest at the last measurement."""
 SOLID_TOLERANCE_M = 0.05
 """Largest distance from a contact point to the bounding box of the touched part."""
-LINE_TILT = 0.0123, 0.0271
-"""Slopes dx/dz and dy/dz of the line in `encloses_along_line`. The tilt avoids hits of vertical edges, as in maps."""
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]
@@ -202,60 +201,3 @@ class StaticDistance:
 def max_displacement(before: Pose3, after: Pose3, extent: float) -> float:
     """Return an upper bound in m of the motion of any point within `extent` m of the base frame's origin."""
     return math.dist(before[:3], after[:3]) + 2 * extent * math.dist(before[3:], after[3:])
-
-
-def point_to_triangles(point: Array, corners: Array) -> Array:
-    """Return the distances (n,) in m from a point (3,) to triangles (n, 3, 3)."""
-    a, b, c = corners.swapaxes(0, 1)
-    normal = np.cross(b - a, c - a)
-    edges = np.min([_distances_to_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    length = np.linalg.norm(normal, axis=1)
-    has_area = length > 0
-    height = np.abs(np.sum((point - a) * normal, axis=1)) / np.where(has_area, length, 1.0)
-    is_above = has_area.copy()
-    for p, q in ((a, b), (b, c), (c, a)):
-        is_above &= np.sum(np.cross(q - p, point - p) * normal, axis=1) >= 0
-    distances: Array = np.where(is_above, height, edges)
-    return distances
-
-
-def _distances_to_segments(point: Array, start: Array, end: Array) -> Array:
-    direction = end - start
-    squared = np.sum(direction * direction, axis=1)
-    share = np.sum((point - start) * direction, axis=1) / np.where(squared > 0, squared, 1.0)
-    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * direction
-    distances: Array = np.linalg.norm(point - nearest, axis=1)
-    return distances
-
-
-def encloses(corners: Array, point: Vector) -> bool:
-    """Return whether a surface of triangles (n, 3, 3), counterclockwise from outside, encloses a point.
-
-    True if the winding number exceeds one half, so that small holes have no effect. The winding number is the sum of
-    the solid angles of all triangles divided by 4 pi (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
-    """
-    ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(point, 3)[:, None]
-    la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
-    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
-    angles = 2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return bool(angles.sum() > 2 * math.pi)
-
-
-def encloses_along_line(corners: Array, point: Vector) -> bool | None:
-    """Return whether a surface encloses a point, from its crossings with the line through the point with LINE_TILT.
-
-    `corners` (n, 3, 3) must contain all triangles that the line may cross. Returns None if the result is undecided,
-    because the surface has a hole or the line hits an edge.
-    """
-    x, y, z = np.moveaxis(corners - point, 2, 0)
-    x, y = x - LINE_TILT[0] * z, y - LINE_TILT[1] * z
-    # For each corner, twice the area of the line and the two other corners; all have one sign if the line crosses.
-    areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
-    is_crossed = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
-    areas, z = areas[is_crossed], z[is_crossed]
-    if not areas.all():
-        return None
-    facing, is_above = np.sign(areas[:, 0]), (areas * z).sum(axis=1) * areas[:, 0] > 0
-    up, down = facing[is_above].sum(), -facing[~is_above].sum()
-    return bool(up > 0) if up == down else None

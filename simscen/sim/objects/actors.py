@@ -14,7 +14,7 @@ from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.divergence import divergence_reason
-from simscen.sim.contact.static_distance import encloses
+from simscen.sim.contact.triangles import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
 from simscen.sim.objects.broad_phase import BroadPhase
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby

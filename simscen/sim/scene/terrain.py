@@ -20,7 +20,7 @@ MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
 
 
 class Terrain:
-    """Solids of a static world that wheels can roll on, as bodies in the engine. True if there is any.
+    """Solids of a static world that wheels can roll on, as bodies in the engine. An instance is true if there are any.
 
     `solids` has the indices of the solids, and `names` has their names by body id.
     """
