@@ -32,8 +32,8 @@ class PassRate(Spec):
     `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run, and stop as
     soon as the claim is decided."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
-    """Number of runs of `fixed`, and maximum number of runs of the other methods. Default for `fixed`: the fewest runs
-    that show the claim if all pass; for the other methods, 20 times as many."""
+    """Number of runs of `fixed`, and maximum number of runs of the other methods. Default for `fixed`: the smallest
+    number of runs that proves the claim if all pass. For the other methods: 20 times as many."""
     target: Rate | None = None
     """Pass rate of a robot that should be accepted; only for `sprt`."""
     power: Confidence = 0.9
@@ -49,6 +49,7 @@ class PassRate(Spec):
 
     @model_validator(mode="after")
     def _check_method(self) -> "PassRate":
+        """Raise ValueError if `target`, `power`, or `runs` do not fit the method or the claim."""
         if self.method == "sprt" and self.target is None:
             raise ValueError("`sprt` needs a `target`: the pass rate of a robot that should be accepted")
         if self.method != "sprt":
@@ -63,13 +64,13 @@ class PassRate(Spec):
 
 
 def fewest_runs(rate: float, confidence: float) -> int:
-    """Return the smallest number n of runs that show the pass rate `rate` if all pass: 1 - rate^n >= confidence."""
+    """Return the smallest number n of runs that proves the pass rate `rate` if all pass: 1 - rate^n >= confidence."""
     runs = math.ceil(math.log1p(-confidence) / math.log(rate) - 1e-9)
     return max(1, runs)
 
 
 class Acceptance(Spec):
-    """Claim about many random runs of a scenario, which `simscen study` tests."""
+    """Claim about many random runs of a scenario. `simscen study` tests it."""
 
     pass_rate: PassRate
     """Pass rate over random seeds and, if there are any, over random variations (`sampled`)."""

@@ -1,6 +1,6 @@
 """Specifications of controllers, goal checkers, and the progress checker.
 
-Names and default values are those of Nav2 unless noted.
+The names and default values are the same as in Nav2, unless noted.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -71,8 +71,8 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
     """Time for which commands are checked for collisions, at most up to the carrot."""
     min_slowed_speed: PositiveSpeed = 0.1
-    """Minimum speed to which the controller slows down a command that would lead to a collision. If the slow command
-    collides as well, the controller fails with NO_VALID_CONTROL. Nav2 fails at once."""
+    """Minimum speed to which the controller slows down a command that would lead to a collision. If the robot would
+    collide at this speed as well, the controller fails with NO_VALID_CONTROL. Nav2 fails at once."""
     use_regulated_linear_velocity_scaling: bool = True
     """Whether to slow down in tight curves."""
     regulated_linear_scaling_min_radius: PositiveLength = 0.9
@@ -94,6 +94,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
 
     @model_validator(mode="after")
     def _check_interpolation(self) -> "RegulatedPurePursuit":
+        """Raise ValueError for an interpolated curvature without a separate point for the curvature."""
         if self.interpolate_curvature_after_goal and not self.use_fixed_curvature_lookahead:
             raise ValueError("`interpolate_curvature_after_goal` needs `use_fixed_curvature_lookahead: true`")
         return self
@@ -171,8 +172,7 @@ class DynamicWindow(PathFollowerSpec):
     twirling_scale: Weight = 0.0
     """Weight of the turn rate. It keeps an omnidirectional base from spinning while it drives."""
     preferred_clearance: NonNegativeLength = 0.05
-    """Minimum clearance of the footprint. If no trajectory has this clearance, it does not apply. Nav2 has no such
-    parameter."""
+    """Minimum clearance of the footprint, ignored if no trajectory has this clearance. Nav2 has no such parameter."""
     forward_point_distance: NonNegativeLength = 0.1
     """Distance from the center of the robot to its front, for the two alignment weights."""
     oscillation_reset_dist: NonNegativeLength = 0.05
@@ -180,7 +180,7 @@ class DynamicWindow(PathFollowerSpec):
     oscillation_reset_angle: Annotated[Angle, Field(ge=0)] = 0.2
     """Angle after which an oscillating motion may change its direction again."""
     x_only_threshold: NonNegativeSpeed = 0.05
-    """Forward speed below which oscillating turns count as oscillation as well."""
+    """Forward speed below which turns in alternating directions count as oscillation as well."""
 
     @property
     def lookahead_s(self) -> float:
@@ -204,7 +204,7 @@ CONTROLLERS = {
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
-    """Base class of goal checker specifications. The tolerances apply to goals without tolerances."""
+    """Base class of goal checker specifications."""
 
 
 class SimpleGoalChecker(GoalCheckerSpec):
@@ -215,7 +215,7 @@ class SimpleGoalChecker(GoalCheckerSpec):
     stateful: bool = True
     """Whether only the heading is checked after the position was reached."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """Factor of the tolerances for a moving robot. For a robot at rest, the full tolerances apply. Nav2: 1."""
+    """Fraction of the tolerances that applies while the robot moves. At rest, the full tolerances apply. Nav2: 1."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]

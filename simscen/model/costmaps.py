@@ -25,7 +25,7 @@ class Costmap(Ranged):
     """Global costmap in the map frame, for planning (nav2_costmap_2d: static, obstacle, and inflation layers)."""
 
     resolution: PositiveLength = 0.05
-    """Maximum edge length of a cell. The cells of a coarser map are split. The cells of a finer map are kept."""
+    """Maximum edge length of a cell. Larger cells of the map are split; smaller cells are kept."""
     inflation_radius: NonNegativeLength = 0.70
     """Distance from obstacles within which cells have a cost."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
@@ -49,8 +49,8 @@ class Costmap(Ranged):
     min_obstacle_height: NonNegativeLength = 0.05
     """Minimum height of obstacles in camera data; lower points are ground. Lidar data is not filtered."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
-    """Maximum slope of camera points that are ground, seen from the robot's base. With 0, as in Nav2, a ramp is an
-    obstacle."""
+    """Maximum slope, seen from the robot's base, of camera points that count as ground. With 0, as in Nav2, a ramp is
+    an obstacle."""
     max_obstacle_height: NonNegativeLength = 2.0
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
@@ -66,8 +66,8 @@ class Costmap(Ranged):
 class LocalCostmap(Spec):
     """Local costmap for controllers and recovery behaviors: a rolling window in the odom frame.
 
-    The local costmap contains sensor data and keepout zones, but not the map. Parameters without a value have the value
-    of the global costmap (`costmap`).
+    The local costmap contains sensor data and keepout zones, but not the map. Parameters that are not set have the
+    values of the global costmap (`costmap`).
     """
 
     width: PositiveLength | None = None
@@ -95,7 +95,7 @@ class LocalCostmap(Spec):
     min_obstacle_height: NonNegativeLength | None = None
     """Minimum height of obstacles in camera data; lower points are ground."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
-    """Maximum slope of camera points that are ground, seen from the robot's base."""
+    """Maximum slope, seen from the robot's base, of camera points that count as ground."""
     max_obstacle_height: NonNegativeLength | None = None
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool | None = None
@@ -106,6 +106,6 @@ class LocalCostmap(Spec):
     """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
     def with_defaults_from(self, shared: Costmap) -> Costmap:
-        """Return the complete parameters. Parameters without a value are taken from `shared`."""
+        """Return the complete parameters. Parameters that are not set are taken from the global costmap `shared`."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)

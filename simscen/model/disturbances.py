@@ -15,6 +15,7 @@ from simscen.triggers.base import Trigger
 
 
 def _one_or_several(value: Any) -> str:
+    """Return the union tag of actions: "several" for a list, otherwise "one"."""
     return "several" if isinstance(value, list) else "one"
 
 
@@ -28,8 +29,8 @@ Actions = Annotated[
 class StepEntry(Spec):
     """Step of the sequence (`then`) of an event. It becomes active when the previous step has happened.
 
-    In the trigger of a step, `time`, `for`, and `travelled` are relative to the previous step. Earlier goals, replans,
-    recoveries, collisions, and events do not count.
+    In the trigger of a step, `time`, `for`, and `travelled` are counted from the previous step. Goals, replans,
+    recoveries, collisions, and events before that do not count.
     """
 
     name: Name | None = None
@@ -78,8 +79,8 @@ class EventEntry(Spec):
 class SequenceStep:
     """Event, or step of the sequence (`then`) of an event.
 
-    `keys` is the path of the step in the scenario, such as ("events", 0, "then", 1). `after` is the index, in the list
-    of `steps_of`, of the step that must happen before; None for an event.
+    `keys` lead to the step in the scenario, e.g. ("events", 0, "then", 1). `after` is the index of the previous step of
+    the sequence in the list that `steps_of` returns; None for an event.
     """
 
     name: str
@@ -99,7 +100,7 @@ class SequenceStep:
         return [action for _, action in self.located_actions()]
 
     def located_actions(self) -> Iterator[tuple[tuple[str | int, ...], AnyAction]]:
-        """Yield for each action its path in the scenario and the action."""
+        """Yield each action with the keys that lead to it in the scenario."""
         if isinstance(self.entry.do, list):
             yield from (((*self.keys, "do", number), action) for number, action in enumerate(self.entry.do))
         elif self.entry.do is not None:

@@ -1,4 +1,4 @@
-"""Specifications of the velocity smoother, the collision monitor, and motion prediction."""
+"""Specifications of safety components: velocity smoother, collision monitor, and motion prediction."""
 
 from typing import Annotated
 
@@ -33,8 +33,8 @@ class VelocitySmoother(Spec):
     max_angular_velocity: PositiveAngularSpeed | None = None
     """Maximum turn rate; default: unlimited."""
     counter_turn_slip: bool = False
-    """Whether to correct turns caused by wheels that slip on one side, which the gyroscope measures. It has an effect
-    only with the localizers `ekf` and `slip_ekf`. Nav2 has no such correction."""
+    """Whether to correct turns that the gyroscope measures when wheels slip on one side. It has an effect only with the
+    localizers `ekf` and `slip_ekf`. Nav2 has no such correction."""
 
 
 class CollisionMonitor(Spec):

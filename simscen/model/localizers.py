@@ -26,11 +26,12 @@ class LocalizerSpec(Typed):
     """Base class of localizer specifications."""
 
     fuses_odometry: ClassVar[bool] = False
-    """Whether the localizer fuses odometry and IMU. The localizer then also defines the odom frame."""
+    """Whether the localizer fuses odometry and IMU itself. It then also defines the odom frame."""
     needs_map: ClassVar[bool] = False
     """Whether the localizer compares sensor data with a map."""
     precomputation: ClassVar[str] = ""
-    """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; "" = none."""
+    """Address `package.module:function` of a precomputation; "" for none. It is called as `function(spec, grid)`, once
+    per map, before the runs start."""
 
 
 class AmclParameters(Ranged, LocalizerSpec):
@@ -99,11 +100,11 @@ class AmclParameters(Ranged, LocalizerSpec):
     do_beamskip: bool = False
     """Whether to skip beams that fit few particles once the filter has converged; `likelihood_field_prob` only."""
     beam_skip_distance: PositiveLength = 0.5
-    """Maximum distance from an obstacle of the map to the end of a beam that fits a particle."""
+    """Maximum distance of the end of a beam from an obstacle of the map for which the beam fits a particle."""
     beam_skip_threshold: Probability = 0.3
-    """Fraction of the particles below which a beam is skipped, because it fits too few particles."""
+    """Minimum fraction of the particles that a beam must fit. Other beams are skipped."""
     beam_skip_error_threshold: Probability = 0.9
-    """Fraction of skipped beams from which no beam is skipped, because the pose must be wrong."""
+    """Fraction of skipped beams at which the pose must be wrong, so that no beam is skipped."""
 
     @property
     def max_used_range(self) -> float:
@@ -123,7 +124,7 @@ class Amcl(AmclParameters):
     @model_validator(mode="before")
     @classmethod
     def _apply_nav2_values(cls, values: Any) -> Any:
-        """Apply the deprecated `parameters: nav2`, except to given values."""
+        """Apply the deprecated `parameters: nav2` to values that are not given."""
         if isinstance(values, Mapping) and values.get("parameters") == "nav2":
             return {"laser_model_type": "likelihood_field", **values}
         return values
@@ -136,7 +137,7 @@ class EkfParameters(LocalizerSpec):
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
     """Standard deviation of the position after one meter."""
     rotation_noise: NonNegativeAngle = 0.02
-    """Standard deviation of the heading after one rad or one meter."""
+    """Standard deviation of the heading after a turn of one rad, and after one meter."""
     gyro_noise: NonNegativeAngularSpeed = 0.005
     """Standard deviation of the yaw rate."""
     gyro_bias: NonNegativeAngularSpeed | None = None
@@ -167,7 +168,7 @@ class OdometryOnly(LocalizerSpec):
 
 
 DEFAULT_TYPE = "amcl"
-"""Type of a localizer without a `type`."""
+"""Type of a localizer for which no `type` is given."""
 _Localizers = Annotated[
     Annotated[Amcl, Tag(DEFAULT_TYPE)]
     | Annotated[Ekf, Tag("ekf")]
@@ -183,6 +184,7 @@ Localizer = Annotated[LocalizerSpec, ExtensibleUnion("localizer", _Localizers)]
 
 
 _MODULE = "simscen.model.localizers:"
+"""Beginning of the addresses of the classes in this module."""
 LOCALIZERS = {
     "amcl": _MODULE + "Amcl",
     "ekf": _MODULE + "Ekf",

@@ -1,4 +1,4 @@
-"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2."""
+"""Specification of the MPPI controller and its critics, with the parameters of nav2_mppi_controller."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -114,7 +114,7 @@ class MppiGoalAngleCritic(MppiCritic):
 
 
 class MppiPathAlignCritic(MppiCritic):
-    """Penalizes the distance between a trajectory and the plan after the same traveled distance."""
+    """Penalizes the distance between a trajectory and the plan, compared at the same driven distance."""
 
     cost_weight: Weight = 14.0
     """Weight of the mean distance in meters."""
@@ -139,8 +139,8 @@ class MppiPathFollowCritic(MppiCritic):
     cost_weight: Weight = 5.0
     """Weight of the distance in meters."""
     offset_from_furthest: PointCount = 5
-    """Number of plan points, 5 cm apart, from the furthest reached point to the target point. Blocked points are
-    skipped."""
+    """Number of plan points, 5 cm apart, from the furthest plan point that any trajectory reaches to the target point.
+    Blocked points are skipped."""
     threshold_to_consider: NonNegativeLength = 1.4
     """Distance from the end of the plan within which the critic is inactive."""
 
@@ -182,7 +182,7 @@ class MppiVelocityDeadbandCritic(MppiCritic):
     """Penalizes velocities that are too low to move a base with friction."""
 
     cost_weight: Weight = 35.0
-    """Weight of the missing m/s and rad/s, integrated over time."""
+    """Weight of the m/s and rad/s by which a velocity is too low, integrated over time."""
     deadband_velocities: Annotated[
         tuple[NonNegativeSpeed, NonNegativeSpeed, NonNegativeAngularSpeed], Field(strict=False)
     ] = (0.0, 0.0, 0.0)
@@ -234,12 +234,12 @@ class Mppi(PathFollowerSpec):
     az_max: PositiveAngularAcceleration | None = None
     """Maximum angular acceleration; default: the limit of the robot."""
     model_delay_vx: Annotated[Duration, Field(le=2)] = 0.0
-    """Delay of the base after a forward command. Each sample starts with the commands that the base has not executed
-    yet."""
+    """Delay between a forward command and its execution by the base. Each sample starts with the commands that the base
+    has not executed yet."""
     model_delay_vy: Annotated[Duration, Field(le=2)] = 0.0
-    """Delay of the base after a sideways command."""
+    """Delay between a sideways command and its execution by the base."""
     model_delay_wz: Annotated[Duration, Field(le=2)] = 0.0
-    """Delay of the base after a turn command."""
+    """Delay between a turn command and its execution by the base."""
     vx_std: PositiveSpeed | None = None
     """Standard deviation of the sampled forward speeds; default: half of `vx_max` (Nav2: 0.2 m/s)."""
     vy_std: PositiveSpeed | None = None
@@ -256,8 +256,8 @@ class Mppi(PathFollowerSpec):
     """Time for which a constant command must be free of collisions; otherwise the command is slowed down. Nav2 has no
     such check."""
     min_slowed_speed: PositiveSpeed = 0.1
-    """Minimum speed to which the controller slows down a command that would lead to a collision. If the slow command
-    collides as well, the controller fails with NO_VALID_CONTROL."""
+    """Minimum speed to which the controller slows down a command that would lead to a collision. If the robot would
+    collide at this speed as well, the controller fails with NO_VALID_CONTROL."""
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1

@@ -1,4 +1,4 @@
-"""Specifications of the navigation action, of the expected outcome of a goal, and of waiting at a goal."""
+"""Specifications of the navigation mode, of the expected outcome of a goal, and of waiting at a goal."""
 
 from typing import Annotated, Any, Literal
 
@@ -28,7 +28,7 @@ class Navigation(Spec):
 
 
 def text_or_mapping(value: Any) -> str:
-    """Return the tag of a value in a union of text and mapping."""
+    """Return the tag of a value in a union of a text and a mapping: "text" or "mapping"."""
     return "text" if isinstance(value, str) else "mapping"
 
 
@@ -37,10 +37,11 @@ Expectation = Annotated[
     | Annotated[Spec, LazySpec("simscen.criteria.error_codes", "ExpectedError"), Tag("mapping")],
     Discriminator(text_or_mapping),
 ]
+"""Expected outcome of a goal."""
 
 
 def expected_failure_name(expected: "Expectation") -> str:
-    """Return "failed" or the name of the expected error code; "" if the goal should succeed."""
+    """Return the expected failure of a goal: "failed", or the name of an error code; "" if the goal should succeed."""
     code = getattr(expected, "error_code", None)
     if code is not None:
         return str(code.name)

@@ -1,4 +1,4 @@
-"""Specifications of the planners of OMPL and Nav2, and of the `medial_axis` planner of the advanced stack."""
+"""Specifications of planners (`planner:`): OMPL planners, two planners of Nav2, and the advanced `medial_axis`."""
 
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -20,20 +20,20 @@ class PlannerSpec(Typed):
     """`rate`: replan at a fixed rate. `on_invalid`: replan only if the path becomes invalid. With `on_invalid`, the
     advanced stack also replans if a clearly better path appears, or if moving obstacles will be in the way."""
     replanning_rate: Frequency | None = None
-    """Rate of new plans (`rate`) or of checks of the plan (`on_invalid`). Default, as in Nav2: 1 Hz, or 0.333 Hz with
-    navigate_through_poses."""
+    """Rate of new plans (`rate`), or of checks whether the plan is still valid (`on_invalid`). Default, as in Nav2: 1
+    Hz, or 0.333 Hz with navigate_through_poses."""
     proximity_threshold: NonNegativeLength = 4.0
-    """With `replanning: rate`, remaining length of the plan below which it is kept unless it is blocked (IsGoalNearby
-    in Nav2's behavior trees)."""
+    """With `replanning: rate`: remaining length of the plan below which the plan is only replaced if it is blocked
+    (IsGoalNearby in Nav2's behavior trees)."""
     cautious: bool = False
-    """Whether to prefer paths with more clearance after the robot failed to follow a plan."""
+    """Whether to prefer paths with more clearance after the robot has failed to follow a plan."""
 
 
 StateSpace = Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"]
 
 
 class OmplParameters(PlannerSpec):
-    """Parameters of all planners that search with OMPL."""
+    """Base class of the specifications of planners that search with OMPL."""
 
     allow_unknown: bool = True
     """Whether plans may lead through unknown cells, which cost slightly more than the most expensive free cells."""
@@ -45,11 +45,11 @@ class OmplParameters(PlannerSpec):
     """State space of the search. `auto`: reeds_shepp for an Ackermann drive, se2 for a long footprint, otherwise
     holonomic."""
     minimum_turning_radius: PositiveLength | None = None
-    """Turning radius of Dubins and Reeds-Shepp paths; default: 1.15 times the turning radius of the robot, and at
-    least 0.2 m (default of nav2_smac_planner: 0.4 m)."""
+    """Turning radius of Dubins and Reeds-Shepp paths. Default: 1.15 times the turning radius of the robot, but at least
+    0.2 m (nav2_smac_planner: 0.4 m)."""
     hull_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.10
-    """Clearance of the whole footprint in searches over poses (all state spaces except `holonomic`). If no path has
-    this clearance, half of it is tried, then none."""
+    """Clearance of the whole footprint in searches over poses (all state spaces except `holonomic`). If there is no
+    path with this clearance, half of it is tried, and then no clearance."""
     cusp_penalty: NonNegativeLength = 1.0
     """Cost, as a length, of each change between forward and backward driving in searches over poses."""
     pose_searches: Annotated[int, Field(ge=1, le=100)] = 6
@@ -62,8 +62,8 @@ class OmplPlanner(OmplParameters):
     component: ClassVar[str] = "simscen.stack.planners.ompl_planner:ompl_planner"
     type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
     gap_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.07
-    """Minimum clearance in gaps on both sides of the robot's inscribed circle; 0 = no minimum. Narrower gaps are used
-    only if there is no other path. Start and goal may be closer to obstacles."""
+    """Minimum clearance on both sides of the robot's inscribed circle in gaps; 0 = no minimum. Narrower gaps are used
+    only if there is no other path. The start and the goal may be closer to obstacles."""
     improving_iterations: Iterations = 500
     """Number of iterations of planners that improve their path; for `bit_star`, see `max_batches`."""
     samples_per_batch: Annotated[int, Field(ge=1, le=100_000)] = 200
@@ -71,20 +71,20 @@ class OmplPlanner(OmplParameters):
     max_batches: Annotated[int, Field(ge=1, le=1000)] = 2
     """Number of batches after which the search ends if it has found a path; `bit_star` only."""
     rewire_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None
-    """OMPL's rewire factor: a larger value connects more neighbors of a sample; `bit_star`, `rrt_star`, and
+    """OMPL's rewire factor: with a larger value, a sample is connected to more neighbors. `bit_star`, `rrt_star`, and
     `informed_rrt_star` only. Default: 1.3 for `bit_star`, otherwise 1.1 as in OMPL."""
     range: PositiveLength | None = None
-    """Longest motion added to a tree; all planners except `bit_star`. Default: OMPL's default in searches over poses,
-    otherwise 1 m."""
+    """Maximum length of a motion that is added to a tree; all planners except `bit_star`. Default: OMPL's default in
+    searches over poses, otherwise 1 m."""
     goal_bias: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.05
     """Probability of drawing the goal as a sample; `rrt_star`, `informed_rrt_star`, and `kpiece` only."""
     cost_threshold_ratio: Annotated[float, Field(ge=0, le=1000), Quantity("ratio")] = 1.01
-    """OMPL's cost threshold: the search ends at a path that costs at most this value times the distance to the goal;
-    `bit_star` and `rrt_star` only. 0 = no threshold."""
+    """OMPL's cost threshold: the search ends when it has found a path that costs at most this value times the distance
+    to the goal. 0 = no threshold. `bit_star` and `rrt_star` only."""
     simplify: bool = True
     """Whether OMPL shortens the path and moves it to cells of lower cost."""
     simplify_steps: Annotated[int, Field(ge=2, le=100_000)] = 100
-    """Number of attempts of each pass of the simplification (`max_steps` of OMPL's PathSimplifier)."""
+    """Number of attempts per pass of the simplification (`max_steps` of OMPL's PathSimplifier)."""
 
 
 class Navfn(PlannerSpec):
@@ -112,7 +112,7 @@ class Smac2d(PlannerSpec):
 
 
 def _planner_tag(value: Any) -> str | None:
-    """Return the tag of a planner specification: its `type`, or "ompl" for all types of OmplPlanner."""
+    """Return the union tag of a planner specification: its `type`, or "ompl" for all types of OmplPlanner."""
     kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
     return kind if kind in ("navfn", "smac_2d", "medial_axis") else "ompl"
 
@@ -130,6 +130,7 @@ Planner = Annotated[PlannerSpec, ExtensibleUnion("planner", _Planners)]
 
 
 _MODULE = "simscen.model.planners:"
+"""Beginning of the addresses of the classes in this module."""
 PLANNERS = {
     **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _MODULE + "OmplPlanner"),
     "navfn": _MODULE + "Navfn",

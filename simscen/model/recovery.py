@@ -1,4 +1,4 @@
-"""Specifications of recovery behaviors, which run after planning or control failed, as in Nav2."""
+"""Specifications of recovery behaviors, which run after planning or control has failed, as in Nav2."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -34,7 +34,7 @@ class BehaviorSpec(Typed):
     """Base class of recovery behavior specifications."""
 
     turns_in_place: ClassVar[bool] = False
-    """Whether the behavior needs a base that can turn in place; other robots skip it."""
+    """Whether the behavior needs a base that can turn in place. Other robots skip the behavior."""
 
 
 class Spin(BehaviorSpec):
@@ -84,9 +84,9 @@ class BackUp(BehaviorSpec):
 
 
 class Retrace(BehaviorSpec):
-    """Drive back along the robot's own path until there is room to turn. Nav2 has no such behavior.
+    """Drive back along the path that the robot has driven, until there is room to turn. Nav2 has no such behavior.
 
-    The robot backs up straight if its path is not known.
+    The robot backs up straight if this path is not known.
     """
 
     component: ClassVar[str] = "simscen.advanced.retrace:Retrace"
@@ -131,13 +131,13 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrPara
 
 
 class Recovery(Spec):
-    """Recovery behaviors, one of which runs each time that planning or control fails (Nav2's default behavior tree)."""
+    """Recovery behaviors. The next one runs each time planning or control fails (Nav2's default behavior tree)."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """Number of retries before the goal fails."""
     retries_since_progress: bool = False
-    """Whether retries and behaviors start again when the robot is one meter nearer to its goal than at any earlier
-    recovery. Nav2 counts all retries of a goal."""
+    """Whether to start again with the first retry and the first behavior when the robot is one meter nearer to its goal
+    than at all earlier recoveries. Nav2 counts all retries of a goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "PLANNER_TIMEOUT",
@@ -186,7 +186,7 @@ class Recovery(Spec):
         return [self._with_shared_parameters(entry) for entry in self.behaviors]
 
     def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
-        """Return the specification of a behavior, given by name or with some of its parameters."""
+        """Return the complete specification of a behavior that is given by name or with some of its parameters."""
         model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
         shared = type(self).model_fields.keys() & model.model_fields.keys()
         own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}
@@ -200,6 +200,7 @@ _SHIPPED: dict[str, type[BehaviorSpec]] = {
     "backup": BackUp,
     "retrace": Retrace,
 }
+"""Specifications of the shipped behaviors, by type."""
 
 
 BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}

@@ -74,8 +74,8 @@ class SkidSteer(Spec):
     right: JointNames | None = None
     """Wheel joints of the URDF on the right; default: found by position."""
     turning_scale: Annotated[float, Field(gt=0, le=10), Quantity("ratio")] = 1.0
-    """Effective wheel separation divided by the geometric wheel separation, above 1 because of skidding (Clearpath's
-    jackal: 1.5)."""
+    """Effective wheel separation divided by the geometric wheel separation. It is above 1 because of skidding
+    (Clearpath's Jackal: 1.5)."""
 
 
 class Ackermann(Spec):
@@ -92,7 +92,7 @@ class Ackermann(Spec):
     wheel_width: PositiveLength = 0.04
     """Width of a wheel along its axle."""
     max_steering: PositiveAngle
-    """Maximum steering angle of the virtual wheel in the middle."""
+    """Maximum steering angle of a virtual front wheel in the middle."""
     left: JointNames | None = None
     """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
@@ -192,7 +192,7 @@ class SensorSpec(Component):
     """Base class of sensor specifications. The component is called with a simscen.sensors.sensor.SensorSetting."""
 
     reading_type: ClassVar[str]
-    """Class name of the readings in simscen.core.messages.sensor_data: Scan, Odometry, Imu, Bump, or Image."""
+    """Name of the class of the readings in simscen.core.messages.sensor_data: Scan, Odometry, Imu, Bump, or Image."""
     localizes: ClassVar[bool] = False
     """Whether the localizer uses the scans of this sensor."""
 
@@ -203,7 +203,7 @@ class SensorSpec(Component):
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Return why this class is not a valid specification of a sensor; "" if it is valid."""
+        """Return the reason why this class is not a valid specification of a sensor; "" if it is valid."""
         if problem := super().definition_problem():
             return problem
         is_known = getattr(cls, "reading_type", None) in READING_KINDS
@@ -312,7 +312,7 @@ class Sensor(Choice):
 
     @property
     def reading_type(self) -> str:
-        """Class name of the readings in simscen.core.messages.sensor_data."""
+        """Name of the class of the readings in simscen.core.messages.sensor_data."""
         assert isinstance(self.chosen, SensorSpec)
         return self.chosen.reading_type
 
@@ -359,8 +359,8 @@ class RobotSpec(Spec):
     footprint: Ring | None = None
     """Corners of the footprint of any other robot in the base frame; default: computed from the shapes."""
     hull_friction: Friction = 0.5
-    """Friction coefficient of the hull. It is multiplied by the coefficient of what the hull touches: 1 for walls and
-    fixed obstacles, 0.6 for movable obstacles."""
+    """Friction coefficient of the hull. In a contact, it is multiplied by the coefficient of the other body: 1 for
+    walls and fixed obstacles, 0.6 for movable obstacles."""
     drive: Drive
     """Wheels and their kinematics."""
     limits: Limits
@@ -384,6 +384,7 @@ class RobotSpec(Spec):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> "RobotSpec":
+        """Raise ValueError for keys that are missing or exclude each other."""
         if unknown := sorted(self.latency.sensors.keys() - self.sensors.keys()):
             raise ValueError(f"`latency` names `{unknown[0]}`, which is not a sensor of the robot")
         if (self.urdf is None) == (self.body is None):

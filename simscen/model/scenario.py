@@ -70,7 +70,7 @@ class InitialEstimate(PoseSpec):
 
 
 class EstimateOrPlace(PlaceAllowed):
-    """Annotation of a field that takes an initial estimate or the name of a place."""
+    """Annotation of an initial estimate that can also be given as the name of a place."""
 
     def value_at(self, pose: PoseSpec) -> InitialEstimate:
         """Return an estimate at the pose of a place, with the default standard deviations."""
@@ -86,7 +86,7 @@ else:
 
 
 class Payload(Spec):
-    """Load on the robot, which is not part of its robot file and unknown to its stack."""
+    """Load on the robot. It is not part of the robot file, and the stack does not know it."""
 
     mass: PositiveMass
     """Mass in kg."""
@@ -137,7 +137,7 @@ MAX_GOALS = 1000
 class MultiRobotEntry(RobotEntry):
     """One of several robots, with its own start, goals, faults, and criteria.
 
-    Without `map` or `on_goal_failure`, the value of the scenario applies. The `stack` is merged with the stack of the
+    A missing `map` or `on_goal_failure` is taken from the scenario. The `stack` is merged with the stack of the
     scenario.
 
     Example: `robots: {left: {pose: {x: 1, y: 1}, goals: [{pose: dock}]}, right: {pose: {x: 4, y: 1}}}`
@@ -164,6 +164,7 @@ MAX_ROBOTS = 20
 
 
 def _check_reason(reason: str) -> str:
+    """Return the reason. Raises ValueError if it is empty."""
     if not reason.strip():
         raise ValueError("the reason is empty")
     return reason
@@ -173,7 +174,7 @@ Reason = Annotated[str, Field(max_length=500), AfterValidator(_check_reason)]
 
 
 class ExpectedFailure(Spec):
-    """Known failure. A run that fails counts as failed-as-expected, and a run that passes counts as a failure.
+    """Known failure. A run that fails counts as failed-as-expected, and a run that passes counts as failed.
 
     Example: `expected: {fail: "the planner hugs corners, NAV-123", criteria: [clearance]}`
     """
@@ -181,12 +182,13 @@ class ExpectedFailure(Spec):
     fail: Reason
     """Reason, e.g. a ticket and the problem."""
     criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
-    """Ids of the criteria that must fail, and names of the events and faults that must not happen. Nothing else may
+    """Ids of the criteria that must fail, and names of the events and faults that must not happen; nothing else may
     fail. Default: at least one criterion must fail."""
 
     @model_validator(mode="before")
     @classmethod
     def _require_reason(cls, value: Any) -> Any:
+        """Raise ValueError for text, to explain how a reason is written."""
         if isinstance(value, str):
             raise ValueError("give the reason for the known failure as `{fail: REASON}`")
         return value
@@ -208,6 +210,7 @@ class Physics(Spec):
 
 
 def _check_unique(measures: list[AnyMeasure]) -> list[AnyMeasure]:
+    """Return the metrics. Raises ValueError if one of them is given twice."""
     kinds = [measure.kind for measure in measures]
     repeated = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
     if repeated:
@@ -263,13 +266,13 @@ class ScenarioSpec(Spec):
     skip: Reason | None = None
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
-    """Values by the path of a key, such as `robot.motor_torque`. Each combination is a separate run."""
+    """Values by path of a key, such as `robot.motor_torque`. Each combination of values is a separate run."""
     acceptance: Acceptance | None = None
-    """Claim about many random runs, which `simscen study` tests. Other commands ignore the claim."""
+    """Claim about many random runs that `simscen study` tests. Other commands ignore the claim."""
 
     @property
     def only_robot(self) -> RobotEntry:
-        """The robot of a scenario with a single robot; raises AssertionError otherwise."""
+        """The robot of a scenario with a single robot. Raises AssertionError for several robots."""
         assert self.robot is not None
         return self.robot
 
@@ -319,7 +322,7 @@ def expected_failure(spec: ScenarioSpec) -> DeclaredFailure | None:
 
 
 class CriteriaSpec(ScenarioSpec):
-    """Scenario for judging existing logs, with optional `world` and `robot`."""
+    """Criteria file for judging existing logs: a scenario in which `world` and `robot` are optional."""
 
     simscen: LanguageVersion = 1
     """Version of the scenario language."""

@@ -1,4 +1,4 @@
-"""Specification of simscen's navigation stack, with Nav2's parameter names, and the profiles of default values."""
+"""Specification of simscen's navigation stack, with Nav2's parameter names, and its sets of defaults (profiles)."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -17,17 +17,19 @@ from simscen.spec.quantities import Quantity
 
 Profile = Literal["reference", "advanced", "nav2", "simscen"]
 Values = Mapping[str, Any]
+"""Parameters by key, or by section and key."""
 
 SECTIONS_BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
-"""Sections whose parameters depend on `type`. Profiles contain their parameters by type; the first type is the default.
-"""
+"""Sections in which the parameters depend on `type`. A profile contains their parameters by type, the default first."""
 _COSTMAP: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
     "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
     "inf_is_valid": False,
     "inflation_radius": 0.70, "cost_scaling_factor": 3.0, "resolution": 0.05,
 }  # fmt: skip
+"""Parameters of both costmaps in the profile `nav2`."""
 _PLANNER: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
+"""Parameters of all planners in the profile `nav2`."""
 _USE_CIRCLE: Values = {"consider_footprint": False}
 NAV2: Values = {
     "controller_frequency": 20.0,
@@ -72,6 +74,7 @@ NAV2: Values = {
 }  # fmt: skip
 """Parameters of the profile `nav2`, by section."""
 _CAUTIOUS: Values = {"cautious": True}
+"""Parameters of all planners in the profile `advanced`."""
 ADVANCED: Values = {
     "localizer": {"scan_matching_amcl": {}},
     "planner": {
@@ -94,17 +97,18 @@ ADVANCED: Values = {
 }  # fmt: skip
 """Parameters of the profile `advanced`, by section, that differ from the defaults."""
 PROFILES: Mapping[str, Values] = {"reference": {}, "advanced": ADVANCED, "nav2": NAV2, "simscen": ADVANCED}
+"""Parameters that differ from the defaults, by profile and section."""
 
 
 def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the parameters of a stack, completed by those of its `profile`."""
+    """Return the parameters of a stack. Missing parameters are taken from its `profile`."""
     profile = PROFILES.get(str(parameters.get("profile", "reference")), {})
     sections = {name: _complete_section(name, values, parameters.get(name)) for name, values in profile.items()}
     return {**parameters, **sections}
 
 
 def _complete_section(name: str, defaults: Any, section: Any) -> Any:
-    """Return a section with missing parameters from the profile. A validated specification is returned unchanged."""
+    """Return a section in which missing parameters are taken from the profile. `section` is None if it is missing."""
     if section is None:
         if name not in SECTIONS_BY_TYPE:
             return defaults
@@ -119,7 +123,7 @@ def _complete_section(name: str, defaults: Any, section: Any) -> Any:
 
 
 def merge_parameters(defaults: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `defaults` updated by `parameters`; nested mappings are merged."""
+    """Return `defaults` updated by `parameters`. Nested mappings are merged."""
     merged = dict(defaults)
     for key, value in parameters.items():
         nested = isinstance(defaults.get(key), Mapping) and isinstance(value, Mapping)
@@ -156,7 +160,7 @@ class StackSpec(InProcessStack):
     odometry: OdometryFilter = by_default()
     """Source of the transform from odom to base."""
     costmap: Costmap = by_default()
-    """Global costmap for planning. The values also apply to parameters that the local costmap does not set."""
+    """Global costmap for planning. Its values are also the defaults of the local costmap."""
     local_costmap: LocalCostmap = by_default()
     """Local costmap for control and recovery behaviors."""
     planner: Planner = by_default()
@@ -171,7 +175,7 @@ class StackSpec(InProcessStack):
     progress_checker: ProgressChecker = by_default()
     """Checker that detects that the robot makes no progress."""
     recovery: Recovery = by_default()
-    """Recovery behaviors after planning or control failed."""
+    """Recovery behaviors after planning or control has failed."""
     velocity_smoother: VelocitySmoother = by_default()
     """Limits of the acceleration and velocity of commands."""
     collision_monitor: CollisionMonitor = by_default()
@@ -184,6 +188,7 @@ class StackSpec(InProcessStack):
     @model_validator(mode="before")
     @classmethod
     def _apply_profile(cls, parameters: Any) -> Any:
+        """Complete the parameters by the values of the profile."""
         has_profile = isinstance(parameters, Mapping) and parameters.get("profile") in PROFILES
         return apply_profile(parameters) if has_profile else parameters
 

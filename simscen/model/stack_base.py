@@ -1,4 +1,4 @@
-"""Base classes of the specifications of stacks and controllers, and the latencies of stacks and robots."""
+"""Base classes of the specifications of stacks and controllers, and computing times (latencies) of stacks."""
 
 from typing import Annotated
 
@@ -10,7 +10,7 @@ from simscen.spec.quantities import Duration, Frequency, PositiveAngle, Positive
 
 
 class GoalTolerances(Spec):
-    """Tolerances for goals without tolerances. The stack and criteria use them."""
+    """Tolerances of goals that have no tolerances of their own. The stack and criteria use them."""
 
     xy_goal_tolerance: PositiveLength = 0.25
     """Distance from the goal within which the goal counts as reached."""
@@ -33,7 +33,7 @@ class StackBase(Spec):
     controller_frequency: Frequency = 20.0
     """Rate at which the stack computes commands."""
     goal_checker: GoalTolerances = by_default()
-    """Tolerances for goals without tolerances."""
+    """Tolerances of goals that have no tolerances of their own."""
     keepout: Annotated[list[RegionName], Field(max_length=100)] = []
     """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
     speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
@@ -59,7 +59,7 @@ class ControllerSpec(Typed):
 
     @property
     def lookahead_s(self) -> float:
-        """Time in seconds that the controller looks ahead. It determines the default size of the local costmap."""
+        """Time in s for which the controller looks ahead. It determines the default size of the local costmap."""
         return 2.0
 
 
@@ -70,15 +70,15 @@ class PathFollowerSpec(ControllerSpec):
     """Fraction of the goal's `xy_goal_tolerance` within which the robot stops driving and turns to the goal's heading
     (Nav2: 1)."""
     max_robot_pose_search_dist: PositiveLength = 1.5
-    """Length of the plan in which the point nearest to the robot is searched, from the previous nearest point on (Nav2:
-    half the size of the local costmap)."""
+    """Length of the part of the plan in which the point nearest to the robot is searched. The part begins at the
+    previous nearest point (Nav2: half the size of the local costmap)."""
 
 
 class Latency(Spec):
     """Computing times of the parts of a stack, rounded to physics ticks.
 
-    The result of a part is available after its computing time. Parts run in parallel, as Nav2's servers do. A part that
-    is still computing is not started again.
+    The result of a part is available after its computing time. Parts run in parallel, as Nav2's servers do. A part is
+    not started again while it is still computing.
     """
 
     localizer: Duration = 0.0
@@ -97,4 +97,4 @@ class RobotLatency(Latency):
     """Computing times on a robot, and delays of its sensors, for scenarios with `stack: {latency: robot}`."""
 
     sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}
-    """Delays by sensor name, instead of the `latency` of the sensor."""
+    """Delays by sensor name. They replace the `latency` of the sensors."""

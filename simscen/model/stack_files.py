@@ -12,8 +12,8 @@ from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
-_TAG = "an external stack"
-"""Tag of external stacks in validation errors."""
+_EXTERNAL_TAG = "an external stack"
+"""Union tag of external stacks. Validation errors contain it."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 
@@ -38,14 +38,14 @@ class ExternalStackSpec(StackBase):
 
 
 def _stack_tag(value: Any) -> str:
-    """Return the tag of a stack specification: its `type`, or `_TAG` if it is external."""
+    """Return the union tag of a stack specification: its `type`, or _EXTERNAL_TAG for an external stack."""
     if isinstance(value, dict):
-        return _TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
-    return _TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
+        return _EXTERNAL_TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
+    return _EXTERNAL_TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
 
 
 _Stacks = Annotated[
-    Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_TAG)], Discriminator(_stack_tag)
+    Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_EXTERNAL_TAG)], Discriminator(_stack_tag)
 ]
 AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack", _Stacks)]
 
@@ -68,11 +68,13 @@ class StackFileSpec(Spec):
 
 
 def _check_command(text: str) -> str:
+    """Return the command line. Raises ValueError if it cannot be split into words."""
     split_command(text)
     return text
 
 
 def _check_absolute(folder: str) -> str:
+    """Return the folder. Raises ValueError unless it is absolute or below `~`."""
     if not folder.startswith(("/", "~")):
         raise ValueError(
             "expected an absolute folder or one below `~`, since this file applies to all working directories"

@@ -76,7 +76,8 @@ class Draw(Choice):
 class Sampled(Spec):
     """Reproducible random values of several paths.
 
-    The k-th value of a path depends only on the seed, the path, and k. Numbers are rounded to six digits.
+    With `method: random`, value k of a path depends only on the seed, the path, and k. Numbers are rounded to six
+    digits.
     """
 
     count: Annotated[int, Field(ge=1, le=MAX_DRAWS)]
@@ -84,9 +85,9 @@ class Sampled(Spec):
     seed: Annotated[int, Field(ge=1, le=2**32 - 1)] = 1
     """Seed of these values; the runs keep the seed of the scenario."""
     method: Literal["random", "latin_hypercube", "sobol"] = "random"
-    """`random`: independent values, which an `acceptance` claim requires. `latin_hypercube`: values that are evenly
-    spread over the range of each path; they change with `count`. `sobol`: values that are evenly spread over all paths
-    together (a Sobol sequence with a random shift); they change with the paths."""
+    """`random`: independent values, which an `acceptance` claim requires. `latin_hypercube`: the values of each path
+    are evenly spread over its range; they change with `count`. `sobol`: the combinations of values are evenly spread (a
+    Sobol sequence with a random shift); they change with the set of paths."""
     values: Annotated[dict[ValuePath, Draw], Field(min_length=1, max_length=50)]
     """Distribution of the value of each path."""
 
@@ -101,10 +102,9 @@ class VariationBlock(Spec):
     grid: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """All combinations of the values of each path."""
     pairwise: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """Few combinations, in which each pair of values of any two paths occurs."""
+    """Few combinations that contain each pair of values of any two paths."""
     pairs: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """The first values of all paths together, then the second values, and so on. All lists must have the same length.
-    """
+    """Variation k combines value k of each path. All lists must have the same length."""
     list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MAX_VARIATIONS, alias="list")] = None
     """Each variation as a mapping of paths to values, with an optional `name`."""
     sampled: Sampled | None = None
@@ -116,18 +116,19 @@ class VariationBlock(Spec):
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":
+        """Raise ValueError unless there is at least one kind of values."""
         if all(values is None for values in (self.grid, self.pairwise, self.pairs, self.list_, self.sampled)):
             raise ValueError("expected one of: grid, pairwise, pairs, list, sampled")
         return self
 
     @property
     def is_random(self) -> bool:
-        """Whether the variations are independent random draws."""
+        """Whether the variations are independent random draws, without other kinds of values."""
         return self.is_sampled_alone and self.sampled is not None and self.sampled.method == "random"
 
     @property
     def is_sampled_alone(self) -> bool:
-        """Whether the block has only `sampled` values."""
+        """Whether `sampled` is the only kind of values in the block."""
         others = (self.grid, self.pairwise, self.pairs, self.list_)
         return self.sampled is not None and all(other is None for other in others)
 
@@ -143,7 +144,7 @@ class Variations(
 ):
     """Values by path, as one block or a list of blocks. Each combination in a block is a separate run.
 
-    `[]` removes the variations that a file inherits.
+    An empty list (`[]`) removes the variations that a file inherits.
     """
 
     @property
@@ -153,6 +154,6 @@ class Variations(
 
 
 class VariationsSection(Spec):
-    """Scenario of which only the key `variations` is read."""
+    """The key `variations` of a scenario, without its other keys."""
 
     variations: Variations

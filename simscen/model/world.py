@@ -1,4 +1,4 @@
-"""Specifications of worlds (`*.world.yaml`) and of ROS maps."""
+"""Specifications of worlds (`*.world.yaml`) and of the YAML files of ROS maps."""
 
 from typing import Annotated, Literal
 
@@ -16,7 +16,7 @@ class Wall(Spec):
     """Wall along a polyline."""
 
     name: Name = "wall"
-    """Name in collision reports; default: wall_1, wall_2, …"""
+    """Name in collision reports. Default: wall_1, wall_2, …"""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=10_000)]
     """Corners of the center line as [x, y] or names of places. Repeat the first corner at the end to close the wall."""
     thickness: PositiveLength = 0.1
@@ -25,7 +25,7 @@ class Wall(Spec):
     """Height above the ground."""
 
     def label(self, number: int) -> str:
-        """Return the given name, or e.g. `wall_3` for wall number 3."""
+        """Return the name, or e.g. `wall_3` for wall number 3 without a name."""
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
@@ -70,7 +70,7 @@ class Travel(Motion):
 
 
 class Movable(WorldObject):
-    """Object that can move. The robot can push an object with a mass. An object with `move` follows its waypoints."""
+    """Object that can move. The robot can push an object with a mass. An object with `move` moves by itself."""
 
     mass: Mass = 0.0
     """Mass in kg; 0: the robot cannot push the object."""
@@ -117,7 +117,7 @@ class WorldSpec(Spec):
     map_height: PositiveLength = 1.0
     """Height of the walls made from `map`."""
     sdf: FilePath | None = None
-    """Gazebo world to which the objects are added."""
+    """Gazebo world to which the walls, obstacles, objects, ramps, and doors are added."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     """Walls along polylines."""
     obstacles: Annotated[list[Obstacle], Field(max_length=10_000)] = []
