@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 HEADER = b"\x00\x01\x00\x00"
-"""Header of a little-endian message."""
+"""Header of a message in little-endian byte order."""
 _BYTE_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 """Byte order, as in `struct`, by the first two bytes of a message."""
 _TOO_SHORT = "the message ends before its type does"
@@ -28,7 +28,7 @@ class Writer:
         self._data = bytearray(HEADER)
 
     def put(self, codes: str, *values: Any) -> Writer:
-        """Append numbers of equal width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
+        """Append numbers of the same width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
         self._align(struct.calcsize("<" + codes[-1]))
         self._data += struct.pack("<" + codes, *values)
         return self
@@ -56,6 +56,7 @@ class Writer:
         return bytes(self._data)
 
     def _align(self, width: int) -> None:
+        """Append padding up to a multiple of `width` bytes."""
         self._data += bytes(-(len(self._data) - len(HEADER)) % width)
 
 
@@ -71,7 +72,7 @@ class Reader:
         self._data, self._byte_order, self._offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
-        """Return the next numbers, of equal width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
+        """Return the next numbers, of the same width. `codes` are their format codes of `struct`, e.g. "7d"."""
         layout = struct.Struct(self._byte_order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         try:
@@ -82,7 +83,7 @@ class Reader:
         return values
 
     def count(self) -> int:
-        """Read the length of the next sequence."""
+        """Return the length of the next sequence."""
         return int(self.take("I")[0])
 
     def string(self) -> str:
@@ -105,6 +106,7 @@ class Reader:
         return values
 
     def _align(self, width: int) -> None:
+        """Skip padding up to a multiple of `width` bytes."""
         self._offset += -(self._offset - len(HEADER)) % width
 
     def _skip(self, size: int) -> int:

@@ -1,4 +1,4 @@
-"""Python client for a stack: connects to simscen, yields the steps of a run, and sends the stack's answers."""
+"""Client for a stack in Python: connects to simscen, yields the steps of a run, and sends the stack's answers."""
 
 from __future__ import annotations
 
@@ -85,6 +85,7 @@ class Step:
         self.publish(LOG, messages.log(self.stamp, level, self._peer.name, text))
 
     def _answer(self) -> bytes:
+        """Return the ANSWER frame: command, published messages, and events about goals."""
         if self.command_due or self._commanded:
             self.publish(COMMAND, messages.twist(*self._peer.command))
         for event in self._peer.goals.take_events():
@@ -178,7 +179,7 @@ class Peer:
                 self._process_frame(kind, wire.from_json(body))
 
     def add(self, **about: Any) -> None:
-        """Add facts about the stack to the run's log. They are sent at the end of the run."""
+        """Add facts about the stack, as JSON values, to the run's log. They are sent at the end of the run."""
         self._bye_content.update(about)
 
     def give_up(self, message: str) -> None:
@@ -188,6 +189,7 @@ class Peer:
         raise Refused(message)
 
     def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
+        """Update the goals by a GOAL, PREEMPT, or CANCEL frame."""
         if kind == wire.GOAL:
             self.task = content
             self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
@@ -200,9 +202,11 @@ class Peer:
             raise wire.Malformed(f"a stack cannot receive a frame of kind {kind}")
 
     def _message(self, number: int, data: bytes) -> Message:
+        """Return the message on the topic with this number."""
         return Message(*self._topics[number], data)
 
     def _expect(self, kind: int) -> dict[str, Any]:
+        """Receive a frame of this kind, and return its JSON object."""
         received_kind, body = self._connection.receive()
         if received_kind != kind:
             raise wire.Malformed(f"a frame of kind {received_kind} instead of {wire.KIND_NAMES[kind]}")

@@ -1,4 +1,4 @@
-"""Goal queue of a stack: holds the goals from simscen, and collects events about their progress."""
+"""Goal queue of a stack: holds the goals from simscen, and collects events about their progress for simscen."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Goals:
         return self.current
 
     def reached(self) -> None:
-        """Report the current goal as reached, or as passed if it has `via`, and start its `wait`.
+        """Report the current goal as reached (as passed if it has `via`), and start its `wait`.
 
         Raises ValueError without a current goal.
         """
@@ -88,7 +88,8 @@ class Goals:
     def failed(self, error_code: int | str, message: str = "", go_on: bool = False) -> None:
         """Report the current goal as failed, with the number or name of a Nav2 error code.
 
-        Drops the goals `ahead`; without `go_on`, drops all goals. Raises ValueError without a current goal.
+        The goals `ahead` are dropped, and without `go_on` all other goals, too. Raises ValueError without a current
+        goal.
         """
         self._drop("goal.failed", error_code=error_code, message=message)
         if not go_on:
@@ -124,6 +125,7 @@ class Goals:
         self.waiting = self.waiting[ahead:]
 
     def _end(self, kind: str, **data: Any) -> None:
+        """End the current goal with an event of this kind. Raises ValueError without a current goal."""
         if self.current is None:
             raise ValueError(f"{kind} without a goal: accept it first")
         self.report(kind, self.current.name, **data)

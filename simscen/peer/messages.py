@@ -316,7 +316,7 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
 
 
 BEHAVIOR_TREE_LOGGER = "behavior_tree"
-"""Name of the logger of the lines that `tree_change` returns."""
+"""Name of the logger for the lines of `tree_change`."""
 
 
 def tree_change(node: str, before: str, after: str) -> str:

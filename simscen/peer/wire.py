@@ -19,6 +19,7 @@ SOCKET_FD_VARIABLE = "SIMSCEN_STACK_FD"
 HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 11)
 """Kinds of frames, in the first byte after the size."""
 KIND_NAMES = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
+"""Names of the kinds of frames, by their number."""
 
 COMMAND_DUE = 1
 """Flag of a STEP frame: the answer must contain a velocity command."""
@@ -86,6 +87,7 @@ def _reject_constant(word: str) -> None:
 
 
 def _is_nested_deeper(content: Any, remaining: int) -> bool:
+    """Return whether JSON content has more than `remaining` levels."""
     inner = content.values() if isinstance(content, dict) else content if isinstance(content, list) else ()
     return remaining == 0 or any(_is_nested_deeper(item, remaining - 1) for item in inner)
 
@@ -117,6 +119,7 @@ def _pack_messages(messages: Messages) -> bytes:
 
 
 def _unpack_messages(body: bytes, offset: int, count: int) -> Messages:
+    """Return the messages that begin at `offset`. Raises Malformed unless they fill the rest of the body."""
     messages = []
     for _ in range(count):
         number, size = _unpack_struct(_MESSAGE, body, offset)
@@ -130,17 +133,18 @@ def _unpack_messages(body: bytes, offset: int, count: int) -> Messages:
 
 
 def _unpack_struct(layout: struct.Struct, body: bytes, offset: int) -> tuple[Any, ...]:
+    """Return the fields of a header at `offset`. Raises Malformed if the body is too short."""
     if offset + layout.size > len(body):
         raise Malformed("it ends before its header is complete")
     return layout.unpack_from(body, offset)
 
 
 class Disconnected(ConnectionError):
-    """The other side has closed the connection."""
+    """End of the connection, closed by the other side."""
 
 
 class Refused(RuntimeError):
-    """simscen has sent ERROR, or the stack has given up: the run ends. The message states the reason."""
+    """End of the run because simscen has sent ERROR or the stack has given up. The message states the reason."""
 
 
 class Connection:
@@ -190,6 +194,7 @@ class Connection:
         self._stream.close()
 
     def _receive_exactly(self, size: int) -> bytes:
+        """Wait for `size` bytes, and return them."""
         parts, remaining = [], size
         while remaining:
             try:
