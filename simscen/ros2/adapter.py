@@ -1,4 +1,4 @@
-"""Adapter that lets ROS nodes act as the stack of a run: publishes sensor data, sends goals, and returns commands."""
+"""Adapter by which ROS nodes act as the stack of a run: publishes sensor data, sends goals, and returns commands."""
 
 import math
 import os
@@ -12,9 +12,9 @@ from simscen.peer.goals import Goal, Goals
 from simscen.ros2.bring_up import BringUp
 from simscen.ros2.frames import TF_STATIC, FrameNames
 from simscen.ros2.goal_sender import ACTIONS, ActionSender, GoalFailed, GoalSender, GoalSenders, StackState
-from simscen.ros2.graph import CLOCK, LATCHED, Graph, ReceivedMessage, Topic
+from simscen.ros2.graph import CLOCK, LATCHED_TOPICS, Graph, ReceivedMessage, Topic
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
+from simscen.ros2.messages import NS_PER_S, find_type, read_twist, write_twist
 from simscen.ros2.nav2.actions import MotionActions, RecoveryReporter
 from simscen.ros2.nav2.filter_info import FilterInfo
 from simscen.ros2.nav2.report import LogLine, Nav2Report
@@ -64,7 +64,7 @@ class Adapter:
             period_s: Control period.
             answer_limit_s: Maximum wall time for the answer to a step after the nodes are ready.
             filter_info: Messages that describe the zone masks among `topics`.
-            restart_reason: Why the launch command was started a second time; empty the first time.
+            restart_reason: Reason why the launch command was started a second time; empty the first time.
         """
         if not rclpy.ok():
             rclpy.init(args=[])
@@ -115,8 +115,8 @@ class Adapter:
 
     def _check_launched(self) -> None:
         """Raise AdapterError if the launch command has ended."""
-        if self._launched is not None and self._launched.ended is not None:
-            raise AdapterError(f"the launched command {self._launched.ended}: {self._launched.command}")
+        if self._launched is not None and self._launched.end_reason is not None:
+            raise AdapterError(f"the launched command {self._launched.end_reason}: {self._launched.command}")
 
     def run_facts(self) -> Dict[str, Any]:
         """Return facts about the nodes and the synchronization for the run's log."""
@@ -184,18 +184,18 @@ class Adapter:
         limit_s = min(limit_s, self._answer_limit_s) if self.is_ready else limit_s
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
-            self._estimate.take_published(topic, data)
+            self._estimate.process_published(topic, data)
             if topic in self._replaced_topics:
                 self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
         messages = self._bring_up.hold_initial_pose(messages)
-        warming_up = now < self._options.warm_up * NANOSECONDS
+        warming_up = now < self._options.warm_up * NS_PER_S
         if not self.is_ready:
             warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
             self._bring_up.keep(messages)
             if not warming_up:
                 self._bring_up.wait(now, MAX_WAIT_FRACTION * limit_s)
-                messages = [message for message in messages if message[0] not in LATCHED]
+                messages = [message for message in messages if message[0] not in LATCHED_TOPICS]
                 self._begin()
         messages = [*messages, *self._bring_up.due_initial_pose()]
         self._barrier.step_time.begin(MAX_WAIT_FRACTION * limit_s)
@@ -273,21 +273,22 @@ class Adapter:
             self._goals.accept()
 
     def _state(self, now: int) -> StackState:
+        """Return the state of the stack for the goal sender."""
         is_stopped = all(abs(number) < 1e-3 for number in self._velocity)
         return StackState(now, is_stopped, self._estimate.pose)
 
     def _process(self, message: ReceivedMessage) -> List[Message]:
-        """Process a message of the nodes. Return the messages to send to simscen: none for a command."""
+        """Process a message of the nodes. Return the messages to send to simscen: none for a velocity command."""
         if message.topic == COMMAND:
             self._velocity = read_twist(message.data, message.type == TWIST_STAMPED_TYPE)
             return []
-        relevant = self._estimate.take_received(message)
+        relevant = self._estimate.process_received(message)
         if message.topic == PLAN:
             self._report_plan()
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
-        """Report a new plan as an event: of the reason "goal" for the first plan to a goal, otherwise "rate"."""
+        """Report a new plan as an event. Its reason is "goal" for the first plan to a goal, otherwise "rate"."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return

@@ -1,4 +1,4 @@
-"""Wait until all nodes of the stack are ready, and publish sensor data meanwhile if they need it.
+"""Bring-up before a run: waits until all nodes are ready, and meanwhile publishes sensor data if they need it.
 
 Some nodes become active only if sensor data arrive and time advances. For example, Nav2's costmaps wait for
 odom -> base_link. `BringUp.prepare` first waits without sensor data. Then `BringUp.wait` publishes the readings of the
@@ -12,8 +12,8 @@ from typing import Callable, Dict, List, Optional, Sequence
 
 from rclpy.clock import Clock, ClockType
 
-from simscen.ros2.graph import LATCHED, Graph, Topic
-from simscen.ros2.messages import NANOSECONDS, SCAN_TYPE
+from simscen.ros2.graph import LATCHED_TOPICS, Graph, Topic
+from simscen.ros2.messages import NS_PER_S, SCAN_TYPE
 from simscen.ros2.nav2.report import Nav2Report
 from simscen.ros2.options import AdapterError, BringUpAborted, Options
 from simscen.ros2.readiness import MAP, Readiness
@@ -23,7 +23,7 @@ INITIAL_POSE = "/initialpose"
 PREPARE_S = 10.0
 """Maximum wall time to wait without sensor data."""
 PREPARE_SETTLE_S = 2.0
-"""Wall time without new nodes, in addition to `--settle`, after which nodes probably wait for sensor data."""
+"""Nodes probably wait for sensor data if none has appeared for this wall time, in addition to `--settle`."""
 CHECK_PERIOD_S = 0.25
 """Wall time between two checks of the graph."""
 FIRST_SCAN_S = 2.0
@@ -47,7 +47,7 @@ class BringUp:
         Args:
             period_s: Control period.
             unavailable: Topics whose message type is not installed.
-            report: Report about Nav2; None for other nodes.
+            report: Log of Nav2's nodes, which shows whether they have given up; None without Nav2.
         """
         self._graph, self._readiness, self._options, self._period = graph, readiness, options, period_s
         self._unavailable, self._report = list(unavailable), report
@@ -96,7 +96,7 @@ class BringUp:
         return [message for message in messages if message[0] != INITIAL_POSE]
 
     def due_initial_pose(self) -> List[Message]:
-        """Return the held initial pose once a node subscribes to it, only once; otherwise an empty list."""
+        """Return the initial pose, once, when a node subscribes to it; otherwise an empty list."""
         if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
             return []
         pose, self._initial_pose = self._initial_pose, None
@@ -108,7 +108,7 @@ class BringUp:
         `now` is simulated time in ns. `messages` are the messages of this step.
         """
         # Nav2's AMCL needs a scan to publish map -> odom.
-        if not self._options.nav2 or now >= FIRST_SCAN_S * NANOSECONDS:
+        if not self._options.nav2 or now >= FIRST_SCAN_S * NS_PER_S:
             return False
         known = {*self._latest, *(topic for topic, _ in messages)}
         return any(type_name == SCAN_TYPE and topic not in known for topic, type_name in self._graph.types.items())
@@ -121,11 +121,11 @@ class BringUp:
         """
         remaining_s = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
         self._readiness.has_map = MAP in self._latest
-        for topic in LATCHED.intersection(self._latest):
+        for topic in LATCHED_TOPICS.intersection(self._latest):
             self._graph.publish(topic, self._latest.pop(topic))
 
         def publish() -> None:
-            self._graph.offset_ns += round(self._period * NANOSECONDS)
+            self._graph.offset_ns += round(self._period * NS_PER_S)
             self._graph.publish_clock(now)
             for topic, data in [*self._latest.items(), *self.due_initial_pose()]:
                 self._graph.publish(topic, data)
@@ -153,8 +153,8 @@ class BringUp:
                 raise AdapterError(self._reasons(missing))
         finally:
             self._graph.node.destroy_timer(timer)
-        self._graph.offset_ns += round(self._period * NANOSECONDS)
-        waited, ahead = time.monotonic() - self._started_at, self._graph.offset_ns / NANOSECONDS
+        self._graph.offset_ns += round(self._period * NS_PER_S)
+        waited, ahead = time.monotonic() - self._started_at, self._graph.offset_ns / NS_PER_S
         print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
 
     def end(self) -> None:

@@ -1,4 +1,4 @@
-"""Rename frames in messages for the user's graph, and order messages so that transforms are published first."""
+"""Frames in simscen's messages: renaming for the user's graph, and publishing of transforms before other messages."""
 
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
@@ -18,7 +18,7 @@ class FrameNames:
         renames: Texts `FRAME:=NAME`: simscen's name, and the name in the user's graph.
         second_base: Second name of the base frame, such as base_footprint; None for no second name.
 
-    Raises AdapterError if a rename has another form, or if the frame cannot be renamed.
+    Raises AdapterError if a text has another form, or if a frame cannot be renamed.
     """
 
     def __init__(self, renames: Sequence[str], second_base: Optional[str]) -> None:

@@ -1,4 +1,4 @@
-"""Send goals to a stack by one of Nav2's actions or by a pose on /goal_pose, and observe whether they are reached."""
+"""Senders of goals to the nodes, by a Nav2 action or a pose on /goal_pose, which also observe the outcomes."""
 
 import math
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union
@@ -7,7 +7,7 @@ from rclpy.action import ActionClient
 
 from simscen.peer.goals import Goal
 from simscen.ros2.graph import Graph
-from simscen.ros2.messages import NANOSECONDS, Pose, find_type, wrap_angle
+from simscen.ros2.messages import NS_PER_S, Pose, find_type, wrap_angle
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError
 
@@ -18,7 +18,7 @@ ACTIONS = {
     "navigate_through_poses": "nav2_msgs/action/NavigateThroughPoses",
     "follow_waypoints": "nav2_msgs/action/FollowWaypoints",
 }
-STANDSTILL_NS = NANOSECONDS
+STANDSTILL_NS = NS_PER_S
 """Simulated time with zero commands after which a goal on /goal_pose counts as reached."""
 REJECTED, UNKNOWN = 1, 9000
 """Error codes for a rejected goal and for an unknown error."""
@@ -27,11 +27,11 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 
 class GoalReached(NamedTuple):
-    """The oldest sent goal without an outcome is reached."""
+    """Outcome of a sent goal: reached. Outcomes come in the order of the goals."""
 
 
 class GoalFailed(NamedTuple):
-    """The oldest sent goal without an outcome has failed, with an error code of Nav2."""
+    """Outcome of a sent goal: failed, with an error code of Nav2. Outcomes come in the order of the goals."""
 
     code: int
     message: str
@@ -160,6 +160,7 @@ class ActionSender:
         return None
 
     def _take_feedback(self, message: Any) -> None:
+        """Update the number of passed goals and of recoveries."""
         feedback = message.feedback
         self.recoveries = getattr(feedback, "number_of_recoveries", 0)
         if self.action == "navigate_through_poses":
@@ -188,7 +189,7 @@ class ActionSender:
         return [*self._passed_goals(state), *[GoalFailed(code, message)] * (len(self._goals) - self._passed)]
 
     def _missed_waypoints(self, result: Any) -> Dict[int, GoalFailed]:
-        """Return the failures in a result of FollowWaypoints by the index of the goal."""
+        """Return the failures in a result of FollowWaypoints, by the index of the goal."""
         missed: Dict[int, GoalFailed] = {}
         for waypoint in getattr(result, "missed_waypoints", ()):
             index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
@@ -197,7 +198,7 @@ class ActionSender:
         return missed
 
     def _passed_goals(self, state: StackState) -> List[Outcome]:
-        """Return the outcomes of the goals that the robot has passed since the last call, according to the feedback."""
+        """Return the outcomes of the goals passed since the last call, according to the feedback."""
         # The feedback of FollowWaypoints is the same for reached and missed goals, so that the pose estimate decides.
         found: List[Outcome] = []
         for goal in self._goals[self._reported : self._passed]:
@@ -220,7 +221,7 @@ GoalSender = Union[GoalPoseSender, ActionSender]
 
 
 class GoalSenders:
-    """Goal senders that the option --goals allows: for `auto`, NavigateToPose and /goal_pose."""
+    """Senders that the option `--goals` (`requested`) allows. `auto` allows NavigateToPose and /goal_pose."""
 
     def __init__(self, graph: Graph, requested: str) -> None:
         self._senders: List[GoalSender] = []
@@ -247,7 +248,7 @@ def pose_stamped(goal: Goal, now: int) -> Any:
     """Return the goal as geometry_msgs/msg/PoseStamped in the map frame, with the stamp `now` in ns."""
     message: Any = find_type(POSE_TYPE)()  # type: ignore[misc]
     message.header.frame_id = "map"
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, NANOSECONDS)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, NS_PER_S)
     message.pose.position.x, message.pose.position.y = goal.x, goal.y
     message.pose.orientation.z, message.pose.orientation.w = math.sin(goal.yaw / 2), math.cos(goal.yaw / 2)
     return message

@@ -1,8 +1,8 @@
 """simscen's own ROS node, which publishes and receives serialized (CDR) messages, and lists the other nodes.
 
-ROS time may be ahead of simulated time, because it advances while the run waits for nodes to become ready.
-`Graph.offset_ns` is the difference. The graph adds it to the stamps of published messages, and subtracts it from the
-stamps of received messages.
+While the run waits for nodes to become ready, ROS time advances, but simulated time does not. `Graph.offset_ns` is the
+difference between both. The graph adds it to the stamps of published messages, and subtracts it from the stamps of
+received messages.
 """
 
 import time
@@ -15,12 +15,12 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from simscen.ros2.messages import find_type, shift_stamps, write_clock
 from simscen.ros2.options import TopicNames
 
-NODE = "simscen"
+NODE_NAME = "simscen"
 """Name of simscen's own node."""
-UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+UNKNOWN_NODE_NAME = "_NODE_NAME_UNKNOWN_"
 """Name that ROS gives to a node if it discovers the node's publishers or subscriptions before the node."""
 CLOCK = "/clock"
-LATCHED = frozenset(
+LATCHED_TOPICS = frozenset(
     (
         *("/map", "/tf_static", "/robot_description", "/keepout_filter_mask", "/speed_filter_mask"),
         *("/keepout_costmap_filter_info", "/speed_costmap_filter_info"),
@@ -28,7 +28,7 @@ LATCHED = frozenset(
 )
 """Topics that are published with transient local durability, so that later subscribers receive the last message."""
 QUEUE_DEPTHS = {"/tf": 100, "/imu": 100}
-"""QoS history depths of topics with a high rate."""
+"""QoS history depths of topics with a high rate, by topic."""
 DEFAULT_QUEUE_DEPTH = 10
 """QoS history depth of other topics that are not latched."""
 Node = Tuple[str, str]
@@ -36,7 +36,7 @@ Node = Tuple[str, str]
 
 
 class ReceivedMessage(NamedTuple):
-    """A message from the nodes: topic of the stack protocol, name of the type, and CDR."""
+    """A message from the nodes: topic of the stack protocol, name of the type, and serialized (CDR) data."""
 
     topic: str
     type: str
@@ -51,7 +51,7 @@ class Topic(NamedTuple):
 
 
 class Endpoint(NamedTuple):
-    """A publisher or a subscription of another node: full name of the node, message type, and QoSProfile."""
+    """A publisher or subscription of another node: full name of the node, message type, and QoS profile."""
 
     node: str
     type: str
@@ -64,13 +64,13 @@ STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 class Graph:
     """simscen's node in one ROS domain.
 
-    Parameters `topic` are topics of the stack protocol. Parameters `name` are names of topics in the graph.
+    Parameters `topic` are topics of the stack protocol. Parameters `name` are names in the graph, after remapping.
     """
 
     def __init__(self, names: TopicNames, check_alive: Callable[[], None]) -> None:
         """`check_alive` is called repeatedly while waiting, and may raise an exception to end the wait."""
         self.names, self._check_alive = names, check_alive
-        self.node = rclpy.create_node(NODE, namespace=names.namespace or None, use_global_arguments=False)
+        self.node = rclpy.create_node(NODE_NAME, namespace=names.namespace or None, use_global_arguments=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.publishers: Dict[str, Any] = {}
@@ -92,7 +92,7 @@ class Graph:
         return True
 
     def publish(self, topic: str, data: bytes) -> bool:
-        """Publish CDR, and return whether the topic has subscribers. Does nothing if the topic is not advertised."""
+        """Publish a message, and return whether the topic has subscribers. Does nothing if it is not advertised."""
         publisher = self.publishers.get(topic)
         if publisher is None:
             return False
@@ -120,7 +120,7 @@ class Graph:
         self._subscriptions[topic] = (type_name, subscription)
 
     def subscribe_to_status(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
-        """Call `callback` with each GoalStatusArray of an action. Return the action server's node, or None."""
+        """Call `callback` with each GoalStatusArray of an action from now on. Return its server's node, or None."""
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
@@ -129,8 +129,10 @@ class Graph:
         return servers[0].node
 
     def subscription_profile(self, name: str) -> QoSProfile:
-        """Return a QoS profile that matches all publishers of a topic, except those of this node."""
-        return subscription_qos([end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE])
+        """Return a QoS profile for a subscription that is compatible with all publishers of other nodes."""
+        return subscription_qos(
+            [end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE_NAME]
+        )
 
     def spin_once(self, seconds: float = 0.0) -> None:
         """Handle one event of the node (message, answer, timer); wait at most `seconds` of wall time for it."""
@@ -145,7 +147,7 @@ class Graph:
                 return
 
     def spin_until(self, done: Callable[[], bool], seconds: float) -> bool:
-        """Handle events until `done`; return False if that takes longer than `seconds` of wall time."""
+        """Handle events until `done` returns True. Return False if that takes longer than `seconds` of wall time."""
         end = time.monotonic() + seconds
         while not done():
             remaining = end - time.monotonic()
@@ -158,7 +160,7 @@ class Graph:
     def nodes(self) -> List[Node]:
         """Return all other nodes that are not hidden, sorted."""
         found = self.node.get_node_names_and_namespaces()
-        return sorted({(n, s) for n, s in found if n != NODE and not n.startswith("_")})
+        return sorted({(n, s) for n, s in found if n != NODE_NAME and not n.startswith("_")})
 
     def publishers_of(self, name: str) -> List[Endpoint]:
         """Return the publishers of a topic that belong to other nodes."""
@@ -200,9 +202,10 @@ def full_name(node: Node) -> str:
 
 
 def _endpoints(infos: List[Any]) -> List[Endpoint]:
+    """Return the endpoints of other nodes, without duplicates."""
     found = {}
     for info in infos:
-        if info.node_name not in (NODE, UNKNOWN_NODE):
+        if info.node_name not in (NODE_NAME, UNKNOWN_NODE_NAME):
             node = full_name((info.node_name, info.node_namespace))
             found[node, info.topic_type] = Endpoint(node, info.topic_type, info.qos_profile)
     return [found[key] for key in sorted(found)]
@@ -210,7 +213,7 @@ def _endpoints(infos: List[Any]) -> List[Endpoint]:
 
 def publisher_qos(topic: str) -> QoSProfile:
     """Return the QoS profile with which simscen publishes a topic."""
-    latched = topic in LATCHED
+    latched = topic in LATCHED_TOPICS
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=1 if latched else QUEUE_DEPTHS.get(topic, DEFAULT_QUEUE_DEPTH),

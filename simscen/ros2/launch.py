@@ -1,4 +1,4 @@
-"""Run the user's launch command, and end all processes that it started, even if the adapter is killed.
+"""Launch command of the user: runs it, and ends all processes that it started, even if the adapter is killed.
 
 LaunchedCommand runs this file as a program, `python launch.py COMMAND`. The program runs the command in a shell. When
 the command ends or the adapter closes standard input, the program sends SIGINT to all descendants, then SIGTERM, then
@@ -23,7 +23,7 @@ SIGNALS_AND_WAITS_S = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGK
 
 
 class LaunchedCommand:
-    """A launch command that has been started."""
+    """The running launch command. The constructor starts it."""
 
     def __init__(self, command: str, environment: Mapping[str, str]) -> None:
         self.command = command
@@ -33,7 +33,7 @@ class LaunchedCommand:
         )
 
     @property
-    def ended(self) -> Optional[str]:
+    def end_reason(self) -> Optional[str]:
         """How the command ended, such as "ended with exit code 1"; None while it runs."""
         code = self._process.poll()
         if code is None:
@@ -48,7 +48,7 @@ class LaunchedCommand:
 
 
 def descendants(parent: int) -> List[int]:
-    """Return the process ids of all running descendants of a process, children before grandchildren."""
+    """Return the ids of all running descendants of the process `parent`, children before grandchildren."""
     children: Dict[int, List[int]] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -79,7 +79,7 @@ def end_descendants() -> None:
 
 
 def main() -> int:
-    """Run the command until it ends or standard input closes; return its exit code."""
+    """Run the command until it ends or standard input is closed. Return its exit code."""
     # A descendant whose parent ends becomes a child of this process, so that `descendants` still finds it.
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

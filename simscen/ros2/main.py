@@ -1,4 +1,4 @@
-"""Serve one run by the stack protocol: perform the handshake, prepare the nodes, and answer all steps."""
+"""Main loop of the adapter for one run: performs the handshake with simscen, prepares the nodes, answers all steps."""
 
 import json
 import os
@@ -20,15 +20,15 @@ from simscen.ros2.options import AdapterError, BringUpAborted, Domain, Options, 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
-"""Nav2 actions by which a scenario can request that goals are sent."""
+"""Nav2 actions that a scenario can request for its goals."""
 PROTOCOL_TOPICS = {published: topic for topic, published in MASKS.items()}
-"""Topics of zone masks in the stack protocol, by the topics under which the adapter publishes them."""
+"""Topics of zone masks in the stack protocol, by the topics on which the adapter publishes them."""
 READY_MARGIN_S = 15.0
 """Wall time that the first answer may take in addition to `--ready`."""
 
 
 def main(values: Dict[str, Any]) -> int:
-    """Serve one run with the Options `values`. Return 0, or 1 after an error or if simscen has disconnected."""
+    """Serve one run. `values` are the Options by name. Return 0, or 1 after an error or if simscen has disconnected."""
     connection = Connection.inherited()
     # Exceptions unwind, so that the adapter ends what it started.
     signal.signal(signal.SIGTERM, _terminate)
@@ -87,7 +87,7 @@ class ReceivedStep(NamedTuple):
     """Content of a STEP frame.
 
     now:             simulated time in ns
-    messages:        topics and CDR
+    messages:        topic and serialized (CDR) message
     is_command_due:  whether the robot needs a velocity command now
     limit_s:         maximum wall time for the answer
     """
@@ -99,7 +99,7 @@ class ReceivedStep(NamedTuple):
 
 
 class AdapterRun:
-    """ROS domain, launch command, and adapter of one run, as a context manager that ends all of them."""
+    """One run of the adapter. A context manager that finally ends the adapter, the launch command, and the domain."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -154,6 +154,7 @@ class AdapterRun:
         self._answer_steps(connection, hello, make_adapter)
 
     def _answer_steps(self, connection: Connection, hello: Hello, make_adapter: Callable[[str], Any]) -> None:
+        """Process all frames after the handshake, until END."""
         now = 0
         while True:
             kind, body = connection.receive()
@@ -174,7 +175,10 @@ class AdapterRun:
                 self._process_frame(kind, wire.from_json(body), now)
 
     def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
-        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it and repeat all steps."""
+        """Perform a step, and return the messages of the nodes. If Nav2 aborts its bring-up, restart Nav2 once.
+
+        After a restart, all earlier steps are repeated.
+        """
         # On a busy machine, Nav2's lifecycle manager gives up when a single response is lost.
         if self._adapter.is_ready:
             return list(self._adapter.step(*step))
@@ -206,6 +210,7 @@ class AdapterRun:
         return self._options._replace(goals=mode)
 
     def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
+        """Update the goals by a GOAL, PREEMPT, or CANCEL frame."""
         if kind == wire.GOAL:
             self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
             self._adapter.continue_after_failure = content["on_goal_failure"] == "continue"
@@ -218,7 +223,7 @@ class AdapterRun:
     def _number_messages(
         self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
     ) -> "List[Tuple[int, bytes]]":
-        """Return the `received` messages and the goal events, with topic numbers instead of names."""
+        """Return the `received` messages and the events of the goals, with topic numbers instead of topics."""
         out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
@@ -251,4 +256,5 @@ def _is_robot_topic(topic: Dict[str, Any]) -> bool:
 
 
 def _terminate(*_: Any) -> None:
+    """Handle SIGTERM: raise Disconnected."""
     raise Disconnected("terminated by simscen")

@@ -1,4 +1,4 @@
-"""Helpers for message types, a few messages as CDR bytes, and 2D poses."""
+"""Functions for message types, for a few serialized (CDR) messages, and for 2D poses."""
 
 import functools
 import importlib
@@ -7,8 +7,8 @@ import struct
 from typing import Any, Optional, Sequence, Tuple
 
 LITTLE_ENDIAN = b"\0\1\0\0"
-"""The four bytes before a message in little-endian CDR."""
-NANOSECONDS = 10**9
+"""Header of four bytes before a message in little-endian CDR."""
+NS_PER_S = 10**9
 """Nanoseconds per second."""
 TRANSFORMS_TYPE, PATH_TYPE = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
 SCAN_TYPE, ODOMETRY_TYPE = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
@@ -35,7 +35,7 @@ def read_header(message: bytes) -> Tuple[int, str]:
     """Return the stamp in ns and the frame of a serialized message that begins with a std_msgs/Header."""
     order = _byte_order(message)
     seconds, nanoseconds, size = struct.unpack_from(order + "iII", message, 4)
-    return seconds * NANOSECONDS + nanoseconds, message[16 : 16 + size - 1].decode("utf-8", "replace")
+    return seconds * NS_PER_S + nanoseconds, message[16 : 16 + size - 1].decode("utf-8", "replace")
 
 
 def read_twist(message: bytes, is_stamped: bool) -> Tuple[float, ...]:
@@ -54,7 +54,7 @@ def write_twist(numbers: Sequence[float]) -> bytes:
 
 def write_clock(nanoseconds: int) -> bytes:
     """Return a serialized rosgraph_msgs/msg/Clock."""
-    return LITTLE_ENDIAN + struct.pack("<iI", nanoseconds // NANOSECONDS, nanoseconds % NANOSECONDS)
+    return LITTLE_ENDIAN + struct.pack("<iI", nanoseconds // NS_PER_S, nanoseconds % NS_PER_S)
 
 
 def shift_stamps(type_name: str, message: bytes, offset_ns: int) -> bytes:
@@ -81,6 +81,7 @@ def shift_stamps(type_name: str, message: bytes, offset_ns: int) -> bytes:
 
 @functools.lru_cache(maxsize=None)
 def _has_header(type_name: str) -> bool:
+    """Return whether a message type begins with a std_msgs/Header."""
     fields = find_type(type_name).get_fields_and_field_types()  # type: ignore[union-attr]
     return next(iter(fields.values()), "") == "std_msgs/Header"
 
@@ -89,19 +90,20 @@ def _shift_header(message: bytearray, position: int, offset_ns: int) -> int:
     """Add `offset_ns` to the stamp of the header at `position`; return the position after the header."""
     order = _byte_order(message)
     seconds, nanoseconds = struct.unpack_from(order + "iI", message, position)
-    stamp = max(0, seconds * NANOSECONDS + nanoseconds + offset_ns)
-    struct.pack_into(order + "iI", message, position, *divmod(stamp, NANOSECONDS))
+    stamp = max(0, seconds * NS_PER_S + nanoseconds + offset_ns)
+    struct.pack_into(order + "iI", message, position, *divmod(stamp, NS_PER_S))
     return _skip_string(message, position + 8)
 
 
 def _skip_string(message: bytearray, position: int) -> int:
+    """Return the position after the string at `position`."""
     position = _align(position, 4)
     (size,) = struct.unpack_from(_byte_order(message) + "I", message, position)
     return position + 4 + int(size)
 
 
 def _align(position: int, width: int) -> int:
-    """Return the next aligned position; CDR aligns relative to the end of its first four bytes."""
+    """Return the next position that is aligned to `width` bytes, counted from the end of the CDR header."""
     return position + -(position - 4) % width
 
 

@@ -26,12 +26,14 @@ DISAPPEAR_TIMEOUT_S = 1.0
 
 
 class _Request(NamedTuple):
+    """A pending request: its future (None while the service is not available), and the time at which waiting began."""
+
     future: Optional[Any]
     since: float
 
 
 class ServicePoll:
-    """Repeated calls of the same service of several nodes. Nodes that do not answer do not block other nodes."""
+    """Calls the same service of several nodes repeatedly. Nodes that do not answer do not block other nodes."""
 
     def __init__(self, graph: Graph, service_type: str, service: str, **request: Any) -> None:
         self._graph, self._service = graph, service
@@ -68,6 +70,7 @@ class ServicePoll:
         self._graph.spin_until(self._collect, timeout_s)
 
     def _collect(self) -> bool:
+        """Store the answers that have arrived. Return whether no request is pending."""
         for node, (future, _) in list(self._waiting.items()):
             if future is not None and future.done():
                 self.answers[node] = future.result()
@@ -75,7 +78,7 @@ class ServicePoll:
         return not self._waiting
 
     def waiting_s(self, node: Node) -> float:
-        """Return the wall time in s for which a node has not answered; 0 if it has answered."""
+        """Return for how many seconds of wall time a node has not answered; 0 if it has answered."""
         return time.monotonic() - self._waiting[node].since if node in self._waiting else 0.0
 
 
@@ -160,6 +163,7 @@ class NodeBarrier:
         self._graph.receive_all()
 
     def _leave_out(self, nodes: List[Node], reason: str) -> None:
+        """Leave nodes out of further rounds. Raises AdapterError with `reason` if a node is required."""
         required = [full_name(node) for node in nodes if full_name(node) in self.required()]
         if required:
             raise AdapterError(f"{', '.join(required)} {reason}")

@@ -12,11 +12,11 @@ from typing import IO, Any, Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 
 class AdapterError(Exception):
-    """The run cannot continue. The message states the problem and its solution."""
+    """Failure of the adapter, which ends the run. The message states the problem and its solution."""
 
 
 class BringUpAborted(AdapterError):
-    """The lifecycle manager of a launched Nav2 has given up. `manager` is its name."""
+    """Failure of a launched Nav2 to start: its lifecycle manager, with the name `manager`, has given up."""
 
     def __init__(self, message: str, manager: str) -> None:
         super().__init__(message)
@@ -26,14 +26,20 @@ class BringUpAborted(AdapterError):
 class Options(NamedTuple):
     """Options of `simscen ros2`. Times are in s.
 
+    launch:      command that starts the nodes; None if the user starts them
+    domain:      ROS_DOMAIN_ID; None to select it automatically
+    remap:       renamed topics, `/from:=/to`
     without:     topics that simscen does not publish
+    goals:       how goals are sent: a Nav2 action, "goal_pose", or "auto"
     frame:       renamed frames, `FRAME:=NAME`
+    base_frame:  second name of the base frame
+    sync:        "lockstep" or "paced"
     factor:      speed relative to real time if `sync` is "paced"
     rounds:      extra rounds of the node barrier if no command has arrived; 0 = one per node
     wait:        maximum wall time to wait for a command
     warm_up:     simulated time before goals are sent
     ready:       maximum wall time until the nodes are ready
-    settle:      wall time for which the graph must be unchanged before the run
+    settle:      wall time for which the nodes of the graph must be unchanged before the run
     answer:      maximum wall time to wait for an answer of a node
     wall_time:   whether to accept nodes without use_sim_time
     nav2:        whether to require Nav2's nodes and check their parameters

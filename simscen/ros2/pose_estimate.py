@@ -1,4 +1,4 @@
-"""Pose estimate and newest plan of the stack, derived from messages."""
+"""Pose estimate and newest plan of the stack, derived from the messages of simscen and of the nodes."""
 
 from typing import Any, List, Optional, Tuple
 
@@ -14,8 +14,8 @@ PLAN = "/plan"
 class PoseEstimate:
     """Pose estimate and newest plan of the stack.
 
-    The pose estimate is map -> odom of /tf composed with odometry. If the transform is missing, the estimate is
-    /amcl_pose, or else the initial pose composed with odometry.
+    The pose estimate is the transform map -> odom of /tf, composed with odometry. Without this transform, the estimate
+    is /amcl_pose, or else the initial pose composed with odometry.
     """
 
     def __init__(self) -> None:
@@ -37,15 +37,15 @@ class PoseEstimate:
             return messages.compose(self._initial, self._odometry)
         return None
 
-    def take_published(self, topic: str, data: bytes) -> None:
+    def process_published(self, topic: str, data: bytes) -> None:
         """Process a message from simscen."""
         if topic == "/odom":
             self._odometry = _pose(_read("nav_msgs/msg/Odometry", data).pose.pose)
         elif topic == "/initialpose":
             self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
 
-    def take_received(self, message: ReceivedMessage) -> bool:
-        """Process a message from the nodes. Return False for a message on /tf without map -> odom, else True.
+    def process_received(self, message: ReceivedMessage) -> bool:
+        """Process a message from the nodes. Return whether simscen needs it: not a message on /tf without map -> odom.
 
         Raises AdapterError for a pose or plan in another frame than `map`.
         """
@@ -57,10 +57,11 @@ class PoseEstimate:
             poses = _read(message.type, message.data).poses
             self.plan = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in poses]
         elif message.topic == "/tf":
-            return self._take_transforms(message)
+            return self._process_transforms(message)
         return True
 
-    def _take_transforms(self, message: ReceivedMessage) -> bool:
+    def _process_transforms(self, message: ReceivedMessage) -> bool:
+        """Store map -> odom of a message on /tf. Return whether the message contains it."""
         found = False
         for link in _read(message.type, message.data).transforms:
             if link.child_frame_id.lstrip("/") != ODOM_FRAME:
@@ -76,6 +77,7 @@ class PoseEstimate:
 
 
 def _require_map_frame(message: ReceivedMessage) -> None:
+    """Raise AdapterError if the frame of a message is not the map frame."""
     frame = messages.read_header(message.data)[1]
     if frame.lstrip("/") != MAP_FRAME:
         raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")

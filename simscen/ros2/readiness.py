@@ -1,4 +1,4 @@
-"""Checks of whether the nodes of the user's graph are ready for a run."""
+"""Checks whether the nodes of the user's graph are ready for a run."""
 
 from typing import Any, Iterable, List, Optional, Sequence, Set, Tuple
 
@@ -22,7 +22,7 @@ SHARED_TOPICS = ("/tf", "/tf_static", "/initialpose", GOAL_POSE)
 
 
 class Readiness:
-    """Checks of the ROS graph. Each check returns one text for each problem."""
+    """Checks of the ROS graph before a run. Each check returns one text for each problem that it finds."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Readiness:
         barrier.required = self.required_nodes
 
     def use_transforms(self, transforms: UserTransforms) -> None:
-        """Require that the user's nodes publish these transforms, and accept their frames as base frames."""
+        """Require that the user's nodes publish `transforms`, and accept the frames in them as base frames."""
         self._user_transforms = self._nav2.user_transforms = transforms
 
     def no_nodes(self) -> List[str]:
@@ -71,6 +71,7 @@ class Readiness:
         return self._missing_map() + (self._nav2.wrong_parameters() if self._options.nav2 else [])
 
     def _missing_map(self) -> List[str]:
+        """Return a problem if nodes wait for a map that no node publishes."""
         name = self._graph.names(MAP)
         if self.has_map or self._graph.publishers_of(name):
             return []
@@ -91,7 +92,7 @@ class Readiness:
         return names | {full_name(node) for node in self._lifecycle_nodes()}
 
     def command_type(self) -> str:
-        """Return the type with which commands are published, Twist or TwistStamped."""
+        """Return the type of velocity commands: Twist or TwistStamped."""
         return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
 
     def _command_problems(self) -> List[str]:
@@ -115,7 +116,7 @@ class Readiness:
         return []
 
     def _incompatible_subscribers(self, topic: Topic) -> List[str]:
-        """Return subscribers that receive nothing, because the type or the QoS profile is incompatible."""
+        """Return a problem for each subscriber with an incompatible type or QoS profile, which receives nothing."""
         name, found = self._graph.names(topic.name), []
         for end in self._graph.subscribers_of(name):
             if end.type != topic.type:
@@ -129,7 +130,7 @@ class Readiness:
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
-        """Return other nodes that publish a topic of simscen."""
+        """Return a problem for each other node that publishes a topic of simscen."""
         if topic.name in SHARED_TOPICS:
             return []
         name = self._graph.names(topic.name)
@@ -139,9 +140,9 @@ class Readiness:
         ]
 
     def _unused_sensors(self) -> List[str]:
-        """Return sensors without a subscriber if a node waits for this type on another topic.
+        """Return a problem for each sensor without a subscriber if a node waits for its type on another topic.
 
-        Otherwise, return a problem if no sensor has a subscriber.
+        If there is no such sensor, return a problem if no sensor at all has a subscriber.
         """
         found = []
         sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY_TYPE))]
@@ -161,7 +162,7 @@ class Readiness:
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
-        """Return names of topics that are not simscen's, with their endpoints of these types."""
+        """Return pairs (topic, endpoint) of all topics that simscen does not use, for endpoints of these types."""
         own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
         for name, existing in sorted(self._graph.topics().items()):
@@ -170,6 +171,7 @@ class Readiness:
         return found
 
     def _nodes_on_wall_time(self) -> List[str]:
+        """Return a problem for each node that does not use simulated time."""
         if self._options.wall_time:
             return []
         return [
@@ -182,7 +184,7 @@ class Readiness:
         return [node for node in self._graph.nodes() if self._graph.service_type(node, "get_state") == STATE_SERVICE]
 
     def _inactive_nodes(self) -> List[str]:
-        """Return the lifecycle nodes that are not active, or do not report their state."""
+        """Return a problem for each lifecycle node that is not active or does not report its state."""
         if self._states is None:
             return []
         self._states.track(self._lifecycle_nodes())

@@ -1,4 +1,4 @@
-"""Limit of the wall time of one step of the run."""
+"""Limit of the wall time for which the adapter waits for nodes in one step of the run."""
 
 import math
 import time
@@ -31,7 +31,8 @@ class StepTime:
     def wait_for(self, awaited: Callable[[], Iterable[str]], limit_s: float) -> bool:
         """Handle events until `awaited` returns no nodes. Return False if that takes longer than `limit_s`.
 
-        Raises AdapterError with the slowest nodes if the time of the step is over.
+        `awaited` returns the full names of the nodes to wait for. Raises AdapterError with the slowest nodes if the
+        time of the step is over.
         """
         start = time.monotonic()
         waiting = set(awaited())
@@ -50,10 +51,12 @@ class StepTime:
         return False
 
     def _count(self, nodes: Iterable[str], start: float) -> None:
+        """Add the wall time since `start` to the waiting times of these nodes."""
         for node in nodes:
             self._waited[node] = self._waited.get(node, 0.0) + time.monotonic() - start
 
     def _message(self) -> str:
+        """Return the error message with the slowest nodes."""
         slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:MAX_LISTED_NODES]
         times = ", ".join(f"{node} ({self._waited[node]:.1f} s)" for node in slowest)
         return (

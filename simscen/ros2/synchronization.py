@@ -21,14 +21,14 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from simscen.ros2.frames import transforms_first
 from simscen.ros2.graph import Graph, ReceivedMessage
-from simscen.ros2.messages import NANOSECONDS, read_header
+from simscen.ros2.messages import NS_PER_S, read_header
 from simscen.ros2.nav2.actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED_TYPE
 
 Message = Tuple[str, bytes]
-"""Topic of the stack protocol, and the message in CDR."""
+"""Topic of the stack protocol, and the serialized (CDR) message."""
 
 
 class LockstepSynchronization:
@@ -85,6 +85,7 @@ class LockstepSynchronization:
                 )
 
     def _count(self, now: int, command: Optional[ReceivedMessage]) -> None:
+        """Update the counters and the tracked actions at the end of a control period."""
         self.counters["beats"] += 1
         if command is None:
             self.counters["without_command"] += 1
@@ -109,7 +110,7 @@ class PacedSynchronization:
 
         `now` is simulated time in ns.
         """
-        elapsed = now / NANOSECONDS / self._factor
+        elapsed = now / NS_PER_S / self._factor
         start = time.monotonic() - elapsed
         # After a delay, the rest of the run keeps its pace instead of catching up.
         self._start = start if self._start is None else max(self._start, start)
@@ -126,9 +127,11 @@ class PacedSynchronization:
 
 
 def _last_command(received: Sequence[ReceivedMessage]) -> Optional[ReceivedMessage]:
+    """Return the last velocity command, if any."""
     return next((message for message in reversed(received) if message.topic == COMMAND), None)
 
 
 def _take_inbox(graph: Graph) -> List[ReceivedMessage]:
+    """Return all messages of the inbox, and empty it."""
     received, graph.inbox[:] = list(graph.inbox), []
     return received

@@ -1,4 +1,4 @@
-"""Check of transforms that the user's nodes publish instead of simscen's /tf_static, e.g. by robot_state_publisher."""
+"""Check of the transforms of the user's nodes, e.g. robot_state_publisher, if they replace simscen's /tf_static."""
 
 from typing import Any, List, Set
 
@@ -13,7 +13,7 @@ PROFILES = {
     TF_STATIC: QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     "/tf": QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
 }
-"""Topics of transforms, with the QoS profiles of the subscriptions."""
+"""QoS profiles of the subscriptions, by topic."""
 
 
 class UserTransforms:
@@ -29,9 +29,10 @@ class UserTransforms:
         message = deserialize_message(names.apply(TF_STATIC, message_type, replaced), message_type)
         self._required = [link.child_frame_id for link in message.transforms]
         for topic, profile in PROFILES.items():
-            graph.node.create_subscription(message_type, graph.names(topic), self._take, profile)
+            graph.node.create_subscription(message_type, graph.names(topic), self._process_transforms, profile)
 
-    def _take(self, message: Any) -> None:
+    def _process_transforms(self, message: Any) -> None:
+        """Add the frames of a TFMessage, except those that simscen publishes as well."""
         for link in message.transforms:
             if link.header.frame_id not in SHARED_FRAMES:  # simscen publishes odom -> base frame
                 self._published |= {link.header.frame_id, link.child_frame_id}

@@ -1,4 +1,4 @@
-"""Observer of the actions of Nav2's servers, which finds overdue velocity commands and reports recoveries.
+"""Observers of the actions of Nav2's servers: one finds overdue velocity commands, the other reports recoveries.
 
 **Overdue commands.** A server must send commands while it executes an action that moves the robot. The simulation waits
 for them, because the control loops of Nav2 up to Jazzy run on wall time and may be slower than the simulation.
@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, Callable, NamedTuple
 
-from simscen.ros2.messages import NANOSECONDS
+from simscen.ros2.messages import NS_PER_S
 from simscen.ros2.node_parameters import NodeParameters
 
 if TYPE_CHECKING:
@@ -29,17 +29,17 @@ RATE_PARAMETERS = {
     "drive_on_heading": "cycle_frequency",
 }
 """Actions that move the robot, and the server's parameter that sets the rate of commands in Hz."""
-MISSING_LIMIT_NS = NANOSECONDS
-"""Simulated time without a due command after which the run fails."""
+MISSING_LIMIT_NS = NS_PER_S
+"""Simulated time after which the run fails if a due command has not arrived."""
 NEXT_WAIT_S = 0.25
-"""Maximum wall time to wait for a due command after a command that did not arrive."""
+"""Maximum wall time to wait for a due command if the previous one did not arrive."""
 BEHAVIORS = ("spin", "backup", "wait")
 """Actions of Nav2's behavior server that its behavior trees count as recoveries."""
 CLEARING = "clear_costmap"
 """Name of the reported recovery if a costmap is cleared."""
 OUTCOMES = {4: "succeeded", 5: "canceled", 6: "failed"}
 """Reported outcomes, by GoalStatus.status."""
-FEEDBACK_DELAY_NS = NANOSECONDS
+FEEDBACK_DELAY_NS = NS_PER_S
 """Simulated time to wait for the status of a behavior before a counted recovery is reported as costmap clearing."""
 
 ReportEvent = Callable[..., None]
@@ -54,6 +54,8 @@ class OverdueCommand(NamedTuple):
 
 
 class _Server(NamedTuple):
+    """Node with an action server that moves the robot, and the period of its commands."""
+
     node: str
     period_ns: float
 
@@ -74,9 +76,10 @@ class MotionActions:
             node = self._graph.subscribe_to_status(action, partial(self._process_status, action))
             rate = 0.0 if node is None else self._parameters.values(node, [parameter]).get(parameter) or 0.0
             if node is not None and rate > 0.0:
-                self._servers[action] = _Server(node, NANOSECONDS / rate)
+                self._servers[action] = _Server(node, NS_PER_S / rate)
 
     def _process_status(self, action: str, message: Any) -> None:
+        """Record whether a server executes its action."""
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
 
     def record_command(self, now: int) -> None:
@@ -123,6 +126,7 @@ class RecoveryReporter:
             self._process_status(behavior, bytes(goal.goal_info.goal_id.uuid), goal.status)
 
     def _process_status(self, behavior: str, goal: bytes, status: int) -> None:
+        """Report a recovery that has started or ended. `goal` is the id of the action goal."""
         if goal not in self._known and (status == EXECUTING or status in OUTCOMES):
             self._known.add(goal)
             self._executing[goal] = behavior
@@ -132,7 +136,7 @@ class RecoveryReporter:
             self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
 
     def update_count(self, number: int) -> None:
-        """Update the number of recoveries. `number` is `number_of_recoveries` of the current navigation action."""
+        """Update the count of recoveries. `number` is `number_of_recoveries` of the current navigation action."""
         self._feedback_count += max(0, number - self._last_number)
         self._last_number = number
 
@@ -141,7 +145,7 @@ class RecoveryReporter:
         self._last_number = 0
 
     def report_clearing(self, now: int) -> None:
-        """Report counted recoveries that were no behaviors as costmap clearing. `now` is simulated time in ns."""
+        """Report recoveries in the count that are not behaviors as costmap clearings. `now` is simulated time in ns."""
         if self._feedback_count <= self._behavior_count:
             self._excess_since = None
             return

@@ -9,13 +9,13 @@ from simscen.ros2.graph import Topic
 from simscen.ros2.messages import find_type
 
 MASKS = {"/keepout_zones": "/keepout_filter_mask", "/speed_zones": "/speed_filter_mask"}
-"""Topics of masks in the stack protocol, and the topics under which the adapter publishes them."""
+"""Topics on which the adapter publishes masks, by their topics in the stack protocol."""
 INFO_TYPE = "nav2_msgs/msg/CostmapFilterInfo"
 INFO_TOPICS = {
     "/keepout_filter_mask": "/keepout_costmap_filter_info",
     "/speed_filter_mask": "/speed_costmap_filter_info",
 }
-"""Topics of masks, and the topics of their CostmapFilterInfo."""
+"""Topics of CostmapFilterInfo messages, by the topics of the masks that they describe."""
 KEEPOUT, SPEED_PERCENT, SPEED_ABSOLUTE = 0, 1, 2
 """Values of CostmapFilterInfo.type, from nav2_costmap_2d/costmap_filters/filter_values.hpp."""
 

@@ -1,4 +1,4 @@
-"""Check of whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
+"""Rules that check whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
 
 The rules apply to parameter files and to running nodes. https://docs.nav2.org/configuration/ describes the parameters.
 """
@@ -45,8 +45,8 @@ def check(
 ) -> List[ParameterProblem]:
     """Return all problems in the parameters of Nav2's nodes.
 
-    Keys of `nodes` and `subscriptions` are node names without namespace. `subscriptions` is None for a parameter file.
-    In a running node, a wrong topic name is only a problem if the node subscribes to this topic.
+    Keys of `nodes` and `subscriptions` are node names without namespace. A wrong topic name is only a problem if the
+    node subscribes to this topic; without `subscriptions`, it always is.
     """
     problems: List[ParameterProblem] = []
     for name in sorted(nodes):
@@ -88,23 +88,28 @@ class _Node(NamedTuple):
     problems: List[ParameterProblem]
 
     def get(self, key: str) -> Optional[Any]:
+        """Return the value of a parameter; None if it is not set."""
         return self.parameters.get(key)
 
     def add_problem(self, key: str, message: str, is_severe: bool = True) -> None:
+        """Add a problem of the parameter `key`."""
         self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
 
     def check_base(self, key: str) -> None:
+        """Add a problem unless the parameter is a name of the base frame."""
         value = self.get(key)
         if value is not None and value not in self.published.bases:
             hint = f"--base-frame {value} also gives it that name"
             self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.bases[0]!r}: {hint}")
 
     def check_frame(self, key: str, *frames: str) -> None:
+        """Add a problem unless the parameter is one of these frames."""
         value = self.get(key)
         if value is not None and value not in frames:
             self.add_problem(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
 
     def check_topic(self, key: str, topics: Sequence[str], kind: str) -> None:
+        """Add a problem unless the parameter is one of these topics. `kind` is what they contain, e.g. "scans"."""
         value = self.get(key)
         if not isinstance(value, str):
             return

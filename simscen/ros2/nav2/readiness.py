@@ -30,7 +30,7 @@ class Nav2Readiness:
         )
 
     def _published_names(self) -> parameter_rules.PublishedNames:
-        """Return the names in the user's graph. Frames of the user's transforms are additional base frames."""
+        """Return the names that simscen publishes. Frames of the user's transforms are additional base frames."""
         if self.user_transforms is None:
             return self._names
         return self._names._replace(bases=[*self._names.bases, *self.user_transforms.robot_frames])
@@ -55,6 +55,7 @@ class Nav2Readiness:
     def _severe_problems(
         self, nodes: Dict[str, Dict[str, Any]], subscriptions: parameter_rules.Subscriptions, prefix: str
     ) -> List[str]:
+        """Return a text, with `prefix`, for each severe problem of the parameters of `nodes`."""
         found = parameter_rules.check(nodes, self._published_names(), subscriptions)
         return [f"{prefix}{problem.node}: {problem.message}" for problem in found if problem.is_severe]
 

@@ -1,4 +1,4 @@
-"""Behavior tree transitions, warnings, and parameters of Nav2's nodes for the run's log."""
+"""What the run's log contains about Nav2: behavior tree transitions, warnings, and parameters of its nodes."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ NODES = (
     *("local_costmap", "global_costmap"),
 )
 """Names of the nodes whose parameters are recorded."""
-OMITTED = ("use_sim_time", "qos_overrides.")
-"""Prefixes of names of parameters that are not recorded."""
+OMITTED_PREFIXES = ("use_sim_time", "qos_overrides.")
+"""Parameters whose names begin with one of these texts are not recorded."""
 
 
 class LogLine(NamedTuple):
@@ -53,18 +53,18 @@ class Nav2Report:
 
     def begin(self) -> None:
         """Discard the collected lines, subscribe to the logs, and read the parameters of Nav2's nodes."""
-        self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._take_tree)
+        self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._add_tree_changes)
         self.follow_log()
         self._lines.clear()
         for node in self._barrier.nodes:
             if node.rpartition("/")[2] in NODES:
-                names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED)]
+                names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED_PREFIXES)]
                 self.parameters[node] = self._node_parameters.values(node, names)
 
     def follow_log(self) -> None:
         """Subscribe to /rosout if a node publishes it. Call repeatedly until a node does."""
         if not self._follows_log:
-            self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
+            self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._add_log_line)
 
     def errors(self) -> list[str]:
         """Return the last distinct errors among the lines since the last `take_lines`."""
@@ -84,12 +84,14 @@ class Nav2Report:
         self._graph.node.create_subscription(message_type, topic, take, self._graph.subscription_profile(topic))
         return True
 
-    def _take_tree(self, message: Any) -> None:
+    def _add_tree_changes(self, message: Any) -> None:
+        """Add a line for each change in a BehaviorTreeLog message."""
         for change in message.event_log:
             text = tree_change(change.node_name, change.previous_status, change.current_status)
             self._lines.append(LogLine(INFO, BEHAVIOR_TREE_LOGGER, text))
 
-    def _take_log(self, message: Any) -> None:
+    def _add_log_line(self, message: Any) -> None:
+        """Add a message of /rosout if it is a warning or an error, and notice an aborted bring-up."""
         if message.level >= WARNING:
             self._lines.append(LogLine(message.level, message.name, message.msg))
         if ABORTED_BRING_UP in message.msg:

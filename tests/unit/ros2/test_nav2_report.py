@@ -38,10 +38,10 @@ def test_a_parameter_becomes_a_value_of_json(value: SimpleNamespace, expected: o
 def test_lines_are_taken_once_and_sorted_by_logger() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
-    report._take_log(SimpleNamespace(level=40, name="planner_server", msg="no path"))
-    report._take_log(SimpleNamespace(level=20, name="amcl", msg="created"))
+    report._add_log_line(SimpleNamespace(level=40, name="planner_server", msg="no path"))
+    report._add_log_line(SimpleNamespace(level=20, name="amcl", msg="created"))
     change = SimpleNamespace(node_name="FollowPath", previous_status="IDLE", current_status="RUNNING")
-    report._take_tree(SimpleNamespace(event_log=[change]))
+    report._add_tree_changes(SimpleNamespace(event_log=[change]))
     assert report.take_lines() == [
         LogLine(20, "behavior_tree", "FollowPath: IDLE -> RUNNING"),
         LogLine(40, "planner_server", "no path"),
@@ -53,8 +53,8 @@ def test_the_last_different_errors_are_listed() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
     for number in (1, 2, 2, 3, 4):
-        report._take_log(SimpleNamespace(level=40, name="planner_server", msg=f"error {number}"))
-    report._take_log(SimpleNamespace(level=30, name="amcl", msg="a warning"))
+        report._add_log_line(SimpleNamespace(level=40, name="planner_server", msg=f"error {number}"))
+    report._add_log_line(SimpleNamespace(level=30, name="amcl", msg="a warning"))
     assert report.errors() == ["planner_server: error 2", "planner_server: error 3", "planner_server: error 4"]
     report.take_lines()
     assert report.errors() == []
@@ -63,8 +63,8 @@ def test_the_last_different_errors_are_listed() -> None:
 def test_a_lifecycle_manager_that_gives_up_is_known_by_name() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
-    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))
+    report._add_log_line(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))
     assert not report.aborted_bring_up
     text = "Failed to bring up all requested nodes. Aborting bringup."
-    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg=text))
+    report._add_log_line(SimpleNamespace(level=40, name="robot1.manager", msg=text))
     assert report.aborted_bring_up == "robot1.manager"
