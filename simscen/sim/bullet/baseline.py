@@ -26,7 +26,9 @@ class PyBulletBaseline:
         ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
         engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
-            for tile in engine.split_into_tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
+            for tile in engine.split_into_tiles(
+                static.vertices, engine.faces_above_floor(static.vertices, static.faces)
+            ):
                 mesh = self._create_body(engine.create_concave_shape(client, submesh(static.vertices, tile)))
                 pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:

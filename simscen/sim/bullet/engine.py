@@ -100,7 +100,7 @@ def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
     return [faces[k : k + MAX_FACES_PER_SHAPE] for k in range(0, len(faces), MAX_FACES_PER_SHAPE)]
 
 
-def above_floor(vertices: Array, faces: Faces) -> Faces:
+def faces_above_floor(vertices: Array, faces: Faces) -> Faces:
     """Return the triangles that do not lie on the floor."""
     above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
     return above
@@ -139,7 +139,7 @@ def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
     """Create one shape from solids that are all PRIMITIVES."""
     kinds, halves, radii, lengths, positions, orientations = [], [], [], [], [], []
     for solid in solids:
-        kind, half, radius, length = _primitive(solid.shape)
+        kind, half, radius, length = _primitive_parameters(solid.shape)
         kinds.append(kind)
         halves.append(half)
         radii.append(radius)
@@ -300,7 +300,7 @@ def create_invisible_shape(client: int) -> int:
     return visual
 
 
-def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
+def _primitive_parameters(shape: Shape) -> tuple[int, Sequence[float], float, float]:
     """Return PyBullet's type of a shape from PRIMITIVES, its half extents, radius, and length in m; 0 if unused."""
     match shape:
         case Box((x, y, z)):

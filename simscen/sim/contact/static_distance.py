@@ -149,7 +149,7 @@ class StaticDistance:
         faces = self._mesh.faces[self._parts.faces(part)]
         if self._parts.is_whole_solid(part) and is_convex(solid := submesh(vertices, faces)):
             return [engine.create_convex_shape(self._client, solid.vertices)]
-        tiles = engine.split_into_tiles(vertices, engine.above_floor(vertices, faces))
+        tiles = engine.split_into_tiles(vertices, engine.faces_above_floor(vertices, faces))
         return [engine.create_concave_shape(self._client, submesh(vertices, tile)) for tile in tiles]
 
     def enclosing_solids(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:

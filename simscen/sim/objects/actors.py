@@ -213,7 +213,7 @@ class Actors:
         return self._rest_poses.poses
 
     def on_push(self, tick: int) -> None:
-        """Discard all speed bounds, because something is pushed during the step that begins at `tick`."""
+        """Discard the result of the broad phase, because something is pushed during the step that begins at `tick`."""
         self._broad_phase.invalidate(tick)
 
     def no_push_before(self, tick: int, robot_speed: Callable[[], float]) -> int:

@@ -40,8 +40,8 @@ class Base(Protocol):
         ...
 
 
-class Drive(Protocol):
-    """Firmware and motors of a base.
+class SimulatedDrive(Protocol):
+    """Firmware and motors of a base. The specification of a drive is `simscen.model.robot.Drive`.
 
     *Given* any command *then* neither speeds nor accelerations exceed the robot's limits.
     *Given* no obstacle and steady commands *then* the base drives what was commanded, except for wheel slip.
@@ -67,7 +67,7 @@ class Drive(Protocol):
 
 def build_drive(
     client: int, body: RobotBody, pose: Pose2, period: float, tick_seconds: float, terrain: Terrain, visual_shape: int
-) -> tuple[Base, Drive]:
+) -> tuple[Base, SimulatedDrive]:
     """Return the base and drive of a robot at `pose`. The firmware of the drive runs every `period` seconds.
 
     `visual_shape` is the id of the shape that the renderer shows, `tick_seconds` the duration of a physics step.

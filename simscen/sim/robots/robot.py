@@ -62,7 +62,7 @@ class Scene:
             robot.base.set_friction(self.floor.friction)
 
     def apply_pushes(self) -> bool:
-        """Apply the pushes of the next step; return whether any pushes remain, now or later."""
+        """Apply the pushes of the next step; return whether any push is active or scheduled."""
         self.pushes = [push for push in self.pushes if push.end_tick > self.tick]
         for push in self.pushes:
             if push.start_tick <= self.tick:

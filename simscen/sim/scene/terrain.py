@@ -51,7 +51,7 @@ class Terrain:
         if is_convex(mesh):
             shapes = [engine.create_convex_shape(self._client, mesh.vertices)]
         else:
-            tiles = engine.split_into_tiles(static.vertices, engine.above_floor(static.vertices, faces))
+            tiles = engine.split_into_tiles(static.vertices, engine.faces_above_floor(static.vertices, faces))
             shapes = [engine.create_concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
         friction = static.frictions[solid] if static.frictions else 1.0
         for shape in shapes:

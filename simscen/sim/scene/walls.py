@@ -44,7 +44,7 @@ class Walls:
             self._tiles = _tiles_of(mesh)
             self._is_missing = np.ones(len(self._tiles), dtype=np.bool_)
         else:
-            faces = engine.above_floor(mesh.vertices, mesh.faces)
+            faces = engine.faces_above_floor(mesh.vertices, mesh.faces)
             self.bodies += engine.create_static_faces(client, mesh.vertices, faces)
         self.is_complete = not self._is_missing.any()
 
@@ -75,4 +75,4 @@ def prepare_walls(mesh: TriangleMesh) -> None:
 @cached_on_instance
 def _tiles_of(mesh: TriangleMesh) -> FaceTiles:
     """Return the tiles of a mesh without the faces on the floor. The result is cached."""
-    return tile_faces(mesh.vertices, engine.above_floor(mesh.vertices, mesh.faces), TILE_SIZE_M)
+    return tile_faces(mesh.vertices, engine.faces_above_floor(mesh.vertices, mesh.faces), TILE_SIZE_M)
