@@ -159,6 +159,7 @@ class AllowedFolders:
         return any(path.is_relative_to(folder) for folder in self.roots)
 
     def _require_inside(self, path: Path) -> None:
+        """Raise UnusableFile if a path is not in an allowed folder."""
         if not self._contains(path):
             raise UnusableFile("outside the scenario root and the world paths")
 

@@ -181,14 +181,14 @@ class _LimitedCommands(FaultEffect):
         self._previous: tuple[int, Twist] | None = None
 
     def command(self, command: Twist) -> Twist | None:
-        limited = self._within_speeds(command)
+        limited = self._limit_speeds(command)
         if self._previous is not None:
             tick, previous = self._previous
-            limited = self._within_accelerations(previous, limited, self._setting.seconds_since(tick))
+            limited = self._limit_accelerations(previous, limited, self._setting.seconds_since(tick))
         self._previous = self._setting.now(), limited
         return limited
 
-    def _within_speeds(self, command: Twist) -> Twist:
+    def _limit_speeds(self, command: Twist) -> Twist:
         spec, separation = self._spec, self._setting.separation
         vx, vy = _limit_length((command.vx, command.vy), spec.linear)
         (wz,) = _limit_length((command.wz,), spec.angular)
@@ -199,7 +199,7 @@ class _LimitedCommands(FaultEffect):
         (left,), (right,) = _limit_length((left,), spec.left), _limit_length((right,), spec.right)
         return twist_from_sides(left, right, limited.vy, separation)
 
-    def _within_accelerations(self, previous: Twist, command: Twist, seconds: float) -> Twist:
+    def _limit_accelerations(self, previous: Twist, command: Twist, seconds: float) -> Twist:
         spec = self._spec
         vx, vy = _limit_length((command.vx - previous.vx, command.vy - previous.vy), spec.linear_acceleration, seconds)
         (wz,) = _limit_length((command.wz - previous.wz,), spec.angular_acceleration, seconds)

@@ -53,6 +53,7 @@ class _DelayedMessages(FaultEffect):
         self._ended = False
 
     def _due_tick(self) -> int:
+        """Return the tick at which a message that is sent now arrives."""
         if self._ended:
             return self._setting.now()
         delay = self._delay.latency + self._delay.jitter * self._rng.random()

@@ -109,6 +109,7 @@ class _RainAttenuation(FaultEffect):
         )
 
     def _returned_light(self, ranges: Array) -> Array:
+        """Return the fraction of the light that surfaces at these ranges (n,) return."""
         light: Array = self._rain.reflectivity * np.exp(-2 * self._rain.extinction * ranges) / ranges**2
         return light
 

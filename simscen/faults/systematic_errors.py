@@ -198,18 +198,18 @@ class _DriftingValues(FaultEffect):
         self._drift, self._setting, self._start_tick = drift, setting, setting.now()
         self._start_pose: Pose2 | None = None
 
-    def _elapsed(self, tick: int) -> float:
+    def _elapsed_seconds(self, tick: int) -> float:
         return self._setting.clock.seconds(max(0, tick - self._start_tick))
 
     def reading(self, reading: Reading) -> Reading | None:
-        elapsed = self._elapsed(reading.tick)
+        elapsed = self._elapsed_seconds(reading.tick)
         if isinstance(reading, Imu):
             x, y, z = reading.angular_velocity
             return replace(reading, angular_velocity=(x, y, z + self._drift.gyro * elapsed))
         return change_distances(reading, lambda distances: distances + self._drift.range * elapsed)
 
     def belief(self, belief: Belief) -> Belief:
-        elapsed = self._elapsed(self._setting.now())
+        elapsed = self._elapsed_seconds(self._setting.now())
         if self._start_pose is None:
             self._start_pose = belief.pose
         drift = Pose2(self._drift.linear * elapsed, 0.0, self._drift.angular * elapsed)

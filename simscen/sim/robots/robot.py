@@ -42,7 +42,7 @@ class TimedPush:
 
 @dataclass(eq=False)
 class Scene:
-    """State that all robots of a simulation share, such as the current tick."""
+    """State that all robots of a simulation share: the engine client, the objects in it, and the current tick."""
 
     client: int
     tick_rate: int

@@ -102,6 +102,7 @@ class DifferentialDrive:
         return mean_angles(self._client, self._vehicle.id, self._joints, len(self._left))
 
     def _set_wheels(self) -> None:
+        """Set the target speeds of the wheel motors, or hold the wheels if the robot is at rest."""
         vx, _, wz = self._ramp.velocity
         self._is_braking = vx == wz == 0 and is_rolling(self._client, self._vehicle.id, self._joints, self._radius)
         if vx == wz == 0 and not self._is_braking:
@@ -198,6 +199,7 @@ class AckermannDrive:
             self._set_wheels()
 
     def _target_steering(self) -> float:
+        """Return the steering angle in rad that the commanded velocity requires."""
         target, limit = self._ramp.target, self._drive.max_steering
         if abs(target.vx) < MIN_STEERING_SPEED_M_S:
             return self._steering
@@ -213,6 +215,7 @@ class AckermannDrive:
         return mean_angles(self._client, self._robot, self._left + self._right, len(self._left))
 
     def _set_steering(self) -> None:
+        """Set the target angles of both front wheels."""
         tangent, ratio = math.tan(self._steering), self._drive.wheel_separation / (2 * self._drive.wheel_base)
         angles = (math.atan(tangent / (1 - tangent * ratio)), math.atan(tangent / (1 + tangent * ratio)))
         pybullet.setJointMotorControlArray(
@@ -227,6 +230,7 @@ class AckermannDrive:
         )
 
     def _set_wheels(self) -> None:
+        """Set the target speeds of the wheel motors, or hold the wheels if the robot is at rest."""
         speed, joints = self._ramp.velocity.vx, self._left + self._right
         self._is_braking = speed == 0 and is_rolling(self._client, self._robot, joints, self._drive.wheel_radius)
         if speed == 0 and not self._is_braking:

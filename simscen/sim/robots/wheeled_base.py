@@ -68,6 +68,7 @@ class WheeledBase:
         self.place(pose)
 
     def _set_up_wheel(self, wheel: Wheel, joint: int) -> None:
+        """Set the collision filter, the friction, and the inertia of a wheel."""
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # the axle is the y axis
         link = joint + 1 if wheel.is_steered else joint
         # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
@@ -189,6 +190,7 @@ class _Link(NamedTuple):
 
 
 def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list[_Link]:
+    """Return the link of a wheel; for a steered wheel, first its knuckle. `index` is the index of the first link."""
     shape, position = _wheel_shape(client, wheel, max_roll), (wheel.x, wheel.y, wheel.radius)
     if not wheel.is_steered:
         return [_Link(wheel.inertia.mass, shape, position, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]

@@ -80,6 +80,7 @@ class RenderScene:
                 self._place(name, body, pose)
 
     def _place(self, name: str, body: Body, pose: Pose3) -> None:
+        """Create the visual bodies of an object if they are missing, and move them to `pose`."""
         known = self._visuals.get(name)
         if known is None or known.solids is not body.solids:
             self._remove(name)
@@ -96,6 +97,7 @@ class RenderScene:
             pybullet.removeBody(body_id, physicsClientId=self._client)
 
     def _create_bodies(self, vertices: Array, faces: engine.Faces) -> tuple[int, ...]:
+        """Create visual bodies of triangles; return their ids."""
         return tuple(
             pybullet.createMultiBody(0, -1, self._create_shape(vertices[faces[k : k + MAX_FACES_PER_VISUAL_SHAPE]]),
                                      physicsClientId=self._client)

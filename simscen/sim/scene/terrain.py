@@ -45,6 +45,7 @@ class Terrain:
         return bool(self.names)
 
     def _add(self, static: TriangleMesh, solid: int) -> None:
+        """Create the bodies of a static solid, given by its index."""
         # A convex solid becomes one shape, so that a wheel on a ramp does not bump into edges between triangles.
         faces = static.faces[static.owners == solid]
         mesh = submesh(static.vertices, faces)

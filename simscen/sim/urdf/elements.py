@@ -239,6 +239,7 @@ def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
 
 
 def _add_unique(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", element: Element) -> None:
+    """Add a link or joint by name; raises InvalidElement if the name is not unique."""
     if item.name in known:
         raise InvalidElement(element, f"two <{element.tag}>s are called {item.name!r}")
     known[item.name] = item  # type: ignore[assignment]  # callers pass a dictionary of the same type

@@ -37,16 +37,18 @@ def _add_wheel(robot: ET.Element, wheel: Wheel) -> None:
     joint = ET.SubElement(robot, "joint", name=wheel.name, type="continuous")
     ET.SubElement(joint, "parent", link=BASE_LINK)
     ET.SubElement(joint, "child", link=f"{wheel.name}_link")
-    ET.SubElement(joint, "origin", xyz=_text(wheel.x, wheel.y, wheel.radius), rpy="0 0 0")
+    ET.SubElement(joint, "origin", xyz=_join_numbers(wheel.x, wheel.y, wheel.radius), rpy="0 0 0")
     ET.SubElement(joint, "axis", xyz="0 1 0")
 
 
 def _add_inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
     inertial = ET.SubElement(link, "inertial")
     _add_origin(inertial, center)
-    ET.SubElement(inertial, "mass", value=_text(mass))
+    ET.SubElement(inertial, "mass", value=_join_numbers(mass))
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(inertial, "inertia", {name: _text(tensor[row][column]) for name, (row, column) in names.items()})
+    ET.SubElement(
+        inertial, "inertia", {name: _join_numbers(tensor[row][column]) for name, (row, column) in names.items()}
+    )
 
 
 def _add_shape(link: ET.Element, solid: Solid) -> None:
@@ -56,14 +58,14 @@ def _add_shape(link: ET.Element, solid: Solid) -> None:
         pose = solid.pose
         match solid.shape:
             case Box(size):
-                ET.SubElement(geometry, "box", size=_text(*size))
+                ET.SubElement(geometry, "box", size=_join_numbers(*size))
             case Cylinder(radius, length) | Capsule(radius, length):
-                ET.SubElement(geometry, "cylinder", radius=_text(radius), length=_text(length))
+                ET.SubElement(geometry, "cylinder", radius=_join_numbers(radius), length=_join_numbers(length))
             case Sphere(radius):
-                ET.SubElement(geometry, "sphere", radius=_text(radius))
+                ET.SubElement(geometry, "sphere", radius=_join_numbers(radius))
             case other:
                 low, high = hull_points(other).min(axis=0), hull_points(other).max(axis=0)
-                ET.SubElement(geometry, "box", size=_text(*(high - low).tolist()))
+                ET.SubElement(geometry, "box", size=_join_numbers(*(high - low).tolist()))
                 pose = pose.compose(Pose3(*((low + high) / 2).tolist()))
         _add_origin(element, pose)
 
@@ -72,8 +74,8 @@ def _add_origin(element: ET.Element, pose: Pose3) -> None:
     x, y, z, w = pose.quaternion
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    ET.SubElement(element, "origin", xyz=_text(*pose.position), rpy=_text(roll, pitch, pose.yaw))
+    ET.SubElement(element, "origin", xyz=_join_numbers(*pose.position), rpy=_join_numbers(roll, pitch, pose.yaw))
 
 
-def _text(*values: float) -> str:
+def _join_numbers(*values: float) -> str:
     return " ".join(f"{value:.9g}" for value in values)

@@ -48,7 +48,7 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
 
 
 def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
-    """Return the passage whose sides are the points of the outline that are nearest to the two points `sides`."""
+    """Return the passage between the two points `sides`, which are moved to the nearest points of the outline."""
     assert field.outline is not None
     one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
     return _passage(goal, (one, other), field)

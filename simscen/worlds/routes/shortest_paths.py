@@ -40,7 +40,7 @@ class Leg:
     """The shortest path from one pose to a goal.
 
     length:    length in m; inf if there is no path
-    passages:  passages on the path; without a path, at most the gap that is too narrow
+    passages:  passages on the path; without a path, the gap that is too narrow, or () if none was found
     """
 
     length: float

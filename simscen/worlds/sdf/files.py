@@ -97,6 +97,7 @@ class IncludedFiles:
         self._open_paths.pop()
 
     def _read_root(self, path: str, uri: Element) -> Element:
+        """Return the root element of the file `path` or of a built-in model. `uri` is the element that refers to it."""
         if path in BUILT_IN_MODELS:
             root = parse(BUILT_IN_MODELS[path].encode(), path, "")
         else:

@@ -43,14 +43,14 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     """
     report, files = ImportReport(lenient=lenient), WorldFiles.of([root, *search])
     try:
-        world = _load(path, files, report)
+        world = _load_world(path, files, report)
     except UnusableElement as error:
         raise report.fatal_error(error) from error
     report.raise_problems()
     return world
 
 
-def _load(path: Path, files: WorldFiles, report: ImportReport) -> World:
+def _load_world(path: Path, files: WorldFiles, report: ImportReport) -> World:
     included_files = IncludedFiles(files, report)
     document = included_files.open_world(path)
     try:

@@ -113,6 +113,7 @@ class ImportReport:
 
 
 def _problem(error: UnusableElement, suffix: str = "") -> Problem:
+    """Return the problem with an unusable element; `suffix` is appended to its message."""
     location = error.location
     message = f"{location.element}: {error.message}{suffix}" if location.element else f"{error.message}{suffix}"
     return Problem(

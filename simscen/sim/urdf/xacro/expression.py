@@ -146,6 +146,7 @@ class _Evaluation:
             return value
 
     def _unchecked_value(self, node: ast.expr) -> object:
+        """Return the value of a node, whose type and size must still be checked."""
         match node:
             case ast.Constant(value):
                 return value
@@ -258,6 +259,7 @@ def _is_namespace(node: ast.expr) -> bool:
 
 
 def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
+    """Return the function or constant with a dotted name, or None."""
     match path:
         case (name,):
             return GLOBAL_FUNCTIONS.get(name)
