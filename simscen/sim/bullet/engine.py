@@ -161,12 +161,12 @@ def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
 def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
     """Create the shape of the common convex hull of solids."""
     return create_convex_shape(
-        client, np.concatenate([solid.pose.apply(_hull_points(solid.shape)) for solid in solids])
+        client, np.concatenate([solid.pose.apply(_reduced_hull_points(solid.shape)) for solid in solids])
     )
 
 
-def _hull_points(shape: Shape) -> Array:
-    """Return points (n, 3) that span the convex hull of a shape."""
+def _reduced_hull_points(shape: Shape) -> Array:
+    """Return points (n, 3) that span the convex hull of a shape; for a mesh, as few as possible."""
     return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
 
 

@@ -203,6 +203,7 @@ def _quaternion_pose(element: Element, in_degrees: bool) -> Pose3:
 # Tables of elements. `report_unknown` uses them to distinguish harmless elements from misspelled ones.
 
 _HARMLESS_ANYWHERE = {"plugin", "light", "pose", "name", "meta", "description", "frame", "model_state"}
+"""Elements that are ignored below any parent except shapes."""
 HARMLESS_CHILDREN = {
     "world": {
         "audio", "wind", "gravity", "magnetic_field", "atmosphere", "gui", "physics", "scene", "spherical_coordinates",
@@ -248,9 +249,10 @@ GEOMETRIC_CHILDREN = SHAPES | {
 }
 """Elements that add or move solids, by parent. A misspelling of one of them is an error."""
 
-# Tags for which `report_unknown` looks in unknown elements and in `experimental:params`.
 _SOLID_TAGS = {"model", "include", "actor", "population", "link", "collision", "geometry"}
+"""An unknown element adds solids if it contains one of these elements."""
 _NON_SOLID_TAGS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
+"""Elements that do not change solids."""
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 _XACRO_CONDITIONALS = ("xacro:if", "xacro:unless")
 
