@@ -132,7 +132,7 @@ def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
 
 
 def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
-    """Return the pose of the root frame in the base frame: on the ground below the center of the driven axles."""
+    """Return the pose of the root frame in the base frame, which is on the ground, centered below the driven axles."""
     if not wheels:
         return Pose3(0.0, 0.0, -min(_lowest_z(solid) for solid in solids))
     x, y, _ = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0).tolist()
