@@ -1,7 +1,7 @@
 """Hooks of the pytest plug-in for scenarios (`pytest --simscen scenarios/`), and the fixture `simscen`.
 
-Scenario files are collected with --simscen, below the paths of the ini option `simscen_paths`, and if they are
-arguments of pytest.
+Scenario files are collected below the paths of the ini option `simscen_paths` and, with --simscen, below the paths on
+the command line. A scenario file that is an argument of pytest is always collected.
 """
 
 from __future__ import annotations

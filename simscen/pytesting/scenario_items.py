@@ -1,4 +1,4 @@
-"""Collector and test items of pytest for scenario files, with one item per run, and the callable of the fixture."""
+"""Pytest collector for scenario files, test items (one per run), and the value of the fixture `simscen`."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def runner_of(config: pytest.Config) -> Runner:
 
 
 def _folder(config: pytest.Config) -> Path:
-    """Return the output folder: in a worker of pytest-xdist that of the controller, otherwise a new folder."""
+    """Return the output folder: a new folder, or in a worker of pytest-xdist the folder of the controller process."""
     controller_folder = getattr(config, "workerinput", {}).get(OUT_OPTION)
     if controller_folder is not None:
         return Path(controller_folder)
@@ -185,7 +185,7 @@ def _raise_errors(problems: list[Problem]) -> None:
 
 
 def _seed(config: pytest.Config) -> int | None:
-    """Return the seed from the command line or the ini option; None for the seed of the scenario. Raises UsageError."""
+    """Return the seed from the command line or the ini option; None to use the scenario's own. Raises UsageError."""
     given = config.getoption("--simscen-seed")
     setting = config.getini("simscen_seed")
     if given is not None or not setting:

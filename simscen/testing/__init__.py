@@ -1,4 +1,6 @@
-"""Contract tests for plug-ins: checks that a component, such as a planner, keeps the promises (rules) of its protocol.
+"""Contract tests for plug-ins: they check that a component, such as a planner, keeps the rules of its protocol.
+
+A promise is one rule. A contract is the set of all promises of one kind of component.
 
     @pytest.mark.parametrize("promise", promises_of(MyPlannerSpec()), ids=str)
     def test_my_planner(promise):

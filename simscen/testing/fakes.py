@@ -1,4 +1,4 @@
-"""Fakes for tests of triggers, actions, and sensors, without a simulation."""
+"""Fakes that replace the simulation in tests of triggers, actions, and sensors."""
 
 import math
 from dataclasses import dataclass, field
@@ -140,13 +140,14 @@ class FakeStage:
 
 
 LINEAR_SPEED_M_S, ANGULAR_SPEED_RAD_S = 0.3, 0.2
+"""Speeds of the robot of FakeSensorView."""
 ROOM_HALF_WIDTH_M = 4.0
 """Half of the side length of a square room. The center of the room is the origin."""
-DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
+DIFFERENTIAL_DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
 
 
 class FakeSensorView:
-    """Fake of sensors.sensor.SensorView, the interface of sensors to the simulation: a robot that drives a circle.
+    """Fake of sensors.sensor.SensorView, the interface of sensors to the simulation. The robot drives a circle.
 
     Tests set the time `seconds`.
     """
@@ -173,9 +174,9 @@ class FakeSensorView:
 
     def encoders(self) -> tuple[float, ...]:
         """Return the angles of the left and the right wheel in rad."""
-        half = DRIVE.wheel_separation / 2
+        half = DIFFERENTIAL_DRIVE.wheel_separation / 2
         left, right = (LINEAR_SPEED_M_S - ANGULAR_SPEED_RAD_S * half), (LINEAR_SPEED_M_S + ANGULAR_SPEED_RAD_S * half)
-        return tuple(speed * self.seconds / DRIVE.wheel_radius for speed in (left, right))
+        return tuple(speed * self.seconds / DIFFERENTIAL_DRIVE.wheel_radius for speed in (left, right))
 
     def touching(self) -> bool:
         """Return whether the bumper touches something: in every second with an odd number."""
@@ -189,7 +190,7 @@ class FakeSensorView:
 
 
 class SquareRoomRays(RayCaster):
-    """Ray caster for the four walls of the room."""
+    """Ray caster for the four walls of a square room, see ROOM_HALF_WIDTH_M."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """Return the ranges (n,) in m of rays from `origins` (n, 3) along `directions` (n, 3); inf beyond `reach`."""

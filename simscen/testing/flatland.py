@@ -1,6 +1,6 @@
-"""Planar world of boxes and discs, and simulated drives of a stack in such a world without a physics engine.
+"""Planar world of boxes and discs for tests of navigation stacks, with drives that need no physics engine.
 
-Distances and ranges are computed with closed formulas, independent of the tested code.
+Closed formulas give distances and ranges, independent of the tested code.
 """
 
 import math
@@ -47,7 +47,7 @@ def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> 
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """Return the Setting with which a component `name` is built: control at 20 Hz, costmap cells of 5 cm.
+    """Return the Setting for building a component `name`: robot, control at 20 Hz, and costmap cells of 5 cm.
 
     `grid` is the map; None for mapless navigation.
     """
@@ -128,7 +128,7 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """Simulated drive of a robot with a stack, perfect odometry, and a noisy lidar.
+    """Simulated drive of a robot that a stack controls, with perfect odometry and a noisy lidar.
 
     world:      obstacles
     pose:       true pose
@@ -237,7 +237,7 @@ def drive(
     stop_on_failure: bool = True,
     **options: Any,
 ) -> Drive:
-    """Return a drive to the goals before its first step. By default, the reference stack drives with true poses.
+    """Return a drive from `start` to the goals, before its first step. The default stack knows the true poses.
 
     `grid` is the map; None for mapless navigation. `options` are fields of Drive.
     """

@@ -1,4 +1,4 @@
-"""Plug-in of pytest: `pytest --simscen-contract my_package:MyPlanner` checks all promises of a component.
+"""Pytest plug-in for contracts: `pytest --simscen-contract my_package:MyPlanner` checks all promises of a component.
 
 A promise is one rule of the component's protocol, such as "the same seed gives the same path".
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
-"""Further plug-in, which collects scenario files. This package must not import it."""
+"""Plug-in that collects scenario files. pytest loads it by this name, because this package must not import it."""
 
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
@@ -43,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Find the promises of all --simscen-contract targets. If the command line has no paths, test nothing else.
+    """Find the promises of all --simscen-contract targets. Without paths on the command line, test nothing else.
 
     Raises UsageError for an invalid target.
     """
@@ -67,7 +67,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 
 def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:
-    """Yield the items of the promises, below one collector for each component. `limit` is in s."""
+    """Yield a test item for each promise, below one collector for each component. `limit` is in s."""
     for subject in dict.fromkeys((promise.role, promise.subject) for promise in promises):
         title = f"{subject[0]} {subject[1]}"
         node = SubjectCollector.from_parent(session, name=title, nodeid=title)

@@ -1,4 +1,4 @@
-"""Computed drives of a robot through one asymmetric room, with noisy sensors, for tests of localizers."""
+"""Drives of a robot through one asymmetric room, computed with noisy sensors for tests of localizers."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -31,6 +31,7 @@ WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
 """Waypoints (x, y) in m of a drive, which returns from the last to the first one."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
+"""Robot that drives through the room."""
 
 
 @cache
@@ -45,7 +46,7 @@ def grid(resolution: float = 0.05) -> OccupancyGrid:
 
 
 def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
-    """Return exact ranges (n, b) in m to boxes, by the slab method. `poses` (n, 3) and beam `angles` (b,) in rad."""
+    """Return exact ranges (n, b) in m to boxes, from lidar `poses` (n, 3) along beam `angles` (b,) in rad."""
     heading = poses[:, 2:] + angles
     with np.errstate(divide="ignore"):
         inverse = 1 / np.stack((np.cos(heading), np.sin(heading)), axis=-1)
@@ -135,7 +136,7 @@ DEFAULT_NOISE = Noise()
 def run_localizer(
     subject: Localizer, drive: RoomDrive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
 ) -> list[Belief]:
-    """Send noisy readings of the drive to a localizer, and return the belief (pose estimate) after each odometry.
+    """Send noisy readings of the drive to a localizer; return its belief (pose estimate) after each odometry reading.
 
     With `imu`, the localizer also receives yaw rates.
     """

@@ -1,4 +1,4 @@
-"""Traces (recorded states of a run) and cases (goals, robot, and world of a run), built from short descriptions."""
+"""Build traces (recorded states of a run) and cases (goals, robot, and world of a run) from short descriptions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -73,6 +73,7 @@ def _velocity(truth: Samples) -> Array:
 
 
 def _belief(description: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
+    """Return estimated poses with covariances, up to the tick `end`."""
     if description is None:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
     ticks = np.arange(0, end + 1, BELIEF_PERIOD_TICKS, dtype=np.int64)
@@ -115,7 +116,7 @@ def _path_points(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:
-    """Return a case. Keys of the description are fields of Case. These fields are converted:
+    """Return a case. The keys of the description are fields of Case. These fields have another form:
 
     start:         [x, y, yaw]
     goals, sent:   list of {name, pose: [x, y, yaw], other fields of Goal}

@@ -1,4 +1,7 @@
-"""Contracts (sets of promises) and promises (rules of a protocol) of a component."""
+"""Find the contracts of a component (sets of promises, the rules of its protocol) by its specification or name.
+
+A target is a component named on the command line with --simscen-contract.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,7 @@ class InvalidTarget(Exception):
 
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
-    """Return the contracts of the component of a specification: one per robot for planners, controllers, and behaviors.
+    """Return the contracts of the component that `spec` specifies; for some kinds one per robot.
 
     `subject` is the name of the component in reports. `robots` are robots by name, by default ROBOTS. Raises
     InvalidTarget if `spec` is not a specification.
@@ -80,7 +83,7 @@ def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | N
 
 
 def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
-    """Return all promises of the component of a specification. The parameters are those of `contracts_of`."""
+    """Return all promises of the component that `spec` specifies. For the parameters, see `contracts_of`."""
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
 
@@ -100,7 +103,7 @@ def promises_of_target(target: str) -> list[Promise]:
 
 
 def _specification_classes(component: str) -> Sequence[Any]:
-    """Return the specification classes of `package.module:Class`, or of all entry points with this name."""
+    """Return the specification class of `package.module:Class`, or the classes of all entry points with this name."""
     if ":" in component:
         return [specification_of(_import_class(component), component)]
     entries = [entry for group in GROUPS if (entry := find_type(group, component)) is not None]
@@ -127,7 +130,7 @@ def _import_class(component: str) -> Any:
 
 
 def specification_of(component_class: Any, component: str) -> Any:
-    """Return the class itself if it is a specification, otherwise the annotated type of its first argument.
+    """Return the specification class of a component: the class itself, or else the type of its first argument.
 
     `component` is the name of the class in messages. Raises InvalidTarget if this type is not a specification.
     """
@@ -145,7 +148,10 @@ def specification_of(component_class: Any, component: str) -> Any:
 
 
 def _instance(model: Any, values: Any, target: str) -> Any:
-    """Return the specification with these values. `target` is for messages. Raises InvalidTarget."""
+    """Return the specification of class `model` with these values. `target` is its name in messages.
+
+    Raises InvalidTarget for invalid values.
+    """
     if not isinstance(values, dict) and not issubclass(model, RootModel):
         raise InvalidTarget(f"{target}: {json.dumps(values)} is not a JSON object")
     try:

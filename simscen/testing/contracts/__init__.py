@@ -1,1 +1,1 @@
-"""One contract for each kind of plug-in: a class whose methods check the rules of its protocol on a component."""
+"""Contracts: for each kind of plug-in, a class whose methods check the rules of the protocol on one component."""

@@ -1,6 +1,6 @@
 """Base classes of contracts and promises, and helpers for checks.
 
-A promise is one rule of a protocol, such as that of planners. A contract is the list of all promises of a protocol.
+A promise is one rule of a protocol, such as the protocol of planners. A contract has all promises of one protocol.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ _reseed_count = 0
 
 
 def reseed_global_generators() -> None:
-    """Seed the global random generators of Python and numpy with a new value, to detect components that use them."""
+    """Give the global random generators of Python and numpy a new seed, to detect components that use them."""
     global _reseed_count  # noqa: PLW0603
     _reseed_count += 1
     random.seed(_reseed_count)
@@ -130,7 +130,7 @@ class ComponentContract(Contract):
     robot: RobotModel = field(kw_only=True)
 
     def setting(self) -> Setting:
-        """Return the Setting for a new component: robot, random generator with a fixed seed, and no map."""
+        """Return the Setting for building the component: robot, random streams with a fixed seed, and no map."""
         return setting(self.robot, name=self.role)
 
     def build(self) -> Any:

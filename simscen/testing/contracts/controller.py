@@ -28,10 +28,11 @@ PERIOD_S = 0.05
 """Time between two commands."""
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
+"""Poses (121, 3) of the straight path to GOAL."""
 SPEED_TOLERANCE = 1e-6
-"""Maximum excess of a command over a limit because of rounding, in m/s and rad/s."""
+"""Rounding error by which a command may exceed a limit, in m/s and rad/s."""
 GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
-"""Maximum position error in m and yaw error in rad at the goal, and time at the goal after which a drive ends."""
+"""Maximum error in m and rad at the goal, and time at the goal after which a drive ends."""
 
 
 class ControllerContract(ComponentContract):
@@ -210,8 +211,9 @@ def require_no_valid_control(failure: NavigationFailure) -> None:
 
 CHECKED_GOAL = Goal("g", Pose2(2.0, -1.0, 0.5), xy_tolerance=0.25, yaw_tolerance=0.25)
 CALL_COUNT = 40
-"""Number of calls in 2 s at 20 Hz."""
+"""Number of calls of a goal checker in 2 s at 20 Hz."""
 VELOCITIES = (STOP, Twist(0.3), Twist(0.0, 0.0, 0.8), Twist(-0.2, 0.0, -0.4))
+"""Velocities of the robot at which goal checkers are called."""
 
 
 class GoalCheckerContract(ComponentContract):

@@ -17,7 +17,7 @@ from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
-DRIVE: dict[str, Any] = {
+DRIVE_TRACE: dict[str, Any] = {
     "seconds": 8,
     "truth": [[0, 0, 0], [4, 2, 0.5], [8, 2.5, 0.5]],
     "events": [
@@ -30,15 +30,15 @@ DRIVE: dict[str, Any] = {
         [7, "navigation.ended", "SUCCEEDED", {"error_code": 0}],
     ],
 }
-"""Description of a drive for `synthetic_trace`; CASE is for `synthetic_case`."""
-STATIONARY: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
-TRUNCATED: dict[str, Any] = {**DRIVE, "seconds": 3, "ended": None, "events": DRIVE["events"][:2]}
+"""Descriptions for `synthetic_case` and `synthetic_trace`: one goal, and a drive to this goal."""
+STATIONARY_TRACE: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
+TRUNCATED_TRACE: dict[str, Any] = {**DRIVE_TRACE, "seconds": 3, "ended": None, "events": DRIVE_TRACE["events"][:2]}
 TRACES = {
-    "a drive": DRIVE,
-    "the trace of a stationary robot": STATIONARY,
-    "a truncated log": TRUNCATED,
+    "a drive": DRIVE_TRACE,
+    "the trace of a stationary robot": STATIONARY_TRACE,
+    "a truncated log": TRUNCATED_TRACE,
 }
-"""Description of each trace (recorded states of a run), by its name in messages."""
+"""Descriptions of all traces (recorded states of runs), by name in messages."""
 
 
 class CriterionContract(Contract):
@@ -81,17 +81,17 @@ class CriterionContract(Contract):
     @promise
     def the_same_trace_gives_the_same_findings(self) -> None:
         """Given the same trace and case then the same findings, independent of clocks and earlier calls."""
-        first = self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive")
-        self.findings(synthetic_trace(STATIONARY), synthetic_case(CASE), "the trace of a stationary robot")
+        first = self.findings(synthetic_trace(DRIVE_TRACE), synthetic_case(CASE), "a drive")
+        self.findings(synthetic_trace(STATIONARY_TRACE), synthetic_case(CASE), "the trace of a stationary robot")
         require(
-            self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive") == first,
+            self.findings(synthetic_trace(DRIVE_TRACE), synthetic_case(CASE), "a drive") == first,
             "returns different findings for the same drive",
         )
 
     @promise
     def a_trace_is_not_changed(self) -> None:
         """Given a trace and a case then they are not changed, because other criteria use them."""
-        trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
+        trace, case = synthetic_trace(DRIVE_TRACE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         self.findings(trace, case, "a drive")
         require(repr((trace, case)) == repr(before), "changes the trace")
@@ -132,14 +132,14 @@ class MetricContract(Contract):
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
         """Given the same trace and case then the same number, independent of clocks and earlier calls."""
-        first = self.measure(DRIVE, "a drive")
-        self.measure(STATIONARY, "the trace of a stationary robot")
-        require(self.measure(DRIVE, "a drive") == first, "returns different numbers for the same drive")
+        first = self.measure(DRIVE_TRACE, "a drive")
+        self.measure(STATIONARY_TRACE, "the trace of a stationary robot")
+        require(self.measure(DRIVE_TRACE, "a drive") == first, "returns different numbers for the same drive")
 
     @promise
     def a_trace_is_not_changed(self) -> None:
         """Given a trace and a case then they are not changed, because criteria use them."""
-        trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
+        trace, case = synthetic_trace(DRIVE_TRACE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         call_component("measures a drive", self.spec.measure, trace, case)
         require(repr((trace, case)) == repr(before), "changes the trace")

@@ -20,12 +20,12 @@ from simscen.stack.setting import Setting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.flatland import CONTROL_PERIOD_TICKS, TICK_RATE_HZ, Drive, Flatland, round_robot
 
-START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
-ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
+START_POSE, NEAR_GOAL, FAR_GOAL = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
+SIDE_GOAL = Goal("aside", Pose2(1.5, 3.2, 1.5))
 GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
-class CheckedStack:
+class DecisionCheckingStack:
     """Wrapper of a stack that checks each decision: types, finite commands, and events of the current tick."""
 
     def __init__(self, stack: Stack) -> None:
@@ -67,12 +67,12 @@ class StackContract(Contract):
             "stack",
             Streams(seed),
             CONTROL_PERIOD_TICKS / TICK_RATE_HZ,
-            estimate=Estimate(START, (0.05, 0.05, 0.02)),
+            estimate=Estimate(START_POSE, (0.05, 0.05, 0.02)),
         )
         stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
         call_component("starts", lambda: stack.start(setting.estimate, goals))
         odometry = ("odom", "ground_truth") if self.has_true_poses else ("odom",)
-        return Drive(world, robot, CheckedStack(stack), START, odometry=odometry)
+        return Drive(world, robot, DecisionCheckingStack(stack), START_POSE, odometry=odometry)
 
     @property
     def has_true_poses(self) -> bool:
@@ -82,12 +82,12 @@ class StackContract(Contract):
     @promise
     def it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(self) -> None:
         """Given an unmapped obstacle on the way to the goal then the robot reaches the goal without contact."""
-        d = self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
+        d = self.new_drive(FAR_GOAL, discs=((3.2, 1.9, 0.25),)).run(90)
         require(
             d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / TICK_RATE_HZ:.0f} s"
         )
-        distance = d.pose.distance(FAR.pose)
-        require(distance <= FAR.xy_tolerance, f"says that it has reached a goal that is {distance:.2f} m away")
+        distance = d.pose.distance(FAR_GOAL.pose)
+        require(distance <= FAR_GOAL.xy_tolerance, f"says that it has reached a goal that is {distance:.2f} m away")
         require(d.min_clearance > 0, f"the robot touches something: clearance {d.min_clearance:.3f} m")
 
     @promise
@@ -100,7 +100,7 @@ class StackContract(Contract):
     @promise
     def once_a_task_has_ended_it_commands_zero(self) -> None:
         """Given a task that has ended then the command is zero from the step of its end on."""
-        d = self.new_drive(NEAR).run(30)
+        d = self.new_drive(NEAR_GOAL).run(30)
         require(
             d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / TICK_RATE_HZ:.0f} s"
         )
@@ -112,7 +112,7 @@ class StackContract(Contract):
     @promise
     def a_canceled_task_ends_at_once(self) -> None:
         """Given a canceled task then task and goal end as canceled, and the command is zero from the next step on."""
-        d = self.new_drive(FAR, NEAR).run(2)
+        d = self.new_drive(FAR_GOAL, NEAR_GOAL).run(2)
         call_component("is canceled", lambda: d.stack.cancel(d.tick))
         canceled_at = len(d.commands)
         d.run(0.5, until="")
@@ -127,10 +127,10 @@ class StackContract(Contract):
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
         """Given a goal that preempts then the current goal is canceled, and the robot drives to the new goal."""
-        d = self.new_drive(FAR).run(1)
-        call_component("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
+        d = self.new_drive(FAR_GOAL).run(1)
+        call_component("is preempted", lambda: d.stack.preempt(d.tick, SIDE_GOAL))
         d.run(0.5, until="")
-        require(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
+        require(d.stack.goal == SIDE_GOAL, f"drives to {d.stack.goal} after it was sent to {SIDE_GOAL}")
         d.run(60)
         canceled = [e.name for e in d.events_of_kind("goal.canceled")]
         require(canceled == ["far"], f"reports that {canceled or 'nothing'} is canceled, not far")
@@ -142,7 +142,7 @@ class StackContract(Contract):
     @promise
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
         """Given a reachable and an unreachable goal then each goal is accepted once and ends once, in this order."""
-        d = self.new_drive(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
+        d = self.new_drive(NEAR_GOAL, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
         accepted = [e.name for e in d.events_of_kind("goal.accepted")]
         ended = [e.name for e in d.log if e.kind in GOAL_END_KINDS]
         require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
@@ -156,14 +156,14 @@ class StackContract(Contract):
     @promise
     def the_same_seed_gives_the_same_drive_bit_for_bit(self) -> None:
         """Given the same readings and seed then bit-identical commands and events."""
-        one, other = (self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
+        one, other = (self.new_drive(FAR_GOAL, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
         require(one.commands == other.commands, "two drives from the same seed differ in their commands")
         require(one.log == other.log, "two drives from the same seed differ in their events")
 
     @promise
     def invalid_scans_never_make_a_decision_invalid(self) -> None:
         """Given scans without any return, and then with ranges of nan, then all decisions are finite."""
-        d = self.new_drive(FAR)
+        d = self.new_drive(FAR_GOAL)
         d.run(1, until="")
         d.range_max = -1.0  # no beam has a return
         d.run(1, until="")
