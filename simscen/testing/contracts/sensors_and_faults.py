@@ -20,7 +20,7 @@ from simscen.core.records.events import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
-from simscen.testing.fakes import DRIVE, FakeSensorView, SquareRoomRays
+from simscen.testing.fakes import DIFFERENTIAL_DRIVE, FakeSensorView, SquareRoomRays
 
 READINGS: dict[str, Callable[[int], Reading]] = {
     "Scan": lambda k: Scan("it", 24 * k, np.linspace(0.5, 5.0, 60) + 0.01 * k, -3.0, 0.1, 0.05, 8.0),
@@ -167,7 +167,7 @@ class SensorContract(Contract):
         """Return a new sensor, its interface to the simulation, and its period in ticks."""
         clock, view = Clock(240), FakeSensorView()
         period, rng = clock.period(self.spec.rate), np.random.default_rng(seed)
-        setting = SensorSetting(SENSOR_NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
+        setting = SensorSetting(SENSOR_NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DIFFERENTIAL_DRIVE)
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
