@@ -167,7 +167,9 @@ class SensorContract(Contract):
         """Return a new sensor, its interface to the simulation, and its period in ticks."""
         clock, view = Clock(240), FakeSensorView()
         period, rng = clock.period(self.spec.rate), np.random.default_rng(seed)
-        setting = SensorSetting(SENSOR_NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DIFFERENTIAL_DRIVE)
+        setting = SensorSetting(
+            SENSOR_NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DIFFERENTIAL_DRIVE
+        )
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
