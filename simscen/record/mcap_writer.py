@@ -79,7 +79,7 @@ class Chunk:
 class Channel:
     """Channel of one topic, which adds messages to a chunk. `number` is the ID of the channel in the file.
 
-    `entries` has two numbers for each message in the chunk: its time in ns, and its offset.
+    `entries` has two numbers for each message in the chunk: its time in ns, and its offset in the chunk.
     """
 
     def __init__(self, number: int, chunk: Chunk) -> None:

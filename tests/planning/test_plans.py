@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from generated_worlds import ROBOT, cheapest_cost, costmap_of, forest, large_maze, maze, random_query, rooms
 
-from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
+from simscen.advanced.planners import bit_star_searches, informed_set, medial_axis_planner
 from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refine
 from simscen.advanced.spec import MedialAxisPlanner as MedialAxisSpec
 from simscen.core.geometry import Pose2
@@ -107,12 +107,12 @@ def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
     whole corridor was searched for seconds. This maze has 15 m, and limits the numbers of blocks and samples instead.
     """
     monkeypatch.setattr(informed_set, "MAX_COST_BLOCKS", 2500)
-    monkeypatch.setattr(search_regions, "MAX_SAMPLES", 300)
+    monkeypatch.setattr(bit_star_searches, "MAX_SAMPLES", 300)
     view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), TICK_RATE_HZ)).view
     rates, start, goal = TraversalCosts(view, ROBOT, 2.0, True), Pose2(0.7, 0.7), Pose2(14.15, 14.15)
     optimum = cheapest_cost(rates, start, goal)
     for seed in range(3):
-        (first,) = next(search_regions.searches(rates, find_endpoints(rates, start, goal, 0.5), seed))
+        (first,) = next(bit_star_searches.searches(rates, find_endpoints(rates, start, goal, 0.5), seed))
         points = first.search(seed, 20_000).solve(simplify=False)
         assert points is not None
         assert rates.along(refine(rates, np.array(points))) < 1.05 * optimum

@@ -17,7 +17,7 @@ from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotati
 WINDOW_SIZE = 36
 """Number of recent corrections whose poses are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
-"""Correlation lengths of the errors (longitudinal, lateral, yaw), as distances driven by `step_length`."""
+"""Correlation lengths of the errors (longitudinal, lateral, yaw) in m driven, with rotations as in `step_length`."""
 DRIFT_VARIANCE_PER_M = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
@@ -70,7 +70,7 @@ class CovarianceEstimator:
         self._base: Pose2 | None = None
 
     def learn_odometry_error(self, matched: Pose2, odometry: Pose2) -> None:
-        """Learn the error of odometry from one step by scan matching and by odometry."""
+        """Learn the error of odometry from one step, measured by scan matching (`matched`) and by odometry."""
         x, y, yaw = odometry.between(matched)
         self._odometry_square = max(
             0.0,

@@ -30,7 +30,7 @@ MAX_WALL_THICKNESS_M = 1.0
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
-    """Sensor model `likelihood_field_prob`, raised to a power because the errors of neighboring beams are similar."""
+    """Sensor model `likelihood_field_prob` with an exponent, because the errors of neighboring beams are similar."""
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,

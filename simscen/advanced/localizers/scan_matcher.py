@@ -1,6 +1,6 @@
-"""Scan matching: the motion between two scans, by point-to-line ICP with odometry as the initial guess.
+"""Scan matching: the motion since the last scan, by point-to-line ICP with odometry as the initial guess.
 
-Source: Censi, An ICP variant using a point-to-line metric (ICRA 2008). A scan is matched with several earlier scans.
+Source: Censi, An ICP variant using a point-to-line metric (ICRA 2008). Each scan is matched with several earlier scans.
 The guess is also a prior: along a corridor that looks the same everywhere, odometry determines the motion.
 """
 

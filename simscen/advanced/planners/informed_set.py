@@ -34,11 +34,11 @@ Mask = npt.NDArray[np.bool_]
 class InformedSet:
     """Points on near-shortest paths from start to goal. `length` is the length of the shortest path in m.
 
-    A path moves from block to block in 16 directions, as a king or a knight in chess. It is up to 2.8 % too long.
+    Paths move from block to block in 16 directions, like a king or a knight in chess. They are up to 2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
-        """Search the shortest paths. If `by_cost`, lengths are traversal costs, in m of driving through free space."""
+        """Search the shortest paths. If `by_cost`, all lengths are traversal costs, as m of driving in free space."""
         size, max_blocks = (COST_BLOCK_M, MAX_COST_BLOCKS) if by_cost else (BLOCK_M, MAX_BLOCKS)
         max_factor = max(1, int(2.0 * costs.inscribed / costs.resolution))
         min_factor = min(math.ceil(math.sqrt(costs.height * costs.width / max_blocks)), max_factor)
@@ -109,7 +109,7 @@ class InformedSet:
         return [self._point_with_most_clearance(costmap, self.length * number / legs) for number in range(1, legs)]
 
     def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
-        """Return the point with the most clearance at the distance `along` m on near-shortest paths, and `along`."""
+        """Return the point with the most clearance on near-shortest paths, `along` m from the start, and `along`."""
         near_shortest = self._through <= self.length + 2 * self._size
         blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size)).tolist()
         cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
@@ -223,7 +223,10 @@ Numbers = npt.NDArray[np.float32]
 
 
 def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, ufunc: np.ufunc, padding: float) -> Numbers:
-    """Reduce each block of `factor` x `factor` cells to one value by a ufunc, after adding `padding` at the end."""
+    """Reduce each block of `factor` x `factor` cells to one value with a ufunc such as np.maximum.
+
+    Incomplete blocks at the end are filled up with `padding`.
+    """
     height, width = (-(-side // factor) * factor for side in cells.shape)
     padded = np.full((height, width), padding, dtype=np.float32)
     padded[: cells.shape[0], : cells.shape[1]] = cells

@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from simscen.advanced.planners.bit_star_searches import Leg, searches
 from simscen.advanced.planners.informed_set import InformedSet
-from simscen.advanced.planners.search_regions import Leg, searches
 from simscen.advanced.spec import MedialAxisPlanner as PlannerSpec
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
@@ -32,7 +32,7 @@ from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, Travers
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
-ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
+REFINEMENT_ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Rounds of `refine`: distance between stations in m, maximum offset from a station in m, and points per station."""
 MIN_SEGMENTS = 2
 """Minimum number of segments of a path, so that there is a station between its ends."""
@@ -43,7 +43,7 @@ def refine(costs: TraversalCosts, points: Array) -> Array:
     """Return an optimized and smoothed path near a path (n, 2), with the same ends."""
     points = _with_shortcuts(costs, points)
     cost = costs.along(points)
-    for spacing, max_offset, count in ROUNDS:
+    for spacing, max_offset, count in REFINEMENT_ROUNDS:
         for stride in (costs.stride, SAMPLE_SPACING_CELLS * costs.resolution):
             other = _cheapest_through(
                 costs,
@@ -60,7 +60,7 @@ def refine(costs: TraversalCosts, points: Array) -> Array:
 
 def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
     """Return the path with straight shortcuts where they are not more expensive."""
-    resampled = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
+    resampled = resample_polyline(points, REFINEMENT_ROUNDS[0][0], MIN_SEGMENTS)
     rows = resampled.tolist()
     cost = [0.0]
     for (ax, ay), (bx, by) in pairwise(rows):
@@ -154,6 +154,7 @@ class MedialAxisPlanner:
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """Return a path in a costmap, which can be a window of the entire costmap."""
         costs = self._make_costs(costmap)
         self._costs = costs.reusing_cache(self._costs) if costmap.costs.size <= MAX_CACHED_CELLS else None
         return Path(with_headings(self._points(costs, start, goal, seed), goal))
@@ -282,7 +283,7 @@ def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: flo
 def _cells_on_line(
     costmap: CostmapView, start: Pose2, goal: Pose2
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Return the columns and rows of the cells on a straight line, and where the line leaves them (0 start, 1 goal)."""
+    """Return columns and rows of the cells on a straight line, and where it leaves each cell (0 start … 1 goal)."""
     crossings = [np.array((0.0, 1.0))]
     origin, direction = np.empty(2), np.empty(2)
     for axis, (start_coordinate, end) in enumerate(((start.x, goal.x), (start.y, goal.y))):

@@ -1,8 +1,8 @@
 """Avoidance of moving obstacles by trajectory rollouts, and return of a standing robot to its position.
 
-As long as the controller's trajectory is safe, its command stays. Otherwise, a few hundred trajectories are compared:
-the controller's trajectory at lower speeds, and sequences of two velocities. Their main cost is the risk of coming too
-close to predicted obstacles. Among safe trajectories, progress decides.
+While the controller's trajectory is safe, the controller's command is kept. Otherwise, a few hundred trajectories are
+compared: the controller's trajectory at lower speeds, and sequences of two velocities. Their main cost is the risk of
+coming too close to predicted obstacles. Among safe trajectories, progress decides.
 
 Sources: Fox, Burgard, Thrun 1997; with moving obstacles, Seder and Petrović 2007.
 """
@@ -31,9 +31,9 @@ from simscen.stack.protocols import CostmapView, RobotModel
 MIN_DISTANCE_M = 0.25
 """Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
 DECAY_TIME_S = 1.2
-"""Time constant in s of the exponential decay of risk with the time ahead."""
+"""Time constant in s with which the weight of risk decays exponentially toward the future."""
 RISK_DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
-"""Weight of the risk at each of TIMES, from 1 now toward 0."""
+"""Weight of the risk at each of TIMES."""
 APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
 """Weights of the maximum nearness to moving obstacles (1 at contact), of a collision, and of the mean nearness."""
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
@@ -41,7 +41,7 @@ STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
 PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, DEVIATION_COST = 1.0, 0.15, 0.08, 0.1
 """Weights of progress, of driving backward, and of a changed command; cost of leaving the controller's trajectory."""
 SAFE_RISK = 0.02
-"""Maximum risk (`Avoidance._risk`) at which the controller's command stays."""
+"""Maximum risk (`Avoidance._risk`) at which the controller's command is kept."""
 RESUME_RISK = 0.01
 """Maximum risk at which the controller gets back control after avoidance; less than SAFE_RISK, as a hysteresis."""
 SPEED_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
@@ -215,7 +215,7 @@ class Avoidance:
         return (pose.x, pose.y) if home is None else (home.x, home.y)
 
     def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
-        """Return the progress (n,) toward the goal of trajectories that end at x and y (n,), relative to full speed."""
+        """Return the progress (n,) toward the goal, relative to full speed, of trajectories that end at x, y (n,)."""
         before = math.hypot(goal[0] - pose.x, goal[1] - pose.y)
         gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON_S)
         return gain
@@ -265,7 +265,7 @@ class StandPosition:
         self._home, self._is_away = None, False
 
     def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
-        """Return the stand position; None until an obstacle moves, when it is set to `pose`."""
+        """Return the stand position. It is None until an obstacle moves, and is then set to `pose`."""
         if self._home is None and has_moving_obstacles:
             self._home = pose
         return self._home

@@ -126,9 +126,9 @@ def divide_into_segments(hits: Hits) -> Segments:
 
 
 def find_clusters(segments: Segments, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
-    """Return the clusters of a scan whose radius is at most `max_radius` in m.
+    """Return the clusters of a scan with a radius of at most `max_radius` in m.
 
-    `ranges` (n,) are those of all beams. The first beam points along `start`; beams are `step` rad apart.
+    `ranges` (n,) are the ranges of all beams. The first beam points along `start`; beams are `step` rad apart.
     """
     spacing = abs(step)
     hits = segments.hits

@@ -202,12 +202,12 @@ class FollowedPath:
         def position(seconds: float) -> complex:
             ramped_for = min(seconds, ramp)
             driven = (now + 0.5 * rate * ramped_for) * ramped_for + then * (seconds - ramped_for)
-            return self._at(min(max(driven, 0.0) + start, end)) + offset * math.exp(-abs(driven) / decay_distance)
+            return self._point_at(min(max(driven, 0.0) + start, end)) + offset * math.exp(-abs(driven) / decay_distance)
 
         factor = 1.0 + abs(offset) / decay_distance
         return position, max(abs(now), abs(then)) * factor, 0.5 * STEP_S * abs(then - now) * factor
 
-    def _at(self, length: float) -> complex:
+    def _point_at(self, length: float) -> complex:
         """Return the point at a length in m along the path."""
         lengths, points = self._lengths, self._points
         after = min(max(bisect_right(lengths, length), 1), len(lengths) - 1)

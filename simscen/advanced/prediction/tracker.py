@@ -1,8 +1,8 @@
 """Tracking of moving obstacles in the scans of one lidar.
 
-A cluster of hits that appears in formerly free space, through which beams of an earlier scan passed, starts a track.
-Later clusters near the predicted position update the track. A track with a significant speed over some updates counts
-as moving.
+A cluster of hits starts a track if it is in formerly free space, through which beams of an earlier scan passed. Later
+clusters near the predicted position update the track. A track with a significant speed over some updates counts as
+moving.
 """
 
 import math
@@ -135,8 +135,8 @@ def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> 
 
 
 CHECKED_BEAMS = 120
-"""Approximate number of beams that are checked while there are no tracks. If one hits something in formerly free space,
-all beams are processed."""
+"""Approximate number of beams that are checked while there are no tracks. All beams are processed if one of these beams
+hits something in formerly free space."""
 MIN_NEW_SHARE, MIN_NEW_HITS = 0.3, 3
 """Minimum share and number of a cluster's hits in formerly free space for `appeared`."""
 STATIC_SHARE = 0.5
@@ -204,9 +204,11 @@ class Tracker:
         return bool(comparison.has_appeared(is_new).any())
 
     def _max_range(self, scan: Scan) -> float:
+        """Return the range in m up to which hits are processed."""
         return min(scan.range_max, self._spec.max_range)
 
     def _update_tracks(self, current: CurrentScan) -> None:
+        """Update, start, and end tracks with all hits of a scan."""
         scan_clusters = self._compare_clusters(current)
         if scan_clusters is None:
             return

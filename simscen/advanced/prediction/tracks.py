@@ -1,4 +1,4 @@
-"""Tracks of obstacles as Kalman filters with a constant-velocity model, and rules by which tracks move, stand, or end.
+"""Tracks of obstacles as Kalman filters with constant velocity, and rules that decide which tracks move, stand, or end.
 
 The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). Because noise
 and measurements are isotropic, position and velocity are complex numbers, and three values replace the covariance

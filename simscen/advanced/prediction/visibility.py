@@ -164,7 +164,7 @@ class BeamComparison:
     distance: Array
 
     def was_free(self) -> Mask:
-        """Return which points were free in the earlier scan; not those beyond NO_HIT_RANGE_M."""
+        """Return which points were free in the earlier scan. Points beyond NO_HIT_RANGE_M do not count as free."""
         return self.earlier.passed_beyond(self.beam, self.distance)
 
     def has_appeared(self, free: Mask) -> Mask:

@@ -69,12 +69,14 @@ class ScenePublisher:
         self.has_published = True
 
     def _update_objects(self, event: Event) -> bool:
+        """Apply an event to the moving objects. Return whether their markers have changed."""
         if event.kind == EventKind.OBJECT_SPAWNED:
             self._spawned[event.name] = event
             return True
         return event.kind == EventKind.OBJECT_REMOVED and self._spawned.pop(event.name, None) is not None
 
     def _update_zones(self, event: Event) -> bool:
+        """Apply an event to the zones. Return whether their markers have changed."""
         if event.kind != EventKind.ZONE_SWITCHED:
             return False
         filter_: Filter = "speed" if event.data.get("filter") == "speed" else "keepout"
@@ -131,6 +133,7 @@ def _outlines(event: Event) -> list[list[tuple[float, float]]]:
 
 
 def _corners(part: Value) -> list[tuple[float, float]]:
+    """Return the corners of an outline in an event, without invalid ones."""
     corners = []
     for corner in part if isinstance(part, list) else []:
         match corner:

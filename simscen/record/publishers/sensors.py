@@ -176,6 +176,7 @@ class SensorPublisher:
         return writer
 
     def _topic(self, sensor: str, default: str, message_type: str) -> Topic:
+        """Return the topic of a sensor: `/default` for the first sensor, `/NAME/default` for the others."""
         topic = self._topics.get((sensor, default))
         if topic is None:
             name = f"/{_ros_name(sensor)}/{default}" if default in self._used_defaults else f"/{default}"

@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.search_regions import SampledSearch
+from simscen.advanced.planners.bit_star_searches import SampledSearch
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_search import PLANNERS, OmplSearch, Point, Problem
 

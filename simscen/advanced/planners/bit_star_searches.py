@@ -28,7 +28,7 @@ RIDGE_OFFSET_M = 0.2
 NARROW_SPACING_M, AXIS_SPACING_M, OPEN_SPACING_M = 0.3, 0.8, 1.1
 """Distance between samples in narrow passages, on the rest of the axis, and elsewhere."""
 NARROW_MARGIN_M = 0.15
-"""A block of the axis is narrow if its clearance exceeds the smallest one by less than this."""
+"""A block of the axis is narrow if its clearance exceeds the smallest clearance of all free cells by less than this."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -112,7 +112,7 @@ class Leg:
     reach: float = LATER_REACH_M
 
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
-        """Return the search for this leg, which is started with `solve`."""
+        """Return the search for this leg. Its method `solve` starts it."""
         if self.samples is None:
             return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
         return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
