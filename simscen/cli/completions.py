@@ -72,7 +72,7 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
 
 _SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
 """Possible parents of the folder `scenarios`: in an installed package, and in a clone of the repository."""
-_SUFFIX = ".scenario.yaml"
+_SCENARIO_SUFFIX = ".scenario.yaml"
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -80,5 +80,5 @@ def shipped_scenarios() -> dict[str, Path]:
     folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
     if folder is None:
         return {}
-    files = sorted(folder.rglob(f"*{_SUFFIX}"))
-    return {file.relative_to(folder).as_posix().removesuffix(_SUFFIX): file for file in files}
+    files = sorted(folder.rglob(f"*{_SCENARIO_SUFFIX}"))
+    return {file.relative_to(folder).as_posix().removesuffix(_SCENARIO_SUFFIX): file for file in files}

@@ -39,7 +39,7 @@ def check_python() -> str:
 
 
 def check_packages() -> str:
-    """Check that all required packages have supported versions. Return the versions of those that affect results."""
+    """Check the versions of all required packages, and return the versions of the packages that affect results."""
     if problems := unmet_requirements():
         raise CheckFailed("; ".join(problems))
     return ", ".join(f"{name} {_version(name)}" for name in PACKAGES)

@@ -12,7 +12,9 @@ _COMPARE = {
     "==": lambda installed, required: installed == required,
     "!=": lambda installed, required: installed != required,
 }
+"""Comparison of two versions by its operator in a requirement."""
 _CLAUSE = re.compile(r"(>=|<|==|!=)\s*([\w.]+)")
+"""One condition of a requirement: operator and version."""
 
 
 def unmet_requirements() -> list[str]:

@@ -24,6 +24,7 @@ _TYPES: dict[str, type | tuple[type, ...]] = {
     "number": (int, float),
     "null": type(None),
 }
+"""Python types by JSON type."""
 
 
 @lru_cache(maxsize=4)
@@ -83,7 +84,7 @@ def value_at(data: Any, keys: Sequence[Key]) -> Any:
 
 
 def alternatives(schema: Schema) -> list[str]:
-    """Return the keys exactly one of which a mapping must have, such as kinds of triggers; [] without such keys."""
+    """Return the keys that exclude each other in a mapping, such as kinds of triggers; [] without such keys."""
     options = [one.get("required", []) for one in schema.get("oneOf", []) if isinstance(one, dict)]
     return [option[0] for option in options if len(option) == 1]
 
@@ -187,6 +188,7 @@ class _Form:
         return {**base, **self._scalar(schema, value, written)}
 
     def _group(self, keys: Keys, schema: Schema, value: dict[str, Any], depth: int) -> dict[str, Any]:
+        """Return the part of a field that describes a mapping: nested fields, and keys that can be added."""
         needed = set(schema.get("required", []))
         shown = [] if depth >= self._max_depth else list(value)
         if depth == 0 and not keys:
@@ -213,6 +215,7 @@ class _Form:
         return found
 
     def _list(self, keys: Keys, schema: Schema, value: list[Any], depth: int) -> dict[str, Any]:
+        """Return the part of a field that describes a list: a nested field for each item."""
         if len(value) > MAX_ITEMS or depth >= self._max_depth:
             return {"fields": [], "addable": [], "omitted": len(value)}
         fields = []
@@ -222,6 +225,7 @@ class _Form:
         return {"fields": fields, "addable": []}
 
     def _scalar(self, schema: Schema, value: Any, written: SourceNode | None) -> dict[str, Any]:
+        """Return the part of a field that describes a scalar. `written` is its syntax node; None if it is inherited."""
         if "enum" in schema:
             return {"type": "choice", "choices": schema["enum"], "value": value}
         if isinstance(value, bool) or schema.get("type") == "boolean":

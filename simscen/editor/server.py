@@ -19,6 +19,7 @@ from simscen.editor.session import EditorSession, RequestRefused
 from simscen.report.picture.palette import css_variables
 
 _WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
+"""First part of the path of the page of a world file."""
 
 
 class OpenFiles:
@@ -69,6 +70,7 @@ class OpenFiles:
 
 
 ADDRESS = "127.0.0.1"
+"""Address of this machine, which other machines cannot reach."""
 PAGE_FOLDER = PACKAGE / "data" / "editor"
 REPLAY_FOLDER = PACKAGE / "data" / "replay"
 SHARED_MODULES = ("camera.js", "dom.js")
@@ -81,6 +83,7 @@ CONTENT_SECURITY_POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
 _REPLAY_PATH = re.compile(r"runs/([0-9]{1,6})/replay\.html")
+"""Path of the replay page of a trial run."""
 _POLICY_OF_PAGE = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
 
 

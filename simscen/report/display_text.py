@@ -14,6 +14,7 @@ from typing import Literal, TextIO
 
 _CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 _CI_MARKER = re.compile(r"##(\w*)\[")
+"""Start of a CI command that is valid anywhere in a line."""
 _ASCII_REPLACEMENTS = str.maketrans(
     {"✓": "+", "✗": "x", "·": "-", "≤": "<=", "≥": ">=", "°": " deg", "×": "x", "…": "...", "—": "-", "→": "->"}
 )

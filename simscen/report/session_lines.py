@@ -34,6 +34,7 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
     Outcome.FAILED_AS_EXPECTED: ("~", "warning"),
     Outcome.SKIPPED: ("-", "warning"),
 }
+"""Symbol of each outcome, and the role of the symbol."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ def _label(name: str) -> StyledText:
 MAX_DETAILED_FAILURES = 20
 """Maximum number of failures that are listed with paths. Further failures are listed with their cause only."""
 NONDETERMINISTIC = "nondeterministic"
-"""Kind of the error of a run whose log differs from that of its repetition."""
+"""Error kind of a run whose log differs from the log of its repetition."""
 
 NameOfRun = Callable[[RunKey], str]
 """Function that returns the name of a run for a list of runs."""

@@ -21,6 +21,7 @@ CLAIM_ROLES: dict[ClaimStatus, Role] = {
     ClaimStatus.UNDECIDED: "warning",
     ClaimStatus.BLOCKED: "bad",
 }
+"""Role of the text about a claim, by its status."""
 
 
 def study_lines(study: Study) -> Iterator[StyledLine]:

@@ -20,7 +20,7 @@ from simscen.stack.localizers import sensor_models
 
 FLOOD_MIB = 200
 execute = fork_server_main._execute
-prepare = fork_server_main._SCENARIOS.get_or_prepare
+prepare = fork_server_main._SCENARIO_CACHE.get_or_prepare
 
 
 def spin():
@@ -138,5 +138,5 @@ def prepare_with_fault(scenario):
 
 if __name__ == "__main__":
     fork_server_main._execute = execute_with_fault
-    fork_server_main._SCENARIOS.get_or_prepare = prepare_with_fault
+    fork_server_main._SCENARIO_CACHE.get_or_prepare = prepare_with_fault
     fork_server_main.main()

@@ -31,6 +31,7 @@ PARAMETER_SETS: Mapping[str, AmclParameters] = {
     "scan_matching_amcl": ScanMatchingAmcl(),
     "scan_matching_amcl, consistent": ScanMatchingAmcl(parameters="consistent"),
 }
+"""Parameters of AMCL to compare, by name of the parameter set."""
 LOGS_PER_BUILDING: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
 """Number of logs of each building, by circumstance (a key of CIRCUMSTANCES)."""
 CONSISTENCY_CIRCUMSTANCES = ("clean", "slipping", "tracked", "outdated", "half")
@@ -229,6 +230,7 @@ def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list
 
 
 def _interval(values: Sequence[float]) -> Interval:
+    """Return the bootstrap interval of the mean of the values."""
     return bootstrap_mean_interval(values, Streams(1).generator("bootstrap"))
 
 

@@ -30,10 +30,11 @@ LOCALIZERS: Mapping[str, AmclParameters] = {
     "amcl, recovery": Amcl.model_validate(RECOVERY_PARAMETERS),
     "scan_matching_amcl": ScanMatchingAmcl(),
 }
+"""Variants of AMCL to compare, by name."""
 SEED_COUNT = 5
 """Number of seeds with which each localizer runs on each log."""
 SCAN_SPACING_M, SCAN_SPACING_RAD = 1.0, 0.5
-"""Translation and rotation in a sparse log, one of which must be reached before the next scan."""
+"""Minimum translation, or minimum rotation, between two scans of a sparse log."""
 DURATION_S = 180.0
 """Duration of a log before it is shortened to end after a turn."""
 END_TURN_RAD = 1.0
@@ -44,6 +45,7 @@ MISSED_TURN_FRACTION, MISSED_TURN_STD_RAD = 0.05, 0.6
 The odometry of the public log MIT CSAIL has such errors.
 """
 MISSED_TURNS_KIND = "as mapped, turns that odometry misses"
+"""Kind of the logs in which odometry misses turns."""
 KINDS: Mapping[str, tuple[str, bool]] = {
     "as mapped, slipping wheels": ("slipping", False),
     MISSED_TURNS_KIND: ("slipping", False),

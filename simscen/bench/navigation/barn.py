@@ -241,7 +241,7 @@ MOVER_COUNT_RANGE = (5, 24)
 SPEEDS_M_S = (0.74, 1.23, 1.72)
 """Mean speeds of the easy, medium and hard worlds of DynaBARN."""
 MAX_SPEED_DEVIATION_M_S = 0.25
-"""Maximum deviation of a cylinder's mean speed from that of the field, and of its speed from its mean speed."""
+"""Maximum deviation of a cylinder's mean speed from the field's, and of a cylinder's speed from its mean speed."""
 SPEED_STD_RANGE_M_S = (0.05, 0.25)
 """Range of the standard deviation of a cylinder's speeds."""
 DEGREE_RANGE = (1, 5)
@@ -283,6 +283,7 @@ def generate_dynamic_field(number: int, speed: float) -> DynamicField:
 
 
 def _random_mover(rng: np.random.Generator, speed: float) -> Mover:
+    """Return a cylinder on a random path with random speeds. `speed` is the mean speed of the field in m/s."""
     points = _random_path(rng)
     mean = speed + float(rng.uniform(-MAX_SPEED_DEVIATION_M_S, MAX_SPEED_DEVIATION_M_S))
     deviation = float(rng.uniform(*SPEED_STD_RANGE_M_S))

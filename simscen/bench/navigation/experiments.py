@@ -99,6 +99,7 @@ def narrow_fields_name(margin: float) -> str:
 
 
 def _field_drive(folder: Path, field: ObstacleField) -> Drive:
+    """Write the world and the scenario of a drive through a field to `folder`."""
     world = write_text(folder / f"field_{field.number}.world.yaml", _world_text(field))
     text = barn.scenario_text(f"field {field.number}", world.name)
     file = write_text(folder / f"field_{field.number}.scenario.yaml", text)
@@ -185,6 +186,7 @@ def write_localization_experiments(
 
 
 def _world_text(field: ObstacleField) -> str:
+    """Return the YAML of a world with the cylinders of a field."""
     pillars = "\n".join(
         f"  - {{name: pillar, cylinder: [{CELL_SIZE_M / 2:g}, {HEIGHT_M:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
         for x, y in field.centers.tolist()
@@ -193,6 +195,7 @@ def _world_text(field: ObstacleField) -> str:
 
 
 def _dynamic_world_text(field: barn.DynamicField) -> str:
+    """Return the YAML of a world with the moving cylinders of a field."""
     lines = []
     for number, mover in enumerate(field.movers, start=1):
         keyframes = ", ".join(

@@ -74,6 +74,7 @@ FAULTS = {
 }
 """Faults by name: YAML, and the values by which … in the YAML is replaced, one for each of STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
+"""Names of the strengths of a fault."""
 FIRST_FAULTY_DRIVE = 1_000_000
 """Smallest number of a drive with a fault. Drives without faults have smaller numbers."""
 

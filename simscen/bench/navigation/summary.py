@@ -141,6 +141,7 @@ def success_interval(trials: Sequence[Trial]) -> Interval | None:
 
 
 def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
+    """Return the fraction of `outcomes` that are `outcome`."""
     return outcomes.count(outcome) / len(outcomes) if outcomes else 0.0
 
 

@@ -65,7 +65,7 @@ class PatrolTimes:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """CPU time of the run divided by that of the PyBullet baseline, for each round."""
+        """CPU time of the run divided by the CPU time of the PyBullet baseline, for each round."""
         return tuple(cpu / baseline for cpu, baseline in zip(self.cpu_rounds, self.baseline_rounds, strict=True))
 
     @property

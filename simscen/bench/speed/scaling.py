@@ -224,12 +224,14 @@ def _chair(width: float) -> list[Solid]:
 
 
 def _obj_text(solids: list[Solid]) -> str:
+    """Return one mesh of all solids as a Wavefront OBJ file."""
     mesh = merge_solids(solids)
     corners = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
     return "\n".join([*corners, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())]) + "\n"
 
 
 def _mesh_model(number: int, x: float, y: float) -> str:
+    """Return the SDF of a movable model with one of the mesh files."""
     mesh = f"<mesh><uri>mesh_{number % 4}.obj</uri></mesh>"
     return (
         f'<model name="thing {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'
@@ -239,6 +241,7 @@ def _mesh_model(number: int, x: float, y: float) -> str:
 
 
 def _box_model(name: str, x: float, y: float, length: float, width: float) -> str:
+    """Return the SDF of a static box with a height of 1 m."""
     box = f"<box><size>{length} {width} 1</size></box>"
     return (
         f'<model name="{name}"><static>true</static><pose>{x} {y} 0.5 0 0 0</pose><link name="body">'

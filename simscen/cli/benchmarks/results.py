@@ -70,6 +70,7 @@ def read_result(file: Path) -> Result:
 
 
 def _figure(entry: dict[str, Any]) -> Measurement:
+    """Return a figure from its JSON data."""
     rounds = tuple(float(value) for value in entry["rounds"])
     return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 
@@ -131,6 +132,7 @@ def _value(value: float, unit: str) -> str:
 
 
 def _spread(figure: Measurement) -> str:
+    """Return the range of the rounds as text; "-" for a single measurement."""
     return f"{min(figure.rounds):.4g} … {max(figure.rounds):.4g}" if len(figure.rounds) > 1 else "-"
 
 

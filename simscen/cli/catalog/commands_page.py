@@ -28,7 +28,8 @@ EXIT_CODES = {
 }
 """Meaning of each exit code."""
 _TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}
-_ESCAPED = re.compile(r"[*<]")
+_MARKUP = re.compile(r"[*<]")
+"""Characters that Markdown would interpret."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
 def _escape_markdown(text: str) -> str:
     """Escape text for a cell of a Markdown table. In code between backticks, escape only `|`."""
     parts = text.replace("|", "\\|").split("`")
-    return "`".join(part if index % 2 else _ESCAPED.sub(r"\\\g<0>", part) for index, part in enumerate(parts))
+    return "`".join(part if index % 2 else _MARKUP.sub(r"\\\g<0>", part) for index, part in enumerate(parts))
 
 
 def _default_text(default: Any) -> str:

@@ -206,6 +206,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
     "limits": robot.Limits,
     "mount": robot.Mount,
 }
+"""Models of the topics of six groups by name of the topic."""
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
@@ -256,6 +257,7 @@ def _plural(kind: str) -> str:
 
 
 def _plural_of_member(kind: str) -> str:
+    """Return the plural of a description without "or"."""
     if kind.startswith("list of "):
         return kind.replace("list", "lists", 1)
     match = _NOUN.fullmatch(kind)
@@ -338,6 +340,7 @@ def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
 
 
 def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:
+    """Return the topic of a model, from its docstring. A line "Example: …" becomes the example."""
     text = inspect.cleandoc(model.__doc__ or "")
     example = _EXAMPLE.search(text)
     return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), example[1] if example else "")

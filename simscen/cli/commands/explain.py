@@ -86,6 +86,7 @@ def _overview(width: int) -> str:
 
 
 def _topic_text(topic: Topic, width: int) -> str:
+    """Return the text about one topic."""
     kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
     parts = [f"{topic.name} ({kind})", _paragraphs(topic.text, width)]
     if topic.value:
@@ -122,6 +123,7 @@ def _lines(paragraph: str, width: int) -> str:
 
 
 def _begins_item(line: str) -> bool:
+    """Return whether a line begins a list item or a headed paragraph."""
     return line.startswith(("- ", "What is measured:", "When it fails:", "Why this:", "Source:"))
 
 

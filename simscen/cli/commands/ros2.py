@@ -24,7 +24,7 @@ SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
 """Environment variable with the file descriptor of the socket to the simulation; set only during a run."""
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
 """Program of the adapter, which runs with the Python interpreter of ROS."""
-_BASE = "base_link"
+_BASE_FRAME = "base_link"
 
 
 class GraphKind(str, Enum):
@@ -80,7 +80,9 @@ def command(
         list[str] | None,
         typer.Option(help="FRAME:=NAME: other name of base_link or of a sensor's frame in your graph; repeatable."),
     ] = None,
-    base_frame: Annotated[str, typer.Option(help="Additional name of the base frame, e.g. base_footprint.")] = _BASE,
+    base_frame: Annotated[
+        str, typer.Option(help="Additional name of the base frame, e.g. base_footprint.")
+    ] = _BASE_FRAME,
     domain: Annotated[
         int | None, typer.Option(min=0, max=232, help="ROS_DOMAIN_ID; default with --launch: an unused one.")
     ] = None,

@@ -151,6 +151,7 @@ def _planned_run(folder: Path) -> PlannedRun:
 
 
 def _folder_name(key: RunKey) -> str:
+    """Return the folder of a run relative to RUNS_FOLDER."""
     return f"{key.scenario}/{key.folder}"
 
 
@@ -211,6 +212,7 @@ def _size(node: Node) -> int:
 
 
 def _failure_text(result: RunResult, failure: Failure) -> str:
+    """Return a failure in words, with the value and its limit."""
     if result.error is not None:
         return result.error.message
     verdict = next(one for one in result.verdicts if one.id == failure.verdict_id)
@@ -219,6 +221,7 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
 
 
 def _comment(chosen: ChosenRun, shrinker: Shrinker, seed: int) -> str:
+    """Return the comment at the top of the written scenario."""
     source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
     failure = shrinker.failure.verdict_id or "an error of the stack"
     return f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."

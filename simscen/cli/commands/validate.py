@@ -65,7 +65,7 @@ def command(
     for file in discover(paths, root_folder, SUFFIXES):
         kind = file_kind(file, root_folder)
         checked.add(kind, relative_to_working_folder(_problems(kind, file, checker), root_folder))
-    _PRINT[format_](checked)
+    _PRINTERS[format_](checked)
     if checked.invalid_files:
         sys.exit(Exit.USAGE)
 
@@ -92,12 +92,14 @@ class _Checked:
     invalid_files: int = 0
 
     def add(self, kind: str, problems: list[Problem]) -> None:
+        """Add the result of one file."""
         self.kinds[kind] += 1
         self.invalid_files += any(problem.severity == "error" for problem in problems)
         self.problems += [problem for problem in problems if problem not in self.problems]
 
     @property
     def summary(self) -> str:
+        """Last line of the output, such as "2 scenarios and 1 world are valid"."""
         if self.invalid_files:
             errors = sum(problem.severity == "error" for problem in self.problems)
             return f"{_count(errors, 'problem')} in {self.invalid_files} of {_count(self.kinds.total(), 'file')}"
@@ -107,25 +109,27 @@ class _Checked:
 
 
 def _count(number: int, kind: str) -> str:
+    """Return a number with the plural of a kind of file, such as "2 studies"."""
     noun, of, rest = kind.partition(" of ")  # a parameter file of Nav2
     plural = "studies" if noun == "study" else f"{noun}s"
     return f"{number} {noun if number == 1 else plural}{of}{rest}"
 
 
-def _text(checked: _Checked) -> None:
+def _print_as_text(checked: _Checked) -> None:
     if checked.problems:
         print_text(as_text(checked.problems))
     print_text(checked.summary)
 
 
-def _json(checked: _Checked) -> None:
+def _print_as_json(checked: _Checked) -> None:
     print(as_json(checked.problems, valid=not checked.invalid_files, files=checked.kinds.total()))
 
 
-def _github(checked: _Checked) -> None:
+def _print_as_github(checked: _Checked) -> None:
     if checked.problems:
         print_text(as_github(checked.problems))
     print_text(checked.summary)
 
 
-_PRINT = {Format.TEXT: _text, Format.JSON: _json, Format.GITHUB: _github}
+_PRINTERS = {Format.TEXT: _print_as_text, Format.JSON: _print_as_json, Format.GITHUB: _print_as_github}
+"""Function that prints the result, by output format."""

@@ -195,6 +195,7 @@ def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> I
 
 
 def _items(title: str, items: "Sequence[WorldItem]", max_count: int) -> Iterator[str]:
+    """Yield a title, and a line for each of the first `max_count` items."""
     if items:
         yield f"  {title}"
     width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:max_count]), default=0)
@@ -204,6 +205,7 @@ def _items(title: str, items: "Sequence[WorldItem]", max_count: int) -> Iterator
 
 
 def _item(item: "WorldItem", width: int) -> str:
+    """Return the line of an item: name, padded to `width`, shape, triangles, extent, and mass."""
     x0, y0, z0, x1, y1, z1 = item.extent
     name = escaped(item.name)
     short_name = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"

@@ -236,6 +236,7 @@ class Falsification:
             journal.add(planned, self._study_plan())
 
     def _study_plan(self) -> StudyPlan:
+        """Return the plan of the search in the form of a study, for the journal and the reports."""
         values = {run.key: run.varied for run in self._planned if run.varied}
         name = self._planned[0].key.scenario if self._planned else self._request.file.stem
         return StudyPlan(name, self.is_random, None, values, stops_early=True)

@@ -99,7 +99,7 @@ def _components(value: object) -> Iterator[Component]:
         yield from _components(one)
 
 
-_SCENARIOS = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
+_SCENARIO_CACHE = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
 Image.preinit()  # imports now instead of in every fork that writes a picture
 
 
@@ -117,8 +117,8 @@ def _warm_up(job: Job) -> None:
     Clear the caches first if this process uses more than half of the allowed memory.
     """
     if _used_memory() > MAX_MEMORY_BYTES / 2:
-        _SCENARIOS.clear()
-    prepared = _SCENARIOS.get_or_prepare(job.scenario)
+        _SCENARIO_CACHE.clear()
+    prepared = _SCENARIO_CACHE.get_or_prepare(job.scenario)
     import_components(prepared)
     precompute(prepared)
     log_header(prepared, job.key.seed)
@@ -132,7 +132,7 @@ def _used_memory() -> int:
 
 def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, Any]:
     """Execute the run of a job in a worker, and return its result as JSON data."""
-    prepared = _SCENARIOS.get_or_prepare(job.scenario)
+    prepared = _SCENARIO_CACHE.get_or_prepare(job.scenario)
     progress = ProgressReporter(prepared.spec.physics.tick_rate, report_progress)
     return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, replay=job.replay))
 

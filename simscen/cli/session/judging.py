@@ -219,6 +219,7 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
 
 
 def _as_error(run: RunFinished) -> RunFinished:
+    """Return a run without a log as an error, unless it was skipped."""
     if run.outcome is Outcome.SKIPPED:
         return run
     error = run.result.error

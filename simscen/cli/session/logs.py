@@ -45,6 +45,7 @@ def find_logs(paths: Sequence[Path]) -> list[Path]:
 
 
 def _logs(path: Path) -> Iterator[Path]:
+    """Yield the logs in a folder and its subfolders, except hidden ones."""
     for folder, subfolders, names in os.walk(path):
         current = Path(folder)
         if is_bag(names):

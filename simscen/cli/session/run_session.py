@@ -107,7 +107,7 @@ def _run(
 ) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
-    `output` and `listeners` receive all events, including those of reused results.
+    `output` and `listeners` receive all events, including the events of reused results.
     """
     start = time.monotonic()
 

@@ -128,6 +128,7 @@ class CandidateRuns:
         return None if isinstance(found, list) else self.checker.check_variation(found)[0]
 
     def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
+        """Run valid candidates in parallel, and return their results. Raises Stopped."""
         named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
         with TemporaryDirectory(prefix="simscen-") as folder:
             jobs = [

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from simscen.loading.stacks.userconfig import UserConfig
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
+"""Valid name of a stack."""
 
 
 @dataclass

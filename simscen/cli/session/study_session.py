@@ -271,6 +271,7 @@ class _StudySession:
         return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, self._drawn)
 
     def _is_decided(self, finished_runs: Sequence[RunFinished]) -> bool:
+        """Return whether these runs decide a sequential claim."""
         if self._claim is None or self._claim.method == "fixed":
             return False
         claim = evaluate_claim(self._claim, in_seed_order(finished.result for finished in finished_runs))

@@ -220,6 +220,7 @@ def world_objects(world: Any, keys: Keys, places: Places) -> Iterator[MapObject]
 
 
 def _regions(data: dict[str, Any], keys: Keys) -> Iterator[MapObject]:
+    """Yield the regions, as closed lines."""
     for name, ring in mapping(data.get("regions")).items():
         own = (*keys, "regions", name)
         corners = point_handles(ring, own, {})

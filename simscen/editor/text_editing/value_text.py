@@ -19,7 +19,7 @@ NUMBER_TOLERANCE = 2e-6
 """Difference up to which two numbers count as equal, in the unit of their text."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
-_UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
+_UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 
 
 def flow_text(value: Any) -> str:
@@ -56,7 +56,7 @@ def replacement_text(value: Any, old: str, style: str) -> str:
         lines = [line for line in old.split("\n")[1:] if line.strip()]
         indent = len(lines[0]) - len(lines[0].lstrip()) if lines else 0
         return (block_scalar_text(value, old, indent) if indent else None) or scalar_text(value)
-    if isinstance(value, str) and style == "'" and not _UNSAFE.search(value):
+    if isinstance(value, str) and style == "'" and not _UNPRINTABLE.search(value):
         return "'" + value.replace("'", "''") + "'"
     if isinstance(value, str) and style == '"':
         return quoted_text(value)
@@ -104,12 +104,12 @@ def is_same_value(found: Any, wanted: Any) -> bool:
 
 def quoted_text(text: str) -> str:
     """Return a text in double quotes."""
-    return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
+    return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
 
 
 def string_text(text: str) -> str:
     """Return a string as YAML, without quotes if that is valid in block and flow style."""
-    if "\n" in text or _UNSAFE.search(text) or text != text.strip():
+    if "\n" in text or _UNPRINTABLE.search(text) or text != text.strip():
         return quoted_text(text)
     tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
     if problems or tree is None or tree.plain != [{"k": text}, {text: 1}]:

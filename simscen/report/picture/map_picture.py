@@ -38,16 +38,14 @@ _MARGIN_PX = 14
 
 DrawLayer = Callable[[Canvas, Scene], Iterator[Label]]
 """Function that draws one layer on the canvas, and yields its labels."""
-# The layers in drawing order: ground, below the robots, objects, and above the robots. Those below and above the robots
-# are drawn for each robot.
 _GROUND_LAYERS: tuple[DrawLayer, ...] = (world_layer.draw_ground, world_layer.draw_floors)
-_OBJECT_LAYERS: tuple[DrawLayer, ...] = (event_layer.draw_places, world_layer.draw_objects)
 _LAYERS_BELOW_ROBOT: tuple[DrawLayer, ...] = (
     world_layer.draw_zones,
     event_layer.draw_fault_bands,
     path_layer.draw_plans,
     event_layer.draw_goals,
 )
+_OBJECT_LAYERS: tuple[DrawLayer, ...] = (event_layer.draw_places, world_layer.draw_objects)
 _LAYERS_ABOVE_ROBOT: tuple[DrawLayer, ...] = (
     path_layer.draw_truth,
     path_layer.draw_belief,
@@ -58,6 +56,7 @@ _LAYERS_ABOVE_ROBOT: tuple[DrawLayer, ...] = (
     event_layer.draw_marks,
     event_layer.draw_collisions,
 )
+"""Layers in drawing order: ground, below the robot, objects, above the robot. Robot layers are drawn for each robot."""
 
 
 def draw_map_picture(scene: Scene) -> Image.Image:

@@ -34,10 +34,12 @@ PEDESTRIAN: Color = (122, 62, 130)
 GROUND: Color = (196, 176, 140)
 FAULTY: Color = (240, 208, 148)
 SLIPPERY: Color = (60, 140, 190)
+"""Colors of drawn parts. FAULTY marks the path during a fault, SLIPPERY a floor with another friction."""
 RED: Color = (194, 48, 16)
 AMBER: Color = (150, 98, 0)
 GREEN: Color = (0, 113, 86)
 GRAY: Color = (98, 103, 111)
+"""Colors of outcomes and statuses."""
 ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
 """Outline colors of the paths of several robots, in the order of the robot names. Further robots repeat the colors."""
 
@@ -51,6 +53,7 @@ OUTCOME_COLORS = {
 STATUS_COLORS = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
 
 _TIME_COLORS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
+"""Color scale of the time of a run, at equal distances from its start to its end."""
 
 
 def time_color(fraction: float) -> Color:

@@ -18,7 +18,7 @@ from simscen.core.records.trace import Trace
 class Scene:
     """Finished run to draw: the world and the data of one robot.
 
-    With several robots, there is a scene for each robot, and a common scene, whose `robots` contains the others.
+    With several robots, there is a scene for each robot, and a common scene that contains them in `robots`.
 
     Attributes:
         trace: Recorded run of the robot.
@@ -99,6 +99,7 @@ def spawn_pose(event: Event) -> Pose2:
 
 
 def _floats(data: Mapping[str, object], key: str) -> list[float]:
+    """Return the numbers in a list of event data; [] without a list."""
     value = data.get(key)
     return [float(part) for part in value if isinstance(part, int | float)] if isinstance(value, list) else []
 

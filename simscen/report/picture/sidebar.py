@@ -133,44 +133,44 @@ def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
     `step` is the time between two dots on the true path in s.
     """
     return [
-        ("", f"true path, a dot every {step:g} s", _draw_path),
-        ("belief", "estimated path", _draw_dashes),
+        ("", f"true path, a dot every {step:g} s", _draw_path_symbol),
+        ("belief", "estimated path", _draw_belief_symbol),
         ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("set down", "robot lifted and set down elsewhere", _draw_arrow),
+        ("set down", "robot lifted and set down elsewhere", _draw_kidnapping_symbol),
         ("goal", "goal, its tolerance and heading", _ring_symbol(palette.GREEN, False)),
         ("failed", "goal that failed", _ring_symbol(palette.RED, True)),
-        ("robot", "robot at the end", _draw_robot),
+        ("robot", "robot at the end", _draw_robot_symbol),
         ("object", "object at the end; before: color of the time", _block_symbol(palette.OBJECT)),
-        ("door", "door at the end; dashed: open and closed", _draw_door),
-        ("person", "person at the end, with heading", _draw_pedestrian),
+        ("door", "door at the end; dashed: open and closed", _draw_door_symbol),
+        ("person", "person at the end, with heading", _draw_pedestrian_symbol),
         ("keepout zone", "keepout zone", _hatched_symbol(palette.RED, -6)),
         ("speed zone", "zone with a speed limit", _hatched_symbol(palette.AMBER, 6)),
         ("ground", "ramp or sill; chevrons point uphill", _block_symbol(palette.GROUND)),
         ("floor", "floor with different friction", _block_symbol(palette.SLIPPERY)),
-        ("fault", "start of a fault; band: fault active", _draw_band),
-        ("event", "robot at an event", _draw_diamond),
+        ("fault", "start of a fault; band: fault active", _draw_fault_symbol),
+        ("event", "robot at an event", _draw_event_symbol),
         ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
         ("violation", "violated criterion", lambda d, x, y: _draw_cross(d, x + 12, y, palette.RED)),
     ]
 
 
-def _draw_path(draw: Pen, x: float, y: float) -> None:
+def _draw_path_symbol(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
         draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
     draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
 
 
-def _draw_robot(draw: Pen, x: float, y: float) -> None:
+def _draw_robot_symbol(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
     draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
 
 
-def _draw_dashes(draw: Pen, x: float, y: float) -> None:
+def _draw_belief_symbol(draw: Pen, x: float, y: float) -> None:
     for k in range(3):
         draw.line([(x + 10 * k, y), (x + 10 * k + 5, y)], fill=palette.BELIEF, width=2)
 
 
-def _draw_arrow(draw: Pen, x: float, y: float) -> None:
+def _draw_kidnapping_symbol(draw: Pen, x: float, y: float) -> None:
     draw.line([(x + 12, y + 6), (x + 12, y - 3)], fill=palette.AMBER, width=3)
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
@@ -193,13 +193,13 @@ def _block_symbol(color: Color) -> DrawSymbol:
     return draw_symbol
 
 
-def _draw_door(draw: Pen, x: float, y: float) -> None:
+def _draw_door_symbol(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 2, y - 2, x + 22, y + 2), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
     for k in range(3):
         draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
 
 
-def _draw_pedestrian(draw: Pen, x: float, y: float) -> None:
+def _draw_pedestrian_symbol(draw: Pen, x: float, y: float) -> None:
     draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PEDESTRIAN, 150), outline=palette.PEDESTRIAN)
     draw.line([(x + 12, y), (x + 23, y)], fill=palette.PEDESTRIAN, width=2)
 
@@ -214,13 +214,13 @@ def _hatched_symbol(color: Color, rise: float) -> DrawSymbol:
     return draw_symbol
 
 
-def _draw_band(draw: Pen, x: float, y: float) -> None:
+def _draw_fault_symbol(draw: Pen, x: float, y: float) -> None:
     draw.line([(x, y), (x + 24, y)], fill=palette.FAULTY, width=10)
     draw.polygon([(x + 13, y - 8), (x + 8, y + 1), (x + 12, y + 1), (x + 11, y + 8), (x + 17, y - 2), (x + 13, y - 2)],
                  fill=palette.AMBER)  # fmt: skip
 
 
-def _draw_diamond(draw: Pen, x: float, y: float) -> None:
+def _draw_event_symbol(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
 
 

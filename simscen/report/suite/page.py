@@ -131,6 +131,7 @@ def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
 
 
 def _headline(report: SessionReport, totals: Totals, counts: str, listed: int) -> str:
+    """Return the head of the page. `counts` are the outcomes in words, `listed` is the number of listed runs."""
     links = " · ".join(f'<a href="{name}">{name}</a>' for name in _LINKED_FILES if name in report.files)
     facts = [
         number_with_noun(len(report.runs), "run"),
