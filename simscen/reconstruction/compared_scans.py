@@ -15,7 +15,7 @@ from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Sca
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
-"""Tolerated difference between measured and expected range, if the poses of the drive are true or estimated."""
+"""Tolerated difference between measured and expected range, for drives with true poses and with estimated poses."""
 BELIEVED_POSE_TOLERANCE_PER_M = 0.02
 """Additional tolerance for estimated poses per meter of range."""
 NOISE_SIGMAS = 4.0
@@ -57,7 +57,7 @@ class ComparedScans:
 
     @cached_property
     def is_explained(self) -> Mask:
-        """Mask (n, beams) of beams that end at the static world, within the tolerance."""
+        """Mask (n, beams) of beams that end at a wall of the static world, within the tolerance."""
         with np.errstate(invalid="ignore"):
             ranges = self.scans.ranges
             return (
@@ -66,7 +66,7 @@ class ComparedScans:
 
     @cached_property
     def is_short(self) -> Mask:
-        """Mask (n, beams) of beams that end before the static world by more than the tolerance."""
+        """Mask (n, beams) of beams that end before the walls of the static world by more than the tolerance."""
         with np.errstate(invalid="ignore"):
             return self.is_hit & (self.scans.ranges < self._nearest - self.tolerance)
 

@@ -80,7 +80,10 @@ def run_estimators(
 def _with_sensor_names_of_robot(
     faults: list[FoundFault], robot: RobotProperties, unknowns: list[str]
 ) -> list[FoundFault]:
-    """Return the faults with the sensor names of the robot file. A fault of a missing sensor becomes an unknown."""
+    """Return the faults with the sensor names of the robot file.
+
+    For a fault of a missing sensor, append a phrase to `unknowns` instead.
+    """
     if not robot.sensors:
         return faults
     found = []

@@ -19,7 +19,7 @@ class Reason:
         text: Observation in the log, as a phrase without a period.
         begin: Start of the observation in s; None if it has no time.
         end: End of the observation in s; None for a single time.
-        confidence: "high", "medium", or "low".
+        confidence: Confidence that the part of the scenario is right: "high", "medium", or "low".
     """
 
     text: str
@@ -45,7 +45,7 @@ class FoundFault:
         values: Parameters of the fault by YAML key.
         begin: Start in s; None for the start of the drive.
         duration: Duration in s; None until the end of the drive.
-        reason: Reason for the fault.
+        reason: Observation that shows the fault.
     """
 
     target: str

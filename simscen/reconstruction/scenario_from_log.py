@@ -34,7 +34,7 @@ class ReconstructionOptions:
 
     Attributes:
         drive: Options for reading the log.
-        files: World, map, and robot to use instead of those in the log.
+        files: World, map, and robot that replace the ones in the log.
         root: Folder of the files that the recorded scenario refers to; None for the working folder.
     """
 
@@ -129,7 +129,7 @@ def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) 
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
-    """Reconstruct a log and write the scenario file `out`, and next to it the map and robot files that it needs.
+    """Write the scenario file `out` from a log, and next to it the map and robot files that the scenario needs.
 
     For a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput
     for an unusable log or file, and OSError if a file cannot be written.

@@ -39,7 +39,7 @@ _STATUS_OF_EVENTS = {
     EventKind.GOAL_CANCELED: "canceled",
 }
 ToSeconds = Callable[[int], float]
-"""Converts a log time in ns to s since the start of the drive."""
+"""Function that converts a log time in ns to s since the start of the drive."""
 
 
 def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> Iterator[RecordedGoal]:
@@ -145,7 +145,7 @@ def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 
 
 MIN_IDLE_S = 1.0
-"""Minimum time before the first goal for cutting this time off."""
+"""The time before the first goal is cut off if it is at least this long."""
 LEAD_S = 0.5
 """Time to keep before the first motion, if goals are derived from the motion."""
 

@@ -121,7 +121,7 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     roles = {prefix + names[role].removeprefix(prefix): role for role in sorted(names)}
     if truth:
         roles[prefix + truth.removeprefix(prefix)] = "truth"
-    stream = open_messages(path, _RolesAndScans(roles) if path.is_dir() else roles)
+    stream = open_messages(path, _TopicsToRead(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
     for raw in stream:
@@ -140,7 +140,7 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     return messages
 
 
-class _RolesAndScans:
+class _TopicsToRead:
     """Container of the topics to read: topics with a role, and topics with "scan" in their name."""
 
     def __init__(self, roles: Mapping[str, str]) -> None:
@@ -151,6 +151,7 @@ class _RolesAndScans:
 
 
 def _decode(raw: RawMessage, role: str) -> LoggedMessage:
+    """Decode a message of a topic with a role. Raises UnusableLog if this is impossible."""
     if raw.encoding != "cdr":
         raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
     try:
@@ -177,6 +178,7 @@ def _without_robot(message: LoggedMessage, robot: str) -> LoggedMessage:
 
 
 def _stamp(message: Any) -> int:
+    """Return the stamp of a decoded message in ns; 0 for a message without a header."""
     if isinstance(message, list):
         return int(message[0].stamp) if message and hasattr(message[0], "stamp") else 0
     return int(getattr(message, "stamp", 0) or 0)

@@ -185,6 +185,7 @@ class _DriveReader:
 
     @cached_property
     def _transforms(self) -> TransformTree:
+        """All transforms of the log."""
         tree = TransformTree()
         for role in ("tf_static", "tf"):
             for message in self._messages.of(role):
@@ -236,6 +237,7 @@ class _DriveReader:
         return Pose2(*mount.pose), max(height, MIN_LIDAR_HEIGHT_M)
 
     def _map(self) -> OccupancyGrid | None:
+        """Return the last map; None without a map."""
         maps = self._messages.of("map")
         grid: OccupancyGrid | None = maps[-1].content if maps else None
         if grid is None:

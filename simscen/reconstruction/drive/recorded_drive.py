@@ -182,8 +182,8 @@ MAX_STEP_M = 2.0
 class MotionSteps:
     """Motion in steps of STEP_S that begin at `times` (n,) in s.
 
-    `measured` is the motion by odometry, `true` the motion by the poses of the drive, and `commanded` the motion by
-    commands. Rows (n, 3) are forward distance in m, leftward distance in m, and turn in rad.
+    `measured` is the motion by odometry, `true` the motion by the poses of the drive, and `commanded` the motion if the
+    commands are executed exactly. Rows (n, 3) are forward distance in m, leftward distance in m, and turn in rad.
     """
 
     times: Array

@@ -15,7 +15,7 @@ from simscen.reconstruction.reasons import FoundFault, Reason, windows
 SAMPLE_PERIOD_S = 0.025
 """Period of the samples at which commands and odometry are compared."""
 MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
-"""Maximum lag to search for, and minimum lag to report."""
+"""Maximum lag that is searched for, and minimum lag that is reported."""
 NORMAL_LAG_S = 0.09
 """Lag of a base without faults, which is subtracted from the reported latency."""
 MIN_COMMAND_M_S = 0.1
@@ -27,12 +27,12 @@ KEPT_RATIO, MIN_KEPT_S = 0.5, 0.6
 STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
 """Minimum duration of a steady command, and maximum change in this time as a fraction of the command."""
 MIN_GAIN_ERROR = 0.08
-"""Minimum deviation of a gain (ratio of driven to commanded speed) from 1 to report."""
+"""Minimum deviation of a reported gain (ratio of driven to commanded speed) from 1."""
 MIN_STEADY_SAMPLES = 20
 """Minimum number of samples with a steady command for estimating a speed limit or a gain."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
-"""Minimum difference to report between the gains of left and right wheels, and maximum fraction of the squared speed
-that the gains do not explain."""
+"""Minimum difference between reported gains of left and right wheels, and maximum fraction of the squared speed that
+these gains do not explain."""
 MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
 """Minimum difference between commanded and driven speed at a speed limit, and maximum standard deviation of the driven
 speed at a speed limit."""

@@ -37,7 +37,7 @@ MIN_GHOST_FRACTION = 0.3
 MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS = 0.02, 2.0
 """Maximum median deviation of the range of a ghost: the larger of a distance and a multiple of the range noise."""
 MIN_DRIVEN_M, MIN_GHOST_S = 0.6, 2.0
-"""Minimum motion of the lidar, and minimum time, in which a ghost is seen."""
+"""Minimum distance that the lidar moves, and minimum time, while a ghost is visible."""
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
@@ -74,7 +74,7 @@ def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
 
 
 def isolated_returns(compared: ComparedScans) -> Mask:
-    """Return a mask (n, beams) of beams that end before the static world and not near the ends of neighbor beams."""
+    """Return a mask (n, beams) of beams that end before the static world, and far from the ends of neighbor beams."""
     ranges = np.where(compared.is_hit, compared.scans.ranges, np.inf)
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(ranges, axis=1))

@@ -30,9 +30,9 @@ limit is halved after each Gauss-Newton step, down to 0.1 m."""
 MIN_BEAMS = 200
 """Minimum number of beams for estimating the mount."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
-"""Minimum error of a mount to report."""
+"""Minimum error of the mount that is reported."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
-"""Minimum bias of the ranges, deviation of the scale of the ranges from 1, and drift of the ranges to report."""
+"""Minimum bias of the ranges, minimum deviation of their scale from 1, and minimum drift that are reported."""
 
 
 def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:

@@ -17,13 +17,14 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
-"""Minimum noise to report beyond the nominal noise: the larger of a distance and a multiple of the nominal noise."""
+"""Minimum reported excess over the nominal noise: the larger of a distance and a multiple of the nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""Minimum noise to report for a lidar with known noise: a multiple of this noise, and a distance beyond this noise."""
+"""Minimum reported noise for a lidar with known noise: the larger of a multiple of this noise, and this noise plus a
+distance."""
 MIN_NOISE_S = 2.0
-"""Minimum duration of additional noise to report."""
+"""Minimum duration of reported noise."""
 MIN_INVALID_SCANS = 2
-"""Minimum number of invalid scans to report."""
+"""Minimum number of invalid scans that are reported."""
 MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
 """Maximum fraction of beams with a hit in an invalid scan, and minimum fraction of beams that should hit the world."""
 MIN_NAN_FRACTION = 0.03
@@ -43,7 +44,7 @@ RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
 WHITE_REFLECTIVITY = 0.9
 """Reflectivity of a surface that the lidar detects up to its maximum range in clear air, as in the fault `rain`."""
 HEAVY_RAIN_MM_H = 25.0
-"""Maximum rain rate to report."""
+"""Maximum reported rain rate."""
 
 
 def invalid_scans(compared: ComparedScans) -> Mask:

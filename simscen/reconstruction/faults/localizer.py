@@ -14,7 +14,7 @@ from simscen.reconstruction.reasons import FoundFault, Reason, windows
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
 """Minimum change of the error of position or heading, from one estimate to the next, that counts as a jump."""
 MIN_OUTAGE_S, MIN_OUTAGE_PERIODS = 1.0, 6.0
-"""Minimum duration of an outage to report: the larger of a time and a multiple of the period of the estimates."""
+"""Minimum duration of a reported outage: the larger of a time and a multiple of the period of the estimates."""
 MIN_CORRECTION_M_RAD = 1e-9
 """Minimum change of the transform from map to odom, in m or rad, that counts as a correction."""
 MAX_JUMP_S = 30.0

@@ -18,18 +18,18 @@ MIN_OUTAGE_PERIODS = 4.5
 MIN_GAP_PERIODS = 1.5
 """Minimum gap between two messages, in periods, in which messages are lost."""
 MIN_LOST_FRACTION, MIN_LOST_MESSAGES = 0.03, 4
-"""Minimum fraction, and minimum number, of lost messages to report."""
+"""Minimum fraction, and minimum number, of lost messages that are reported."""
 MAX_MULTIPLE_ERROR, MIN_MULTIPLE_FRACTION = 0.2, 0.7
 """Maximum difference, in periods, between a gap with lost messages and a multiple of the period. At least
 MIN_MULTIPLE_FRACTION of the gaps must meet this limit."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
-"""Minimum delay to report: the larger of a number of periods and a time."""
+"""Minimum reported delay: the larger of a number of periods and a time."""
 MIN_OUTAGES_INTERMITTENT = 3
 """Minimum number of outages that are reported as one intermittent fault."""
 SLOW_FACTOR = 1.6
 """Minimum ratio of the period of a slow sensor to its usual period."""
 MIN_REPEATED_SCANS = 3
-"""Minimum number of repeated scans in a row to report."""
+"""Minimum number of repeated scans in a row that are reported."""
 MIN_EQUAL_BEAMS = 20
 """Minimum number of beams with a return in both of two equal scans."""
 

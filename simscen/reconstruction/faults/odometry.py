@@ -1,6 +1,6 @@
 """Finds faults of wheel odometry and gyroscope by comparison with the true motion.
 
-The scale of a sensor is the ratio of measured to true motion. A step is a motion step of STEP_S.
+The scale of a sensor is the ratio of measured to true motion. Steps are the steps of MotionSteps.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
 """Minimum distance and turn of a drive for estimating the scales of distances and turns."""
 MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_RAD_PER_M = 0.02, 0.03, 0.008
-"""Minimum deviations from 1 of the scales of distances and turns, and minimum turn per meter, to report."""
+"""Minimum deviations from 1 of reported scales of distances and turns, and minimum reported turn per meter."""
 MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
-"""Minimum velocities of the odometry at rest to report."""
+"""Minimum velocities of the odometry at rest that are reported as drift."""
 MIN_SLIP_FRACTION, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
 """Minimum part of the rolled distance that is lost in a step with slip (fraction, m), and minimum duration of slip."""
 MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
-"""Minimum standard deviations of the odometry after 1 m and after 1 rad to report."""
+"""Minimum standard deviations of the odometry, after 1 m and after 1 rad, that are reported as noise."""
 MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
 """Minimum difference between the lost fraction during slip and the lost fraction in the rest of the drive, and minimum
 rolled distance for computing a lost fraction."""
@@ -32,14 +32,14 @@ REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
 LONG_FRACTION = 0.75
 """Maximum duration of slip as a fraction of the drive. Longer slip is a scale of the odometry."""
 CONFIDENCE_SIGMAS = 4.0
-"""Minimum ratio of an estimate to its standard deviation to report the estimate."""
+"""Minimum ratio of a reported estimate to its standard deviation."""
 
 
 def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = False) -> Iterator[FoundFault]:
     """Yield the faults of the odometry.
 
-    `wheel_separation` is the distance in m between left and right wheels. If `skids` is true (skid-steer robot), wrong
-    turns and noise are not reported.
+    `wheel_separation` is the distance in m between left and right wheels. For a skid-steer robot (`skids`), wrong turns
+    and noise are not reported.
     """
     if len(steps) < 6:
         return
@@ -182,15 +182,15 @@ def _noise(steps: MotionSteps, forward_fit: Array, turn_fit: Array, drive: tuple
 BIN_S, MIN_BINS = 0.5, 8
 """Length of the bins over which turn rates are averaged, and minimum number of bins for an estimate."""
 MIN_BIAS_RAD_S, MIN_DRIFTED_RAD_S = 0.006, 0.006
-"""Minimum bias, and minimum change of the bias by drift, to report."""
+"""Minimum reported bias, and minimum change of the bias by a reported drift."""
 MIN_GYRO_SCALE_ERROR, MIN_GYRO_TURN_RAD = 0.03, 2.0
-"""Minimum deviation of the scale from 1 to report, and minimum total turn for estimating the scale."""
+"""Minimum deviation of a reported scale from 1, and minimum total turn for estimating the scale."""
 MAX_RATE_CHANGE_RAD_S = 0.2
 """Maximum change of the turn rate between bins that are used for estimating a bias or a drift."""
 MIN_RAMP_S, MIN_RAMP_SIGMAS = 4.0, 4.0
 """Minimum duration of a drift, and minimum change by the drift in standard deviations of the remaining errors."""
 MAX_ERROR_RATIO = 0.2
-"""Maximum ratio of the sum of squared errors with a drift or scale to the sum without it, to report the fault."""
+"""A drift or a scale is reported if it reduces the sum of squared errors to less than this fraction."""
 
 
 def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
