@@ -191,12 +191,12 @@ class AdvancedPlanManager(PlanManager):
             return "moving"
         if self._costmap.revision != self._checked_revision:
             self._checked_revision = self._costmap.revision
-            self._max_obstacle_cells = max(self._max_obstacle_cells, self._costmap.obstacle_cells)
+            self._max_obstacle_cells = max(self._max_obstacle_cells, self._costmap.obstacle_cell_count)
             if now - self._adopted_at >= MIN_PLAN_AGE_S and plan.has_lost_clearance():
                 return "tight"
         if now - self._scheduled_at < SHORTCUT_PERIOD_S:
             return ""
-        self._scheduled_at, cells = now, self._costmap.obstacle_cells
+        self._scheduled_at, cells = now, self._costmap.obstacle_cell_count
         disappeared = cells < self._max_obstacle_cells - MAX_VARYING_CELLS
         self._max_obstacle_cells = cells if disappeared else max(self._max_obstacle_cells, cells)
         can_be_shorter = self._is_partial or plan.is_longer_than(pose.distance(goal.pose) - goal.xy_tolerance)
@@ -242,7 +242,7 @@ class AdvancedPlanManager(PlanManager):
         event = super()._adopt(tick, now, result, reason)
         self._avoids_moving, self._moving_checked_at = result.avoids_moving, now
         self._checked_revision = self._costmap.view.revision
-        self._max_obstacle_cells = self._costmap.obstacle_cells
+        self._max_obstacle_cells = self._costmap.obstacle_cell_count
         return event
 
 

@@ -25,7 +25,7 @@ MAX_STEPS = 1000
 """Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_BENEFIT_M = 0.005
-"""Minimum increase of the distance to a moving obstacle by braking; without it, the robot does not brake."""
+"""The robot brakes for a moving obstacle only if braking increases the distance to it by more than this value."""
 ROUNDING_M = 1e-6
 """Rounding error allowed for distances to moving obstacles."""
 

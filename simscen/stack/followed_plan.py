@@ -1,4 +1,4 @@
-"""Plan that the robot follows: check for new obstacles, progress, and transformation to the odom frame."""
+"""The plan that the robot follows: progress, obstacles on the plan, and transformation for the controller."""
 
 import math
 
@@ -14,7 +14,7 @@ from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Minimum distance from the plan within which costmap changes cause a new check for obstacles."""
+"""Costmap changes within this distance of the plan, or the inscribed radius if larger, cause a new check."""
 WATCH_EVERY_POINTS = 4
 """Only every n-th point of the plan is compared with the positions of costmap changes."""
 MAX_DEFERRED_MOTION_M = 0.5

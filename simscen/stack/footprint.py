@@ -36,7 +36,7 @@ def distance_at(costmap: CostmapView, x: float, y: float) -> float:
 
 
 def lethal_near(costmap: CostmapView, x: float, y: float, half_side: float) -> Array:
-    """Return the centers (n, 2) of the lethal cells in a square around (x, y) with half the side length in m."""
+    """Return the centers (n, 2) of the lethal cells in a square around (x, y), given half its side length in m."""
     left, low = costmap.origin
     first = [max(0, math.floor((at - half_side - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
     last = [max(0, math.ceil((at + half_side - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
@@ -105,13 +105,14 @@ class Footprint:
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
         """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles; negative in collision.
 
-        The obstacles are at their predicted positions at `times` in s, which broadcast with the poses. They are
+        The obstacles are at their predicted positions at `times` in s, one for each pose (or broadcast). They are
         inflated by `sigmas` standard deviations. If the footprint is not round, the result is a few cm too small.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
 
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
+        """Return at which of the poses (n, 3) no checked point of the footprint is in a lethal cell."""
         return np.asarray((distances(costmap, self._points_at(poses)) > 0).all(axis=1))
 
     def _points_at(self, poses: Array) -> Array:

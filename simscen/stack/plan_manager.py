@@ -13,8 +13,8 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
-MISSED_AFTER_S = 1.0
-"""Minimum age of a plan that a car can miss (see FollowedPlan.is_missed)."""
+MIN_MISSED_AGE_S = 1.0
+"""Minimum age of a plan that can count as missed by a car (see FollowedPlan.is_missed)."""
 CHECK_EVERY_STEPS = 2
 """Number of steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
@@ -143,7 +143,7 @@ class PlanManager:
 
     def _mandatory_reason(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
         """Return why the plan must be replaced; "" if it can still be followed."""
-        if self._is_car and now - self._adopted_at >= MISSED_AFTER_S and plan.is_missed(pose):
+        if self._is_car and now - self._adopted_at >= MIN_MISSED_AGE_S and plan.is_missed(pose):
             return "missed"
         if self._via and not self._is_partial and plan.remaining() < PLAN_END_M:
             return "missed"

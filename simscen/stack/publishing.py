@@ -117,7 +117,7 @@ REPORT_AFTER_S = 1.0
 
 
 class StandstillReporter:
-    """Creates an event when a component has held the robot (kept it from driving) for REPORT_AFTER_S, and one after."""
+    """Reports by events that a component holds the robot (keeps it from driving): after REPORT_AFTER_S, and the end."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""

@@ -32,8 +32,8 @@ MOTION_READINGS = frozenset((Odometry, Imu, Bump))
 class ReferenceStack:
     """Localizer, costmaps, navigator, controller, velocity smoother, and collision monitor of one robot.
 
-    It decides at the controller's rate and repeats its command in between. Subclasses override the methods `_on_…` and
-    `_adjust_…`. In this class, most of them do nothing or return their argument.
+    It computes a command in each controller period, and repeats the command in between. The methods `_on_…` and
+    `_adjust_…` are extension points for subclasses. In this class, most of them do nothing or return their argument.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class ReferenceStack:
     # Extension points -------------------------------------------------------------------------------------------------
 
     def _on_motion(self, reading: Odometry | Imu) -> None:
-        """Process a plausible odometry or IMU reading."""
+        """Process an odometry or IMU reading with plausible values."""
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
         """Process an odometry reading: its unfiltered pose `wheels`, and `fused`, the pose in the odom frame."""
@@ -267,6 +267,7 @@ class ReferenceStack:
             self._on_motion(reading)
 
     def _believed_pose(self) -> Pose2:
+        """Return the localizer's estimate of the pose in the map frame."""
         source = self._pose_source
         return self._localizer.belief.pose if source is None else source.pose
 

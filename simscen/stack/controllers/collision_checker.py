@@ -20,7 +20,7 @@ MAX_TIME_STEP_S = 0.1
 UNCERTAINTY_SIGMAS = 0.5
 """Moving obstacles are inflated by this number of standard deviations of their position."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Decrease of the distance to a moving obstacle that counts as an approach. Only approaching counts as a collision."""
+"""Decrease of the distance to a moving obstacle that counts as an approach. Contact without approach is ignored."""
 
 
 class CollisionChecker:

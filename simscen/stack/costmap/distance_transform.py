@@ -16,7 +16,7 @@ MAX_INT32_EDGE_CELLS = 30_000
 MAX_REACH_CELLS = 180
 """Largest supported `reach`, the maximum distance: the sum of two squares must fit into 16 bits."""
 OUT_OF_REACH = 65535
-"""Largest value in 16 bits: squared distance of cells that are farther away than the maximum distance."""
+"""Largest value in 16 bits. It stands for squared distances that are larger or not computed."""
 MAX_COMPARED_CELLS = 60
 """Largest `reach` for which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
@@ -66,6 +66,7 @@ class SquaredDistanceTransform:
         return self._squared
 
     def _by_scipy(self, marked: npt.NDArray[np.bool_]) -> Squares:
+        """Return the same, computed with scipy's transform."""
         result: Squares = np.full(marked.shape, self._beyond, np.uint16)
         if marked.any():
             for rows, squared in squared_distance_blocks(marked):

@@ -53,7 +53,7 @@ class GridFrame:
     def indices_of(self, points: ComplexPoints, center: complex, reach: float) -> CellIndices:
         """Return the flat indices of the cells at points x + iy (n,). Points outside the grid are left out.
 
-        All points must be within `reach` m of `center`. If this circle lies on the grid, points need not be checked.
+        All points must be within `reach` m of `center`. If this circle lies on the grid, single points are not checked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
@@ -133,9 +133,9 @@ ValueType = TypeVar("ValueType", bound=np.generic)
 GOAL_EDGE_MARGIN_M = 0.6
 """Distance from the edge of the window at which a plan ends if the goal is outside."""
 ROLL_RATIO = 1 / 8
-"""The window is moved when the robot is farther from its center than this fraction of the window's size."""
+"""A window is moved when the robot is farther from the window's center than this fraction of its size."""
 MAX_ROLL_OFFSET_M = 0.25
-"""The window of a local costmap is also moved when the robot is farther than this from its center."""
+"""The window of a local costmap is moved when the robot is farther than this from the window's center."""
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:

@@ -58,7 +58,8 @@ MAX_REVISIONS = 16
 class LayeredCostmap:
     """Costs of cells and distances to the nearest obstacle, available as `view`.
 
-    Updates recompute only the surroundings of changed cells. The frame, map or odom, is that of the poses in `update`.
+    Updates recompute only the surroundings of changed cells. The poses that `update` gets are in the costmap's frame:
+    map or odom.
 
     Without a map, the costmap is a window of `size` (x, y) in m that rolls with the robot. The window is moved when the
     robot is farther than `max_offset` m from its center.
@@ -138,7 +139,7 @@ class LayeredCostmap:
         return False
 
     @property
-    def obstacle_cells(self) -> int:
+    def obstacle_cell_count(self) -> int:
         """Number of cells with live obstacles, plus the keepout cells added since the start."""
         return self._live.count + self._keepout_change
 
@@ -356,9 +357,11 @@ def _map_costs(
 
 
 def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:
+    """Return the lookup tables of the costmap."""
     inscribed, reach = robot.inscribed_radius, _reach(spec, robot)
     return shared_inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
 
 
 def _reach_cells(reach: float, resolution: float) -> int:
+    """Return the distance `reach` in cells, rounded up."""
     return max(2, math.ceil(reach / resolution))  # at least the neighbors of a wall, if cells are coarse

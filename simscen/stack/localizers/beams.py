@@ -21,7 +21,7 @@ class Field(Protocol):
     """Lookup table over the cells of a map, for example of distances to obstacles."""
 
     def endpoint_cells(self, poses: Array, points: ComplexPoints) -> TableIndices:
-        """Return indices (n, b) into the table of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
+        """Return the table indices (n, b) of `points` (b,), given in the base frame of each of the `poses` (n, 3)."""
         ...
 
 
@@ -50,7 +50,7 @@ class Beams:
         return self.ranges.take(hit) * self.unit_vectors.take(hit) + self.origin
 
     def cells(self, field: Field, poses: Array) -> TableIndices:
-        """Return indices (n, m) into the table of the endpoints for each of the `poses` (n, 3). Caches the result."""
+        """Return the indices (n, m) of the endpoints in the table `field`, for each of the `poses` (n, 3). Cached."""
         last: tuple[Field, Array, TableIndices] | None = self.__dict__.get("_cells")
         if last is None or last[0] is not field or last[1] is not poses:
             last = self.__dict__["_cells"] = field, poses, field.endpoint_cells(poses, self.ends)

@@ -72,12 +72,12 @@ class DistanceField:
         return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
-        """Return positions (2, n) and headings (n,) of `poses` (n, 3) in the table with its border, in cells."""
+        """Convert `poses` (n, 3) to table coordinates: positions (2, n) in cells (with the border), headings (n,)."""
         positions = self._axes @ poses.T[:2] + self._corner
         return positions.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> TableIndices:
-        """Return indices into `table` of points, given in cells and possibly outside the map. Overwrites x and y."""
+        """Return the table indices of points, given in table coordinates and possibly outside. Overwrites x and y."""
         column = x.clip(0, self._width + 1, out=x).astype(np.int32)
         row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2
@@ -85,7 +85,7 @@ class DistanceField:
         return row
 
     def endpoint_cells(self, poses: Array, points: ComplexPoints) -> TableIndices:
-        """Return indices (n, b) into `table` of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
+        """Return the table indices (n, b) of `points` (b,), given in the base frame of each of the `poses` (n, 3)."""
         positions, heading = self.coordinates(poses)
         count = len(heading)
         ends = np.ones((3, len(points)), dtype=np.float32)

@@ -108,7 +108,7 @@ class EkfLocalizer:
             self._update(np.array([mean]), _GYROSCOPE_MATRIX, np.array([[variance]]))
 
     def _wheel_noise(self, step: Pose2, velocity: Array, seconds: float) -> Array:
-        """Return the covariance (3, 3) of the velocity that wheel odometry has measured."""
+        """Return the covariance (3, 3) of the velocity measured by the wheels."""
         length = math.hypot(step.x, step.y)
         along = velocity[:2] * seconds
         noise = np.zeros((3, 3))

@@ -48,7 +48,7 @@ class DifferentialMotionModel:
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after the motion, to first order."""
+        """Return the covariance (3, 3) after the motion, linearized."""
         (turn, drive, _), (turned, driven, again) = self._steps(delta)
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
         dx, dy, across = drive * c, drive * s, (driven - drive**2 * turned) * c * s
@@ -90,7 +90,7 @@ class OmniMotionModel:
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after the motion, to first order."""
+        """Return the covariance (3, 3) after the motion, linearized."""
         bearing = yaw + math.atan2(delta.y, delta.x)
         drive, c, s = math.hypot(delta.x, delta.y), math.cos(bearing), math.sin(bearing)
         driven, strafed, turned = (std**2 for std in self._noise(delta))

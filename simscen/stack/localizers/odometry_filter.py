@@ -131,9 +131,9 @@ class OdometryFilter:
         cross -= cross.dot(self._filter.K.dot(matrix).T)
 
     def _wheels_slip(self, difference: float, variance: float) -> bool:
-        """Return whether the wheels slip: their yaw rate differs from the gyroscope's by more than `variance` allows.
+        """Return whether the wheels slip, given how much their yaw rate differs from the gyroscope's (rad/s).
 
-        `difference` is the difference in rad/s, with its `variance` from measurement noise.
+        `variance` is the variance of the `difference` without slip.
         """
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
@@ -194,7 +194,7 @@ class GyroscopeIntegral:
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
-        """Return the angle in rad from the tick of the last call to `tick`, and its variance; None if readings lack."""
+        """Return the angle in rad since the tick of the last call, and its variance; None if readings are missing."""
         last, self._read = self._read, None
         if self._tick is None or abs(tick - self._tick) > self._max_gap:
             return None

@@ -94,7 +94,7 @@ class ParticleFilter:
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return an exponent (0 … 1) that weakens the likelihood of a scan, and the beams to use: here 1 and all."""
+        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use; here 1 and all beams."""
         return 1.0, beams
 
     def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:

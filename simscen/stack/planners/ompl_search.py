@@ -33,7 +33,7 @@ DEFAULT_RANGE_M = 1.0
 """Default of the parameter `range`: the maximum length of a motion in the search tree."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 """Default of the parameter `rewire_factor` of BIT*."""
-CHECK_PERIOD = 16
+CHECK_PERIOD_ITERATIONS = 16
 """Number of iterations between two calls of `is_done` (see `stop_after`)."""
 PERTURBATIONS_M = (0.5, 0.15)
 """Distances by which path simplification moves states, in two successive passes."""
@@ -256,13 +256,13 @@ def _state(information: Any, point: Point) -> Any:
 def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterations: int = 0) -> Termination:
     """Return a termination condition: after `iterations`, or after `min_iterations` as soon as `is_done` returns True.
 
-    `is_done` is called once per `CHECK_PERIOD` iterations.
+    `is_done` is called once per `CHECK_PERIOD_ITERATIONS` iterations.
     """
 
     def answers() -> Iterator[Iterable[bool]]:
-        for start in range(0, iterations, CHECK_PERIOD):
-            yield repeat(False, min(CHECK_PERIOD, iterations - start))
-            if start + CHECK_PERIOD > min_iterations and is_done():
+        for start in range(0, iterations, CHECK_PERIOD_ITERATIONS):
+            yield repeat(False, min(CHECK_PERIOD_ITERATIONS, iterations - start))
+            if start + CHECK_PERIOD_ITERATIONS > min_iterations and is_done():
                 break
         yield repeat(True)
 

@@ -9,7 +9,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.planners.traversal_costs import TraversalCosts
 
 SPACING_M = 0.05
-"""Distance between the points of a finished path."""
+"""Maximum distance between the points of a finished path."""
 SMOOTHING_PASSES, MAX_COST_RATIO = 8, 1.003
 """Maximum number of smoothing passes, and maximum ratio of the costs after and before smoothing."""
 

@@ -13,7 +13,7 @@ from simscen.stack.costmap.distance_transform import squared_distances_within
 from simscen.stack.costmap.layers import MAX_NON_OBSTACLE, NO_INFORMATION
 from simscen.stack.protocols import CostmapView, RobotModel
 
-UNKNOWN_COSTS = 253
+UNKNOWN_COST = 253
 """Cost of an unknown cell: just above the highest cost of a free cell (nav2_navfn_planner)."""
 NO_ROTATION_COST_FACTOR = 4.0
 """Factor on the costs of cells in which a robot that is not round cannot turn in place."""
@@ -36,7 +36,7 @@ class TraversalCosts:
         self.costmap, self.inscribed = costmap, robot.inscribed_radius
         self.height, self.width = costmap.costs.shape
         self.resolution, self.origin = costmap.resolution, costmap.origin
-        relative = np.minimum(np.arange(256), UNKNOWN_COSTS) / MAX_NON_OBSTACLE
+        relative = np.minimum(np.arange(256), UNKNOWN_COST) / MAX_NON_OBSTACLE
         table = (1.0 + multiplier * relative).astype(np.float32)
         if not allow_unknown:
             table[NO_INFORMATION] = np.inf

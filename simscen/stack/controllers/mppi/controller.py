@@ -51,7 +51,7 @@ def sample_weights(
     """Return the weights (n,) of samples with these costs (n,), proportional to exp(-cost / temperature).
 
     `noise` (axes, steps, n) was added to the sequence. `deviations` are the standard deviations of the noise by axis.
-    The control cost is added to each cost: `gamma` times the product of sequence and noise, divided by their variance.
+    Each cost includes the control cost: `gamma` times the product of sequence and noise, divided by the variance.
     """
     total = costs.copy()
     for axis, deviation in enumerate(deviations):

@@ -157,7 +157,7 @@ def prefer_forward_critic(spec: model.MppiPreferForwardCritic, data: CriticData)
 
 
 def twirling_critic(spec: model.MppiTwirlingCritic, data: CriticData) -> Floats:
-    """Return the mean absolute turn rate."""
+    """Return the mean absolute turn rate in rad/s."""
     return np.asarray(spec.cost_weight * np.abs(data.rollouts.velocities[WZ]).mean(axis=0))
 
 

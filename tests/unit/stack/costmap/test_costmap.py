@@ -161,7 +161,7 @@ def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once()
         pose = Pose2(1.0 + 0.5 * k, 3.0, 0.3 * k)
         map_.update(pose, scan_of(world, pose, noise=0.01))
         assert np.allclose(map_.view.distance, full(map_.view.costs == 254), atol=1e-6)
-        assert map_.obstacle_cells == np.count_nonzero(map_.view.costs == 254) - walls
+        assert map_.obstacle_cell_count == np.count_nonzero(map_.view.costs == 254) - walls
 
 
 @pytest.mark.parametrize("group", [1, 3])
@@ -297,15 +297,15 @@ def test_zones_that_are_switched_on_make_the_costmap_that_has_them_from_the_star
     scan = scan_of(world, Pose2(1.0, 3.0))
     for map_ in (plain, zoned, switched):
         map_.update(Pose2(1.0, 3.0), scan)
-    revision, cells = switched.view.revision, switched.obstacle_cells
+    revision, cells = switched.view.revision, switched.obstacle_cell_count
     switched.set_zones(Zones(keepout=ZONES))
     assert np.array_equal(switched.view.costs, zoned.view.costs)
     assert np.array_equal(switched.view.distance, zoned.view.distance)
     assert switched.view.revision > revision, "who follows a plan looks at it again"
-    assert switched.obstacle_cells == cells + 40 * 40
+    assert switched.obstacle_cell_count == cells + 40 * 40
     switched.set_zones(Zones())
     assert np.array_equal(switched.view.costs, plain.view.costs)
-    assert switched.obstacle_cells == cells
+    assert switched.obstacle_cell_count == cells
 
 
 def test_zones_are_switched_in_a_window_that_rolls() -> None:
