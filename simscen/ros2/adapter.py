@@ -88,7 +88,9 @@ class Adapter:
         offered = [topic for topic in offered if topic.name not in options.without]
         self._unavailable = [topic for topic in offered if not self._graph.advertise(topic.name, topic.type)]
         published = [topic for topic in offered if topic.name in self._graph.publishers]
-        self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options, self._frames.bases)
+        self._readiness = Readiness(
+            self._graph, self._barrier, published, self._senders, options, self._frames.base_frames
+        )
         self._actions = MotionActions(self._graph, self._barrier)
         self._recoveries = RecoveryReporter(self._graph, goals.report)
         self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None

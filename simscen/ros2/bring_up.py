@@ -73,7 +73,7 @@ class BringUp:
 
         def settled() -> bool:
             nonlocal changed_at, incomplete_at, nodes
-            missing[:] = self._readiness.no_nodes() if self._options.warm_up else self._readiness.missing()
+            missing[:] = self._readiness.no_nodes() if self._options.warm_up else self._readiness.problems()
             self._check_unavailable()
             now = time.monotonic()
             if nodes != self._graph.nodes():
@@ -138,7 +138,7 @@ class BringUp:
 
         def complete() -> bool:
             nonlocal changed_at, nodes
-            missing[:] = self._readiness.missing()
+            missing[:] = self._readiness.problems()
             self._check_unavailable()
             if self._report is not None:
                 self._report.follow_log()

@@ -31,12 +31,12 @@ class FrameNames:
                 raise AdapterError(f"--frame {text}: {frame} cannot be renamed, only base_link and frames of sensors")
             self._names[frame] = name
         base = self._names.get(BASE_FRAME, BASE_FRAME)
-        self.bases = [base] if second_base in (None, BASE_FRAME, base) else [base, str(second_base)]
+        self.base_frames = [base] if second_base in (None, BASE_FRAME, base) else [base, str(second_base)]
         """The names of the base frame in the user's graph."""
 
     def apply(self, topic: str, message_type: Any, data: bytes) -> bytes:
         """Return a serialized message with renamed frames. Adds the second base frame to /tf_static."""
-        has_second_base = topic == TF_STATIC and len(self.bases) > 1
+        has_second_base = topic == TF_STATIC and len(self.base_frames) > 1
         if not has_second_base and not any(frame.encode() in data for frame in self._names):
             return data
         from rclpy.serialization import deserialize_message, serialize_message
@@ -60,7 +60,7 @@ class FrameNames:
         """Return the identity transform from the base frame to its second name."""
         transform_type: Any = find_type("geometry_msgs/msg/TransformStamped")
         transform = transform_type()
-        transform.header.frame_id, transform.child_frame_id = self.bases
+        transform.header.frame_id, transform.child_frame_id = self.base_frames
         transform.transform.rotation.w = 1.0
         return transform
 

@@ -20,7 +20,7 @@ ACTIONS = {
 }
 STANDSTILL_NS = NS_PER_S
 """Simulated time with zero commands after which a goal on /goal_pose counts as reached."""
-REJECTED, UNKNOWN = 1, 9000
+REJECTED_CODE, UNKNOWN_CODE = 1, 9000
 """Error codes for a rejected goal and for an unknown error."""
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 """Values of action_msgs/msg/GoalStatus.status."""
@@ -150,16 +150,16 @@ class ActionSender:
             request.poses = poses
         self._goals, self._passed, self._reported, self.recoveries = goals, 0, 0, 0
         self._result = None
-        answer = self._client.send_goal_async(request, feedback_callback=self._take_feedback)
+        answer = self._client.send_goal_async(request, feedback_callback=self._process_feedback)
         barrier.wait(answer, f"{self.name} has not accepted or rejected the goal")
         self._handle = answer.result()
         if not self._handle.accepted:
             self._handle = None
-            return GoalFailed(REJECTED, f"{self.name} rejected the goal")
+            return GoalFailed(REJECTED_CODE, f"{self.name} rejected the goal")
         self._result = self._handle.get_result_async()
         return None
 
-    def _take_feedback(self, message: Any) -> None:
+    def _process_feedback(self, message: Any) -> None:
         """Update the number of passed goals and of recoveries."""
         feedback = message.feedback
         self.recoveries = getattr(feedback, "number_of_recoveries", 0)
@@ -183,7 +183,7 @@ class ActionSender:
             missed = self._missed_waypoints(result)
             return [missed.get(index, GoalReached()) for index in range(self._reported, len(self._goals))]
         ending = {CANCELED: "was canceled by the stack", ABORTED: "was aborted"}.get(answer.status, "ended")
-        code = getattr(result, "error_code", 0) or UNKNOWN
+        code = getattr(result, "error_code", 0) or UNKNOWN_CODE
         message = getattr(result, "error_msg", "") or f"{self.name} {ending}"
         # Goals that were not attempted fail with the current one.
         return [*self._passed_goals(state), *[GoalFailed(code, message)] * (len(self._goals) - self._passed)]
@@ -193,7 +193,7 @@ class ActionSender:
         missed: Dict[int, GoalFailed] = {}
         for waypoint in getattr(result, "missed_waypoints", ()):
             index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
-            code, message = getattr(waypoint, "error_code", 0) or UNKNOWN, getattr(waypoint, "error_msg", "")
+            code, message = getattr(waypoint, "error_code", 0) or UNKNOWN_CODE, getattr(waypoint, "error_msg", "")
             missed[index] = GoalFailed(code, message or f"{self.name} missed it")
         return missed
 
@@ -206,7 +206,7 @@ class ActionSender:
             if arrived or self.action == "navigate_through_poses":
                 found.append(GoalReached())
             else:
-                found.append(GoalFailed(UNKNOWN, f"{self.name} continued without having been there"))
+                found.append(GoalFailed(UNKNOWN_CODE, f"{self.name} continued without having been there"))
         self._reported = self._passed
         return found
 

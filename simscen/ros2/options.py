@@ -1,6 +1,6 @@
 """Options and errors of `simscen ros2`, names of topics, and the ROS domain of a run.
 
-Each run locks the file of its ROS_DOMAIN_ID, so that no other run of this user on this machine uses the same domain.
+Each run locks a file for its ROS_DOMAIN_ID, so that no other run of this user on this machine uses the same domain.
 """
 
 import fcntl
@@ -28,6 +28,7 @@ class Options(NamedTuple):
 
     launch:      command that starts the nodes; None if the user starts them
     domain:      ROS_DOMAIN_ID; None to select it automatically
+    namespace:   namespace of the topics, such as "robot1"
     remap:       renamed topics, `/from:=/to`
     without:     topics that simscen does not publish
     goals:       how goals are sent: a Nav2 action, "goal_pose", or "auto"

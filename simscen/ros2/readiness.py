@@ -31,13 +31,13 @@ class Readiness:
         topics: Sequence[Topic],
         senders: GoalSenders,
         options: Options,
-        bases: Sequence[str],
+        base_frames: Sequence[str],
     ) -> None:
-        """`topics` are published by simscen. `bases` are the names of the base frame in the graph."""
+        """`topics` are published by simscen. `base_frames` are the names of the base frame in the graph."""
         self._graph, self._barrier, self._topics, self._senders = graph, barrier, list(topics), senders
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
-        self._nav2 = Nav2Readiness(graph, barrier, topics, options, bases)
+        self._nav2 = Nav2Readiness(graph, barrier, topics, options, base_frames)
         self._user_transforms: Optional[UserTransforms] = None
         self.has_map = True
         """Whether simscen has published the map."""
@@ -51,7 +51,7 @@ class Readiness:
         """Return a problem if the graph has no node except simscen's."""
         return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
 
-    def missing(self) -> List[str]:
+    def problems(self) -> List[str]:
         """Return all problems that prevent the start of the run."""
         if self.no_nodes():
             return self.no_nodes()

@@ -124,12 +124,12 @@ def command(
     these parameters; 2: it cannot, or the command line is invalid.
     """
     try:
-        bases = FrameNames(frame or [], base_frame).bases
+        base_frames = FrameNames(frame or [], base_frame).base_frames
     except AdapterError as error:
         raise UsageError(str(error)) from error
     parameters = _read_parameters(params) if params is not None else None
     if SOCKET_VARIABLE not in os.environ:
-        _check_parameters(what, parameters, bases)
+        _check_parameters(what, parameters, base_frames)
         return
     options = {
         **{"launch": launch, "domain": domain, "namespace": namespace, "remap": remap or [], "without": without or []},
@@ -157,20 +157,20 @@ def _read_parameters(params: Path) -> Nav2Parameters:
     return parameters
 
 
-def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases: list[str]) -> None:
+def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, base_frames: list[str]) -> None:
     """Check Nav2 parameters. Raises UsageError without parameters, and InvalidInput if Nav2 cannot work with them.
 
-    `bases` are the names of the base frame.
+    `base_frames` are the names of the base frame.
     """
     if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
-    problems = parameters.problems(PublishedNames(["/scan"], "/odom", bases))
+    problems = parameters.problems(PublishedNames(["/scan"], "/odom", base_frames))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(problems)
     if problems:
         print_text(as_text(problems), sys.stderr)
-    print_text(f"{parameters.display_name}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(bases)}")
+    print_text(f"{parameters.display_name}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(base_frames)}")
 
 
 def _find_python() -> str:

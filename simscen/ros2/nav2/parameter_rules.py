@@ -18,17 +18,17 @@ class ParameterProblem(NamedTuple):
 
 
 class PublishedNames(NamedTuple):
-    """Names in the user's graph.
+    """Names that simscen uses in the user's graph.
 
-    scans:      topics on which simscen publishes scans
-    odometry:   topic on which simscen publishes odometry
-    bases:      names of the robot's base frame
-    namespace:  namespace of relative topic names, such as `/robot1`
+    scans:        topics on which simscen publishes scans
+    odometry:     topic on which simscen publishes odometry
+    base_frames:  names of the robot's base frame
+    namespace:    namespace of relative topic names, such as `/robot1`
     """
 
     scans: Sequence[str]
     odometry: str
-    bases: Sequence[str]
+    base_frames: Sequence[str]
     namespace: str = ""
 
 
@@ -98,9 +98,9 @@ class _Node(NamedTuple):
     def check_base(self, key: str) -> None:
         """Add a problem unless the parameter is a name of the base frame."""
         value = self.get(key)
-        if value is not None and value not in self.published.bases:
+        if value is not None and value not in self.published.base_frames:
             hint = f"--base-frame {value} also gives it that name"
-            self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.bases[0]!r}: {hint}")
+            self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.base_frames[0]!r}: {hint}")
 
     def check_frame(self, key: str, *frames: str) -> None:
         """Add a problem unless the parameter is one of these frames."""

@@ -15,9 +15,9 @@ class Nav2Readiness:
     """Checks the nodes of a running Nav2, their parameters, and the parameter file if there is one."""
 
     def __init__(
-        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, bases: Sequence[str]
+        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, base_frames: Sequence[str]
     ) -> None:
-        """`topics` are published by simscen. `bases` are the names of the base frame in the graph."""
+        """`topics` are published by simscen. `base_frames` are the names of the base frame in the graph."""
         self._graph, self._options = graph, options
         self._node_parameters = NodeParameters(graph, barrier)
         self.user_transforms: Optional[UserTransforms] = None
@@ -25,7 +25,7 @@ class Nav2Readiness:
         self._names = parameter_rules.PublishedNames(
             [graph.names(topic.name) for topic in topics if topic.type == SCAN_TYPE],
             odometry[0] if odometry else "",
-            bases,
+            base_frames,
             graph.names.namespace,
         )
 
@@ -33,7 +33,7 @@ class Nav2Readiness:
         """Return the names that simscen publishes. Frames of the user's transforms are additional base frames."""
         if self.user_transforms is None:
             return self._names
-        return self._names._replace(bases=[*self._names.bases, *self.user_transforms.robot_frames])
+        return self._names._replace(base_frames=[*self._names.base_frames, *self.user_transforms.robot_frames])
 
     def missing_nodes(self) -> List[str]:
         """Return one text for each severe problem of the parameter file and for each missing node."""

@@ -9,10 +9,10 @@ def test_transforms_are_published_before_the_readings_that_need_them() -> None:
 
 
 def test_the_base_frame_has_its_own_and_a_second_name() -> None:
-    assert FrameNames([], None).bases == ["base_link"]
-    assert FrameNames([], "base_footprint").bases == ["base_link", "base_footprint"]
-    assert FrameNames(["base_link:=chassis"], "base_footprint").bases == ["chassis", "base_footprint"]
-    assert FrameNames(["base_link:=base_footprint"], "base_footprint").bases == ["base_footprint"]
+    assert FrameNames([], None).base_frames == ["base_link"]
+    assert FrameNames([], "base_footprint").base_frames == ["base_link", "base_footprint"]
+    assert FrameNames(["base_link:=chassis"], "base_footprint").base_frames == ["chassis", "base_footprint"]
+    assert FrameNames(["base_link:=base_footprint"], "base_footprint").base_frames == ["base_footprint"]
 
 
 def test_a_message_without_renamed_frames_is_not_touched() -> None:
