@@ -141,6 +141,6 @@ def _cgroup_memory() -> int:
     return sys.maxsize
 
 
-def _size(size: int) -> str:
+def _size(byte_count: int) -> str:
     """Return a size in bytes as text in MiB, or in GiB from 10 GiB."""
-    return f"{size / 2**20:.0f} MiB" if size < 10 << 30 else f"{size / 2**30:.0f} GiB"
+    return f"{byte_count / 2**20:.0f} MiB" if byte_count < 10 << 30 else f"{byte_count / 2**30:.0f} GiB"

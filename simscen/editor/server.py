@@ -23,7 +23,7 @@ _WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
 
 
 class OpenFiles:
-    """Editor sessions of the main file, and of the world files to which it refers or referred.
+    """Editor sessions of the main file, and of all world files to which it has referred.
 
     The page of world file number n has the path `world-n/`. The number of a world file never changes. The session of a
     world file starts when its page is first requested.
@@ -181,7 +181,7 @@ class _Handler(BaseHTTPRequestHandler):
         return requested
 
     def _body(self) -> bytes | None:
-        """Return the body of a request. If it is too large or has no length, send an error and return None."""
+        """Return the body of a request; None if it is too large or has no length."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > MAX_REQUEST_BYTES:
             self.close_connection = True
@@ -189,6 +189,7 @@ class _Handler(BaseHTTPRequestHandler):
         return self.rfile.read(int(length))
 
     def _file(self, session: EditorSession, name: str) -> Response:
+        """Return the answer to GET: a file of the editor page, or the replay page of a run."""
         if match := _REPLAY_PATH.fullmatch(name):
             return _replay(session, int(match[1]))
         file = self.server.files.get(name or "page.html")
@@ -218,7 +219,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _replay(session: EditorSession, number: int) -> Response:
-    """Return the replay page of a run, with the Content-Security-Policy in the page."""
+    """Return the replay page of a run. Its Content-Security-Policy is read from the page."""
     trial = session.runs.trial(number)
     if trial is None or not trial.replay.is_file():
         return _error("there is no such replay", HTTPStatus.NOT_FOUND)
@@ -255,6 +256,7 @@ def _json(data: Any, status: int = 200) -> Response:
 
 
 def _error(message: str, status: HTTPStatus) -> Response:
+    """Return a JSON answer with an error message."""
     return _json({"error": message}, status)
 
 

@@ -82,7 +82,7 @@ class TrialRuns:
         self._lock = threading.Lock()
 
     def start(self, loaded: LoadedScenario) -> TrialRun:
-        """Cancel all earlier runs, start a run in a thread, and return its state."""
+        """Cancel all earlier runs, start a run in a thread, and return it."""
         for trial in self._trials:
             trial.is_canceled = True
         self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
@@ -93,7 +93,7 @@ class TrialRuns:
         return trial
 
     def trial(self, number: int) -> TrialRun | None:
-        """Return the state of the run with a number; None if there is no such run."""
+        """Return the run with this number; None if there is no such run."""
         return self._trials[number - 1] if 0 < number <= len(self._trials) else None
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Texts about a finished run that all reporters use: violations, errors, names, and places in the scenario file."""
+"""Texts about a finished run for all reporters: violations, errors, names, and locations in the scenario file."""
 
 from dataclasses import dataclass
 

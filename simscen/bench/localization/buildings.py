@@ -189,6 +189,7 @@ def _corridor_furniture(
 
 
 def _is_clear_of_doors(doors: Array, box: tuple[float, float, float, float]) -> bool:
+    """Return whether a box is at least DOOR_CLEARANCE_M away from all doors."""
     return all(box_distances(box_array([box]), door)[0] > DOOR_CLEARANCE_M for door in doors.tolist())
 
 

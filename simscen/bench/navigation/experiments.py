@@ -51,7 +51,7 @@ class Experiment:
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Guaranteed width of the passage through a narrow field, minus ROBOT_WIDTH_M. It is at most 0.1 m wider."""
+"""Guaranteed width of a passage through a narrow field, minus ROBOT_WIDTH_M. The true width is at most 0.1 m larger."""
 ROBOT_WIDTH_M = 0.42
 """Width of the Jackal across its wheels."""
 LOCALIZATION_EXPERIMENTS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
@@ -219,7 +219,7 @@ def write_text(file: Path, text: str) -> Path:
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Write a copy of an experiment, called `name`, with the parameters `stack` under the key `stack` of its scenarios.
+    """Write a copy of an experiment with a new name. `stack` is the value of the key `stack` in its scenarios.
 
     The scenarios in `folder` extend the original scenarios. The key `localizer` is ignored for mapless drives.
     """

@@ -146,7 +146,7 @@ def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """Return the mean of all values except None; None without any such value."""
+    """Return the mean of all values except None; None if there are none."""
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
 
@@ -234,7 +234,7 @@ class DriveComparison:
     better:  number of pairs in which only the compared stack succeeded
     worse:   number of pairs in which only the reference stack succeeded
     success: difference of the success rates
-    seconds: difference of the times to the goal, over pairs in which both succeeded; None without any
+    seconds: difference of the times to the goal, over pairs in which both succeeded; None without such pairs
     sct:     difference of the SCT; None if no pair has two values
     score:   difference of the BARN scores; None if no pair has two values
     """

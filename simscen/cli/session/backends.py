@@ -26,7 +26,7 @@ SHOW_CURSOR = b"\x1b[?25h"
 def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
     """Within the context, raise Interrupted on the first SIGINT, SIGTERM, or SIGHUP, and exit on a later one.
 
-    A second signal within REPEATED_SIGNAL_S is ignored, as is SIGHUP if it was ignored before, for example by nohup.
+    A second signal within REPEATED_SIGNAL_S is ignored. SIGHUP stays ignored if it was ignored before, as with nohup.
     """
     first: list[float] = []
 

@@ -50,6 +50,7 @@ PARALLEL_JOBS = (
     _ParallelJob("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
     _ParallelJob("JOB_COMPLETION_INDEX", "JOB_COMPLETIONS"),  # Kubernetes; the second is set by the user
 )
+"""Variables of GitLab, CircleCI, Buildkite, Slurm, and Kubernetes, in the order in which they are searched."""
 
 
 def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
@@ -120,7 +121,7 @@ class Selection:
     """Filter of scenarios.
 
     keyword:     expression about ids, as with `pytest -k`; "" selects all scenarios
-    tags:        tags; selects the scenarios with at least one of them; () selects all scenarios
+    tags:        a scenario needs at least one of these tags; () selects all scenarios
     shard:       number of this shard (from 1), and count of shards
     variations:  names of variations; () selects all variations
     times:       durations of scenarios in s by title, to balance shards
@@ -180,7 +181,7 @@ def load_selection(
 
 
 def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
-    """Return why a stack cannot run a scenario with these problems; "" if the scenario has any other error."""
+    """Return why a stack cannot run a scenario with these problems; "" without such an error, or with other errors."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != STACK_CANNOT for problem in errors):
         return ""

@@ -62,7 +62,7 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
 
 
 BATCH_SIZE = 8
-"""Number of candidates that run together. It does not depend on the number of workers, so that the result does not."""
+"""Number of candidates that run together. It is independent of the number of workers, and so is the result."""
 
 
 class Stopped(Exception):
