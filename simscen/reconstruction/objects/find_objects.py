@@ -150,7 +150,7 @@ def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
 
 
 def _object_of_track(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
-    """Return the object of a track, with the name ""."""
+    """Return the object of a track, still without a name."""
     shape = fit_shape(track.clusters, is_moving)
     keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
     appears = _appearance(compared, track, usable)

@@ -22,9 +22,9 @@ MIN_SIDE_M = 0.1
 SIZE_PERCENTILE = 90.0
 """Percentile of the visible sizes in single scans that is used as the size of a moving box."""
 HEADING_SPEED_M_S, HEADING_SPAN_S = 0.25, 0.8
-"""Speed above which the direction of motion is the heading, and time before and after that is used to measure it."""
+"""Speed above which the direction of motion is the heading, and time before and after over which it is measured."""
 MIN_STAND_S = 1.5
-"""Minimum time with a speed below HEADING_SPEED_M_S of an object that stands."""
+"""Minimum duration of a stop, in which the speed is below HEADING_SPEED_M_S."""
 SMOOTHING_SCANS = 5
 """Number of scans over which positions are smoothed."""
 TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
@@ -70,7 +70,7 @@ def _fit_cylinder(clusters: list[ScanCluster]) -> tuple[float, float]:
 
 
 def _radius_of(cluster: ScanCluster) -> float:
-    """Return the radius in m of the circle through the nearest hit of a cluster that covers the cluster's angle."""
+    """Return the radius in m of the circle with the same nearest range and the same angle, seen from the lidar."""
     near = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
     sine = math.sin(min(cluster.angle / 2, MAX_HALF_ANGLE_RAD))
     return near * sine / (1.0 - sine)

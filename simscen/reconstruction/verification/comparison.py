@@ -1,4 +1,7 @@
-"""Compares a run of a reconstructed scenario with the recorded drive: paths, times, scans, and incidents."""
+"""Compares a run of a reconstructed scenario with the recorded drive: paths, times, scans, and incidents.
+
+The two drives are the drive in the log (`recorded`) and the drive of the run (`repeated`), with one robot each.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from simscen.record.mcap_reader import attached_result
 STEP_S = 0.1
 """Time between two compared positions."""
 SAME_POSITION_M = 0.3
-"""Maximum distance between both robots at which their scans are compared."""
+"""Maximum distance between the two robots at which their scans are compared."""
 SAME_RANGE_M = 0.2
 """Maximum difference between two ranges that count as equal."""
 MIN_SCANS = 3
