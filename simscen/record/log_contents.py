@@ -131,7 +131,7 @@ class LogContents:
         return {name: contents.trace() for name, contents in self.robots.items()}
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence that the log lacks because messages were removed; complete if the run was aborted."""
+        """Return which evidence the log lacks because messages were removed. The log of an aborted run lacks none."""
         return LogCoverage() if self.end is None else self._counts.coverage()
 
     def result(self) -> str:

@@ -19,14 +19,15 @@ from simscen.core.records.run_result import RunKey
 FORMAT_VERSION = "1"
 """Version of the log format. Logs of another version are rejected."""
 STACK_RECORD = "simscen.stack"
-"""Metadata record at the end of the log that describes the external stacks."""
+"""Name of the metadata record at the end of the log with facts about the external stacks."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
 """Keys of `LogHeader.facts`: value of the option --stack, name of the stack if stacks are compared, and variation."""
 ROBOTS_KEY, RESOLUTION_KEY, ORIGIN_KEY = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
 END_RECORD, COUNT_PREFIX = "simscen.end", "messages:"
-"""Metadata record at the end of a complete log, and the prefix of its keys for the number of messages of a topic."""
+"""Name of the metadata record at the end of a complete log, and prefix of its keys for the numbers of messages by
+topic."""
 RESERVED_FILES = CASE_FILE, SCENARIO_FILE, RESULT_FILE = "case.json", "scenario.yaml", "result.json"
 """Names of attachments that are reserved for simscen."""
 _MEDIA_TYPES = {
@@ -57,7 +58,7 @@ class LogHeader:
         sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
         files: Attachments by name.
         facts: Additional metadata as text by key.
-        robots: Headers of several robots by name; empty for a single robot. Other attributes belong to the first robot.
+        robots: Headers of several robots by name; empty for a single robot. The other attributes are of the first one.
     """
 
     name: str
@@ -155,7 +156,7 @@ def attachments(header: LogHeader) -> dict[str, bytes]:
 
 
 SCENERY_FILE = "scenery.json"
-"""Attachment with the Scenery: objects that pictures and markers show in addition to the trace."""
+"""Name of the attachment with the Scenery: objects that pictures and markers show in addition to the trace."""
 _SCENERIES = TypeAdapter(Scenery)
 
 

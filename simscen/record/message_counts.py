@@ -1,4 +1,4 @@
-"""Check of whether a log still has all recorded messages, by the message counts in its end record."""
+"""Check that a log still has all recorded messages, by the message counts in its end record."""
 
 from collections.abc import Mapping
 

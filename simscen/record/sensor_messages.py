@@ -16,7 +16,7 @@ from simscen.record.messages.event_text import EVENT_LOGGER
 from simscen.record.trace_builder import to_planar
 
 LoggedMessages = list[tuple[int, bytes]]
-"""Ticks of logging, and serialized messages."""
+"""Pairs of the tick of logging and a serialized message."""
 
 
 @dataclass(eq=False)

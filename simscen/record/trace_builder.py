@@ -151,6 +151,7 @@ class TraceRows:
 
 
 def _poses(buffer: SignalBuffer) -> Samples:
+    """Return the planar poses in a buffer."""
     ticks, poses = buffer.columns()
     return Samples(ticks, to_planar(poses))
 
@@ -198,6 +199,7 @@ class TraceBuilder:
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
     def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
+        """Add the poses of moving objects."""
         if type(moved) is PosesAtTick:
             self._rows.joint_objects(moved.predicted.names).append(tick, moved.table)
             return

@@ -67,6 +67,7 @@ def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]
 
 
 def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
+    """Add a message to `decoded`, or the reason why it is unsuitable for the role."""
     decoders, messages = _DECODERS[role], decoded.by_role[role]
     if message.encoding != "cdr":
         encoding = message.encoding or "something unknown"

@@ -46,8 +46,8 @@ class RawMessage(NamedTuple):
 class McapMessages:
     """Iterable of the messages of an MCAP file.
 
-    After the iteration, `complete` states whether the file is not truncated, and `topics` has the message types by
-    topic. The iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
+    After the iteration, `complete` is False if the file is truncated, and `topics` has the message types by topic. The
+    iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -114,6 +114,7 @@ def _run_metadata(path: Path) -> dict[str, str] | None:
 
 
 def _reject_ros1(profile: str) -> None:
+    """Raise UnusableLog if an MCAP profile or message encoding is of ROS 1."""
     if profile == "ros1":
         raise UnusableLog("it is a log of ROS 1", "convert it, e.g. with `rosbags-convert`, whose logs are of ROS 2")
 
@@ -125,8 +126,9 @@ INSTALL_ROSBAGS = "pip install 'rosbags>=0.10,<1'"
 class BagMessages:
     """Iterable of the messages of a rosbag2 folder.
 
-    After the iteration, `complete` states whether no messages are missing, and `topics` has the message types by topic.
-    SQLite and compressed bags need the optional package rosbags. Of these bags, only messages on `topics` are read.
+    After the iteration, `complete` is False if messages are missing, and `topics` has the message types by topic.
+    SQLite and compressed bags need the optional package rosbags. Of these bags, only messages on the topics given to
+    the constructor are read.
     """
 
     def __init__(self, folder: Path, topics: Container[str]) -> None:

@@ -16,7 +16,7 @@ MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
 MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 """Minimum change of a clock that is reported."""
 MIN_MESSAGES_AROUND_STEP = 20
-"""Minimum number of messages before and after the change of a clock."""
+"""Minimum number of messages before and after the change of a clock that is reported."""
 MAX_CLOCK_STEP_RATIO = 1.5
 """When a clock is set, the offset (stamp minus time of logging) changes permanently at one message. If the permanent
 change is more than this ratio times the change at the message, the recorder caught up or lost messages instead."""
@@ -28,7 +28,7 @@ MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 class StampedMessages:
     """Times of logging and stamps of the messages of a topic in ns, in the order of logging.
 
-    Raises UnusableLog if the stamps jump back or if their clock was set during the recording.
+    The constructor raises UnusableLog if the stamps jump back or if their clock was set during the recording.
     """
 
     topic: str

@@ -69,6 +69,7 @@ def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence
 
 
 def _count(number: int) -> str:
+    """Return text such as "2 goals"."""
     return f"{number} goal" if number == 1 else f"{number} goals"
 
 
@@ -194,11 +195,13 @@ class ForeignTraceReader:
         return first
 
     def _stamped(self, role: str) -> StampedMessages | None:
+        """Return the stamps of the messages with a role; None if the times of logging are used instead."""
         messages = self._decoded.by_role[role]
         logged, stamps = [time for time, _ in messages], [_stamp(message) or 0 for _, message in messages]
         return stamped_messages(self._options.topic(role), logged, stamps, self._options)
 
     def _ticks(self, track: Track) -> Ticks:
+        """Return the ticks of a track, and add notes on problems of its stamps."""
         if track.stamped is None:
             if self.time.anchor is not None:
                 self.notes.append(f"{track.source}: all stamps are zero, so the times of logging are used")
@@ -269,6 +272,7 @@ class ForeignTraceReader:
         return self._reason_missing(role, self._options.topic(role)).split(";")[0]
 
     def _add_role(self, role: str, ticks: Ticks, values: list[Any]) -> None:
+        """Add the decoded messages of one of the other roles to `rows`."""
         distinct_ticks, last = _last_per_tick(ticks)
         match role:
             case "odom":
