@@ -29,7 +29,7 @@ def moved(stage):
     return path
 
 
-def test_a_door_swings_by_itself_for_its_whole_duration():
+def test_door_swings_for_its_whole_duration():
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "duration": 2.0}).happened
     assert moved(stage).times[-1] == 2.0
@@ -37,24 +37,24 @@ def test_a_door_swings_by_itself_for_its_whole_duration():
     assert moved(stage).poses[-1] == WIDE_OPEN
 
 
-def test_a_door_that_is_reversed_on_its_way_takes_its_share_at_the_same_speed():
+def test_reversed_door_returns_at_the_same_speed():
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, math.pi / 6)})
     assert perform(stage, close={"name": "gate", "duration": 1.5}).what == "gate swings shut"
     assert moved(stage).times[-1] == pytest.approx(0.5)
 
 
-def test_a_door_that_slides_moves_straight():
+def test_sliding_door_moves_in_a_straight_line():
     stage = FakeStage(objects={"gate": Pose2(0.25, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "duration": 2.0}).what == "gate slides open"
     assert moved(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
 
 
-def test_a_sliding_door_slides_however_its_heading_is_rounded():
+def test_sliding_door_tolerates_a_rounded_heading():
     stage = FakeStage(objects={"gate": Pose2(0.25, 0.0, 1e-15)})
     assert perform(stage, open={"name": "gate"}).what == "gate slides open"
 
 
-def test_a_door_ajar_is_open_by_a_share_of_its_travel():
+def test_door_ajar_is_open_by_the_given_fraction():
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "to": "30 %", "duration": 1.0}).what == "gate swings 30% open"
     assert moved(stage).poses[-1].yaw == pytest.approx(0.3 * math.pi / 2)

@@ -47,6 +47,6 @@ def test_a_stamp_is_the_same_time_in_seconds_and_nanoseconds(rate: int, tick: in
 
 
 @pytest.mark.parametrize("rate", [0, -1, 10**9])
-def test_a_clock_that_nanoseconds_cannot_tell_is_refused(rate: int) -> None:
+def test_tick_rate_above_nanosecond_resolution_is_refused(rate: int) -> None:
     with pytest.raises(ValueError, match="nanoseconds"):
         SimTime(rate)

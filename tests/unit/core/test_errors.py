@@ -19,7 +19,7 @@ PROBLEM = Problem("a.yaml", 3, 4, "SC001", "what is wrong", "how to mend it")
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_an_error_is_the_same_in_another_process(error: SimscenError) -> None:
+def test_errors_survive_pickling(error: SimscenError) -> None:
     there = pickle.loads(pickle.dumps(error))
     assert type(there) is type(error)
     assert (str(there), there.exit, vars(there)) == (str(error), error.exit, vars(error))

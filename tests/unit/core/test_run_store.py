@@ -31,7 +31,7 @@ def store(request, monkeypatch) -> RunStore:
     return RunStore(RUNS)
 
 
-def test_a_store_is_a_sequence_of_what_was_added(store: RunStore) -> None:
+def test_store_is_a_sequence_of_its_results(store: RunStore) -> None:
     assert len(store) == len(RUNS)
     assert list(store) == RUNS
     assert list(store) == RUNS  # it can be read again
@@ -41,12 +41,12 @@ def test_a_store_is_a_sequence_of_what_was_added(store: RunStore) -> None:
         store[len(RUNS)]
 
 
-def test_order_is_that_of_file_and_key(store: RunStore) -> None:
+def test_results_are_ordered_by_file_and_key(store: RunStore) -> None:
     assert list(store.in_order()) == sorted(RUNS, key=lambda run: (run.result.path, run.key))
     assert list(store.select([4, 1])) == [RUNS[4], RUNS[1]]
 
 
-def test_results_that_are_added_to_a_part_are_kept(store: RunStore) -> None:
+def test_results_added_to_a_slice_are_kept(store: RunStore) -> None:
     part = store.select([7])
     part.append(run(9))
     assert list(part) == [RUNS[7], run(9)]
@@ -57,7 +57,7 @@ def test_reports_do_not_depend_on_compression(store: RunStore) -> None:
     assert b"".join(xml_parts(store)) == b"".join(xml_parts(RUNS))
 
 
-def test_the_last_result_of_a_run_counts(store: RunStore) -> None:
+def test_last_result_of_a_run_replaces_earlier_ones(store: RunStore) -> None:
     finished = FinishedRuns()
     for each in store:
         finished.add(each.key, each)

@@ -23,5 +23,5 @@ def test_invalid_probability_is_refused(probability, freedom):
         chi2_quantile(probability, freedom)
 
 
-def test_bounds_of_one_run_are_those_of_a_single_squared_error():
+def test_bounds_of_one_run_equal_those_of_a_chi_square_variable():
     assert nees_mean_bounds(1, 3, 0.95) == pytest.approx((0.2158, 9.3484), abs=1e-4)

@@ -11,6 +11,6 @@ def test_the_interval_is_that_of_scipy(good: int, runs: int) -> None:
 
 
 @pytest.mark.parametrize(("good", "runs"), [(0, 0), (3, 2), (-1, 5)])
-def test_there_is_no_rate_without_runs(good: int, runs: int) -> None:
+def test_pass_rate_without_runs_is_undefined(good: int, runs: int) -> None:
     with pytest.raises(ValueError, match="successes of"):
         wilson_interval(good, runs)

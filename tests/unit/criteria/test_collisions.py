@@ -32,7 +32,7 @@ def test_newest_sample_before_contact_determines_the_fault(stops, status):
     assert verdict({"caused_by_robot": True}, sparse(trace, 1)).status is status
 
 
-def test_a_contact_before_the_first_sample_is_judged_by_that():
+def test_contact_before_the_first_sample_is_judged_by_that_sample():
     trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [8, 4, 0]], "events": [[0.01, *HIT[0][1:]]]})
     late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))
     assert verdict({"caused_by_robot": True}, late).status is Status.FAIL
@@ -44,7 +44,7 @@ def test_fault_of_a_collision_is_unknown_without_velocity():
     assert verdict({}, trace).status is Status.FAIL
 
 
-def test_contacts_are_counted_without_a_truth_but_none_is_no_proof():
+def test_contacts_count_without_truth_but_their_absence_is_inconclusive():
     trace = replace(synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), truth=NOTHING)
     assert verdict({}, trace).status is Status.FAIL
     assert verdict({}, trace).findings[0].detail == ("t = 4.50 s: touched cart, 2.0 N s",)
@@ -52,7 +52,7 @@ def test_contacts_are_counted_without_a_truth_but_none_is_no_proof():
     assert verdict({}, replace(trace, events=trace.events[1:])).status is Status.INCONCLUSIVE
 
 
-def test_object_without_complete_position_has_no_place():
+def test_object_without_complete_position_has_no_location():
     trace = synthetic_trace(
         {"seconds": 8, "truth": [[0, 0, 0]], "events": [[1, "collision.started", "cart", {"y": 1.0}]]}
     )
@@ -60,7 +60,7 @@ def test_object_without_complete_position_has_no_place():
 
 
 @pytest.mark.parametrize(("speed", "status"), [(0.1, Status.PASS), (0.10001, Status.FAIL)])
-def test_up_to_a_tenth_of_a_meter_a_second_is_standing(speed, status):
+def test_robot_below_a_tenth_of_a_meter_per_second_is_standing(speed, status):
     trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT})
     trace.velocity.values[:, 0] = speed
     assert verdict({"caused_by_robot": True}, trace).status is status

@@ -69,7 +69,7 @@ def test_the_sign_and_every_positive_distance_are_those_of_shapely(seed):
 
 @given(SEEDS)
 @settings(deadline=None)
-def test_convex_polygons_that_overlap_are_as_deep_as_the_shortest_way_out(seed):
+def test_penetration_depth_is_the_shortest_separating_translation(seed):
     rng = np.random.default_rng(seed)
     hull, region = convex(star(rng, 0.8, 6)), convex(star(rng, 2.0, 7))
     x, y, yaw = *rng.uniform(-1.5, 1.5, 2), rng.uniform(-3, 3)
@@ -80,24 +80,24 @@ def test_convex_polygons_that_overlap_are_as_deep_as_the_shortest_way_out(seed):
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, np.pi / 2])
-def test_a_footprint_that_straddles_a_narrow_strip_is_in_it(yaw):
+def test_footprint_across_a_narrow_region_is_inside(yaw):
     strip = [[-0.05, -5], [0.05, -5], [0.05, 5], [-0.05, 5]]
     found = judged(strip, [[0, 0, 0, yaw]])
     assert found.status is Status.FAIL
     assert found.value < -0.05
 
 
-def test_a_robot_wholly_inside_is_in_it():
+def test_robot_entirely_inside_a_region_is_inside():
     assert judged([[-5, -5], [5, -5], [5, 5], [-5, 5]], [[0, 1, 0, 0]]).value == pytest.approx(-4.3)
 
 
-def test_a_notch_in_a_region_is_no_part_of_it():
+def test_notch_of_a_region_is_outside():
     narrow = [[-0.05, -0.3], [0.05, -0.3], [0.05, 0.3], [-0.05, 0.3]]
     assert judged(NOTCHED, [[0, 1.5, 2, 0]], narrow).value == pytest.approx(0.05)
     assert judged(NOTCHED, [[0, 1.5, 2, 0]], SQUARE).value < 0
 
 
-def test_a_region_between_two_samples_is_not_jumped_over():
+def test_region_between_two_samples_is_detected():
     dash = [[5.0, -1], [5.02, -1], [5.02, 1], [5.0, 1]]
     fly = [[-0.01, -0.01], [0.01, -0.01], [0.01, 0.01], [-0.01, 0.01]]
     found = judged(dash, [[0, 0, 0, 0], [1.0, 13.0, 0, 0]], fly, seconds=1)  # 0.33 m from sample to sample
@@ -105,7 +105,7 @@ def test_a_region_between_two_samples_is_not_jumped_over():
     assert found.value == pytest.approx(-0.02, abs=0.006)
 
 
-def test_a_robot_that_is_set_down_elsewhere_was_nowhere_in_between():
+def test_teleported_robot_is_not_between_its_poses():
     wall = [[4, -1], [6, -1], [6, 1], [4, 1]]
     way = [[0, 5, -5, 0], [5, 5, -5, 0], [5.02, 5, 10, 0], [10, 5, 10, 0]]
     carried = [[5.0, "robot.placed", ""]]
@@ -113,7 +113,7 @@ def test_a_robot_that_is_set_down_elsewhere_was_nowhere_in_between():
     assert judged(wall, way).status is Status.FAIL
 
 
-def test_turning_through_pi_is_a_small_turn():
+def test_turn_across_pi_is_interpolated_the_short_way():
     way = [[0, 0, 0, 3.13], [1, 0, 0, -3.13]]
     pole = [[0.9, -0.1], [1.1, -0.1], [1.1, 0.1], [0.9, 0.1]]
     tail = [[-1.5, -0.05], [0.1, -0.05], [0.1, 0.05], [-1.5, 0.05]]
@@ -127,7 +127,7 @@ def test_without_a_footprint_the_robot_is_a_disc_of_its_inscribed_radius():
 
 
 @pytest.mark.parametrize("ring", [[[0, 0], [1, 0], [2, 0]], [*NOTCHED, *NOTCHED], [[0, 0], [1, 1], [1, 0], [0, 1]]])
-def test_a_region_that_has_no_inside_of_its_own_is_an_error_never_a_pass(ring):
+def test_degenerate_region_is_an_error(ring):
     assert judged(ring, [[0, 9, 9, 0]]).status is Status.ERROR
 
 
@@ -144,13 +144,13 @@ def in_one_step(region, start, end, footprint=FLY, **more):
 
 
 @pytest.mark.parametrize(("start", "end", "tick"), [((0, 0), (0.3, 0), 6), ((0.3, 0), (0, 0), 0)])
-def test_the_nearest_moment_may_be_a_sample_itself(start, end, tick):
+def test_minimum_distance_can_be_at_a_sample(start, end, tick):
     found = in_one_step(around(1, 0, 0.5), start, end)
     assert (found.value, found.tick) == (pytest.approx(0.199, abs=1e-9), tick)
 
 
 @pytest.mark.parametrize("turn", [2.0, -2.0])
-def test_a_tail_that_sweeps_over_a_region_between_two_samples_is_in_it(turn):
+def test_hull_that_sweeps_a_region_between_two_samples_is_inside(turn):
     at = np.pi + 0.3 * turn
     swept = around(1.4 * np.cos(at), 1.4 * np.sin(at), 0.02)
     assert in_one_step(swept, (0, 0, 0), (0, 0, turn), TAIL).value < 0
@@ -159,15 +159,15 @@ def test_a_tail_that_sweeps_over_a_region_between_two_samples_is_in_it(turn):
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.5, 0.0), (0.0, 0.5), (0.35, -0.35)])
-def test_a_way_in_any_direction_between_two_samples_is_searched(x, y):
+def test_motion_in_any_direction_between_two_samples_is_searched(x, y):
     assert in_one_step(around(x, y, 0.02), (0, 0), (2 * x, 2 * y)).value < 0
 
 
-def test_the_nearest_moment_is_found_to_half_a_centimeter():
+def test_minimum_distance_is_exact_to_half_a_centimeter():
     tip = [[0.0165, 0.0], [0.0166, -1.0], [0.0164, -1.0]]
     assert in_one_step(tip, (0, 0), (0.022, 0), [], radius=0.0).value < 0.005
 
 
 @pytest.mark.parametrize("side", [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
-def test_a_disc_is_round(side):
+def test_disc_has_the_same_distance_in_all_directions(side):
     assert judged(around(*side, 0.25), [[0, 0, 0, 0]], [], radius=0.3).value == pytest.approx(0.45)

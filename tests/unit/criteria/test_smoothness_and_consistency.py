@@ -28,12 +28,12 @@ def test_a_speed_that_never_changes_has_no_ldlj():
 
 
 @pytest.mark.parametrize(("fastest", "status"), [(0.0099, Status.INCONCLUSIVE), (0.01, Status.PASS)])
-def test_trembling_is_not_driving(fastest, status):
+def test_small_vibrations_do_not_count_as_driving(fastest, status):
     speeds = fastest * np.sin(np.linspace(0, np.pi, 81))
     assert Smoothness(min_sparc=-9.0).judge(with_speeds(speeds), CASE)[0].status is status
 
 
-def test_the_spectrum_is_that_of_the_rate_of_the_truth():
+def test_spectrum_uses_the_rate_of_the_truth():
     speeds = np.random.default_rng(6).uniform(0, 1, 81)
     assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
 
@@ -43,7 +43,7 @@ def test_two_samples_have_a_spectrum():
     assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
 
 
-def test_without_velocities_nothing_is_smooth():
+def test_smoothness_is_undefined_without_velocities():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     every = Smoothness(max_acceleration=1.0, max_jerk=1.0, max_mean_jerk=1.0, min_sparc=-1.0, min_ldlj=-1.0)
@@ -63,7 +63,7 @@ def believing(seconds, covariances, offset=0.1):
     return replace(trace, belief=Samples(trace.belief.ticks, values))
 
 
-def test_a_singular_covariance_is_overconfident_where_it_is_sampled():
+def test_singular_covariance_at_a_sample_is_overconfident():
     covariances = np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1))
     covariances[50] = [0.01, 0.01, 0, 0.01, 0, 0.01]
     trace = believing(10, covariances)
@@ -72,7 +72,7 @@ def test_a_singular_covariance_is_overconfident_where_it_is_sampled():
     assert LocalizationConsistency(every=3.0).judge(trace, CASE)[0].status is Status.PASS
 
 
-def test_samples_are_taken_every_so_often_from_the_first_belief_or_the_time_given():
+def test_samples_are_periodic_from_the_first_belief_or_the_given_time():
     covariances = np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1))
     covariances[30:] = [0.0025, 0, 0, 0.0025, 0, 0.0025]
     trace = believing(10, covariances)
@@ -84,7 +84,7 @@ def test_samples_are_taken_every_so_often_from_the_first_belief_or_the_time_give
 
 
 @pytest.mark.parametrize("both_sides", [True, False])
-def test_bounds_are_two_sided_only_when_both_sides_count(both_sides):
+def test_bounds_are_two_sided_only_if_both_sides_are_checked(both_sides):
     trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
     findings = LocalizationConsistency(every=1.0, both_sides=both_sides).judge(trace, CASE)
     high = findings[0].value + findings[0].margin
@@ -96,7 +96,7 @@ def test_bounds_are_two_sided_only_when_both_sides_count(both_sides):
         assert len(findings) == 1
 
 
-def test_the_last_belief_is_a_sample_too():
+def test_last_belief_is_sampled():
     trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
     (found,) = LocalizationConsistency(every=1.0, after=10.0).judge(trace, CASE)
     assert found.status is Status.PASS

@@ -20,14 +20,14 @@ def test_an_unchanged_text_is_saved_byte_for_byte(tmp_path: Path, raw: bytes) ->
     assert file.read_bytes() == raw
 
 
-def test_mixed_line_breaks_are_refused_because_they_could_not_survive(tmp_path: Path) -> None:
+def test_file_with_mixed_line_breaks_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     file.write_bytes(b"a: 1\r\nb: 2\n")
     with pytest.raises(InvalidInput, match="mixes kinds of line breaks"):
         Document(file, "a.yaml").read()
 
 
-def test_a_file_that_changed_meanwhile_is_kept(tmp_path: Path) -> None:
+def test_file_that_changed_on_disk_is_not_overwritten(tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
     document = Document(file, "a.yaml")
@@ -41,7 +41,7 @@ def test_a_file_that_changed_meanwhile_is_kept(tmp_path: Path) -> None:
     assert file.read_text() == "a: 3\n"
 
 
-def test_a_new_file_is_not_written_over_one_that_appeared(tmp_path: Path) -> None:
+def test_new_file_does_not_overwrite_a_file_created_meanwhile(tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     document = Document(file, "a.yaml")
     file.write_text("theirs\n")
@@ -56,7 +56,7 @@ def test_a_new_file_is_not_written_over_one_that_appeared(tmp_path: Path) -> Non
     assert file.read_text() == "mine\n"
 
 
-def test_the_permissions_of_the_file_stay(tmp_path: Path) -> None:
+def test_saving_keeps_the_permissions_of_the_file(tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
     file.chmod(0o640)
@@ -66,7 +66,7 @@ def test_the_permissions_of_the_file_stay(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["a.yaml"]
 
 
-def test_a_folder_that_is_gone_is_an_error_with_a_reason(tmp_path: Path) -> None:
+def test_missing_folder_is_an_error_with_a_reason(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     with pytest.raises(UsageError, match="cannot be written"):

@@ -149,7 +149,7 @@ def test_a_request_that_is_too_large_is_refused(server: EditorServer) -> None:
     assert ask(server, "scene", text="a: " + "x" * (1 << 20)).status == 413
 
 
-def test_saving_needs_the_version_that_was_read(server: EditorServer) -> None:
+def test_saving_requires_the_version_that_was_read(server: EditorServer) -> None:
     opened = ask(server, "open").data
     server.session.file.path.write_text("theirs: 1\n")
     conflict = ask(server, "save", text=TEXT, version=opened["version"])
@@ -173,7 +173,7 @@ def test_a_world_file_has_a_page_of_its_own_as_soon_as_the_scenario_names_it(ser
     assert request(server, "GET", f"/{server.token}/world-2/").status == 404
 
 
-def test_an_error_in_the_program_is_reported_and_the_server_goes_on(
+def test_internal_error_is_reported_and_the_server_continues(
     server: EditorServer, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def broken(_: object) -> dict[str, Any]:

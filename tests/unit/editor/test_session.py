@@ -69,7 +69,7 @@ def things(session: EditorSession, text: str = TEXT) -> dict[str, Any]:
     return {one["id"]: one for one in session.scene({"text": text})["objects"]}
 
 
-def test_everything_that_has_a_place_is_on_the_map(session: MakeSession) -> None:
+def test_every_object_with_a_pose_is_on_the_map(session: MakeSession) -> None:
     found = things(session())
     where = {
         name: [(handle["x"], handle["y"]) for handle in one["handles"]] for name, one in found.items() if one["handles"]
@@ -106,7 +106,7 @@ def test_a_text_with_mistakes_still_has_a_map(session: MakeSession) -> None:
         one.scene({"text": "a: [1"})
 
 
-def test_problems_name_the_thing_on_the_map(session: MakeSession) -> None:
+def test_problems_refer_to_objects_on_the_map(session: MakeSession) -> None:
     one = session()
     (note,) = one.problems({"text": TEXT})["problems"]
     assert (note["severity"], note["object"], note["where"]) == ("warning", "goals/0", "10:9")
@@ -120,13 +120,13 @@ def test_problems_name_the_thing_on_the_map(session: MakeSession) -> None:
     assert one.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
 
 
-def test_a_problem_is_not_put_down_to_a_neighbor_in_the_same_line(session: MakeSession) -> None:
+def test_problem_is_not_assigned_to_another_object_in_the_same_line(session: MakeSession) -> None:
     text = TEXT.replace("goals: [dock, ", "goals: [{name: first one, pose: {x: 4, y: 4.0}}, {pose: {x: 6, y: 2}}, ")
     found = session().problems({"text": text})["problems"]
     assert [problem["object"] for problem in found] == ["goals/0"]
 
 
-def test_moving_a_thing_at_a_place_writes_its_own_pose(session: MakeSession) -> None:
+def test_moving_an_object_at_a_place_writes_a_pose(session: MakeSession) -> None:
     one = session()
 
     def moved(keys: list[Any], **to: float) -> str:
@@ -140,7 +140,7 @@ def test_moving_a_thing_at_a_place_writes_its_own_pose(session: MakeSession) -> 
     assert one.edit({"text": TEXT, "edits": [point]})["text"] == TEXT.replace("goals: [dock]}}", "goals: [[2, 3]]}}")
 
 
-def test_paths_and_clearances_are_those_after_the_edits(session: MakeSession) -> None:
+def test_paths_and_clearances_are_updated_after_edits(session: MakeSession) -> None:
     one = session()
     before = one.preview({"text": TEXT, "edits": []})["robots"]["robot"]
     assert [leg["length"] for leg in before["legs"]] == [0, 6.08]
@@ -150,7 +150,7 @@ def test_paths_and_clearances_are_those_after_the_edits(session: MakeSession) ->
     assert one.preview({"text": TEXT + "raduis: 1\n"})["reason"].startswith("No path is shown until this is corrected")
 
 
-def test_the_inscribed_obstacle_is_avoided_where_it_is_dragged_to(session: MakeSession) -> None:
+def test_path_avoids_a_dragged_obstacle_at_its_new_position(session: MakeSession) -> None:
     one = session()
     moved = [{"op": "pose", "keys": ["world", "obstacles", 0, "pose"], "x": 4.0, "y": 1.5}]
     length = one.preview({"text": TEXT, "edits": moved})["robots"]["robot"]["legs"][1]["length"]
@@ -186,7 +186,7 @@ def test_every_form_offers_only_keys_that_the_file_accepts(session: MakeSession)
             assert not codes & {"SC003", "SC011", "SC012", "SC013", "SC014", "SC015"}, (thing["id"], offered, codes)
 
 
-def test_what_a_base_file_says_is_shown_and_overridden_here(session: MakeSession, tmp_path: Path) -> None:
+def test_values_of_a_base_file_are_shown_and_can_be_overridden(session: MakeSession, tmp_path: Path) -> None:
     (tmp_path / "hall.base.yaml").write_text(TEXT)
     own = "extends: hall.base.yaml\nname: mine\n"
     one = session(own)

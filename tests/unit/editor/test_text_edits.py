@@ -70,18 +70,18 @@ def test_a_value_keeps_its_notation(before: str, value: Any, after: str) -> None
         ("d: >\n  old\n", "x " * 100 + "end\n", "d: >\n  " + ("x " * 59)[:-1] + "\n  " + "x " * 41 + "end\n"),
     ],
 )
-def test_a_long_text_keeps_its_style_where_that_can_hold_it(before: str, value: str, after: str) -> None:
+def test_long_text_keeps_its_scalar_style_if_possible(before: str, value: str, after: str) -> None:
     keys = ("d", "f") if "f:" in before else ("d",)
     assert edited(before, SetValue(keys, value)) == after
 
 
-def test_the_alias_that_is_edited_gets_a_value_of_its_own() -> None:
+def test_edited_alias_becomes_a_separate_value() -> None:
     assert edited("a: &n 2.0\nb: *n\n", SetValue(("b",), 3)) == "a: &n 2.0\nb: 3\n"
     with pytest.raises(EditRefused, match="is not written out in this file"):
         edited("a: &n {x: 2}\nb: [*n]\n", SetValue(("b", 0, "x"), 3))
 
 
-def test_a_change_that_would_reach_other_values_is_refused() -> None:
+def test_edit_that_would_change_other_values_is_refused() -> None:
     with pytest.raises(EditRefused, match="without changing other values"):
         edited("a: &n 2.0\nb: *n\n", SetValue(("a",), 3))
 
@@ -135,7 +135,7 @@ def test_a_new_block_item_is_written_like_the_one_before() -> None:
         ("a:\n  - 1\nb: 2\n", ("a", 0), "a: []\nb: 2\n"),
     ],
 )
-def test_removing(before: str, keys: tuple[Key, ...], after: str) -> None:
+def test_removed_part_leaves_the_expected_text(before: str, keys: tuple[Key, ...], after: str) -> None:
     assert edited(before, RemovePart(keys)) == after
 
 
@@ -177,7 +177,7 @@ def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
-def test_what_is_added_to_a_shipped_file_can_be_removed_without_a_trace(data: st.DataObject) -> None:
+def test_removing_an_added_part_restores_a_shipped_file(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
     lists = [("goals",), ("events",), ("pass",), ("obstacles",), ("walls",), ("regions", "hall"), ("tags",)]
     keys = data.draw(st.sampled_from(lists))
@@ -191,7 +191,7 @@ def test_what_is_added_to_a_shipped_file_can_be_removed_without_a_trace(data: st
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.name)
-def test_setting_every_value_of_a_shipped_file_to_what_it_is_changes_nothing(file: Path) -> None:
+def test_setting_each_value_to_itself_does_not_change_a_shipped_file(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     data = plain(text)
     numbers = [keys for keys in _leaves(data) if isinstance(_at(data, keys), int | float)]

@@ -69,7 +69,7 @@ def test_a_run_shows_its_progress_until_it_is_stopped(loaded: LoadedScenario) ->
     runs.close()
 
 
-def test_a_new_run_stops_the_one_before_and_the_end_deletes_their_files(loaded: LoadedScenario) -> None:
+def test_new_run_stops_the_previous_one_and_exit_deletes_their_files(loaded: LoadedScenario) -> None:
     runs = TrialRuns(EndlessBackend)
     trials: list[TrialRun] = []
     for _ in range(2):

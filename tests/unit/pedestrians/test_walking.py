@@ -128,7 +128,7 @@ def test_pedestrians_do_not_walk_through_walls_or_each_other():
     assert (ways[-1, :, 1] > 4.0).sum() >= 5
 
 
-def test_goals_are_walked_to_in_turn_once_in_a_circle_or_back_and_forth():
+def test_goals_are_visited_once_in_a_loop_or_back_and_forth():
     def reached(repeat: str) -> list[str]:
         crowd = people(walker("anna", 0.0, 0.0, (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), repeat=repeat))
         return [deed.about for deed in walk(crowd, 20.0)[1]]

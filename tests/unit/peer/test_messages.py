@@ -24,12 +24,12 @@ poses = st.lists(st.tuples(numbers, numbers, st.floats(-4, 4)), max_size=5)
 
 
 @given(numbers, numbers, numbers)
-def test_a_twist_is_what_the_engine_packs(vx: float, vy: float, wz: float) -> None:
+def test_twist_equals_the_message_of_the_engine(vx: float, vy: float, wz: float) -> None:
     assert messages.twist(vx, vy, wz) == encode.twist().packer()(Twist(vx, vy, wz))
 
 
 @given(poses)
-def test_a_path_is_what_the_engine_packs(points) -> None:
+def test_path_equals_the_message_of_the_engine(points) -> None:
     table = np.array(points, dtype=np.float64).reshape(-1, 3)
     ours, theirs = messages.path(STAMP, points), encode_arrays.PathPacker("map")(STAMP, table)
     assert len(ours) == len(theirs)
@@ -40,26 +40,26 @@ def test_a_path_is_what_the_engine_packs(points) -> None:
 
 
 @given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))
-def test_a_pose_with_covariance_is_what_the_engine_packs(x: float, y: float, yaw: float, covariance) -> None:
+def test_pose_with_covariance_equals_the_message_of_the_engine(x: float, y: float, yaw: float, covariance) -> None:
     theirs = encode.pose_with_covariance("map").packer()
     expected = theirs(STAMP, Pose3.planar(Pose2(x, y, yaw)), covariance)
     assert messages.pose_with_covariance(STAMP, (x, y, yaw), covariance) == expected
 
 
 @given(names, names)
-def test_transforms_lines_and_texts_are_what_the_engine_packs(frame: str, text: str) -> None:
+def test_transforms_lines_and_texts_equal_the_messages_of_the_engine(frame: str, text: str) -> None:
     link = (frame, text, STAMP, Pose3.planar(Pose2(1.0, 2.0, 0.5)))
     ours = (STAMP, frame, text, (1.0, 2.0, 0.5))
     assert messages.transforms([ours, ours]) == encode_arrays.TransformsPacker()([link, link])
 
 
-def test_particles_are_what_the_engine_packs() -> None:
+def test_particles_equal_the_message_of_the_engine() -> None:
     cloud = [(1.0, 2.0, 0.0, 0.25), (3.0, 4.0, 1.0, 0.75)]
     assert messages.particle_cloud(STAMP, cloud) == encode_arrays.ParticleCloudPacker("map")(STAMP, np.array(cloud))
 
 
 @given(names, st.lists(st.floats(0, 100, width=32) | st.just(float("inf")), max_size=9))
-def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
+def test_scan_is_unchanged_by_serialization(frame: str, ranges) -> None:
     scan = Scan("lidar", 0, np.array(ranges, dtype=np.float64), -1.5, 0.25, 0.5, 12.0)
     read = messages.read("sensor_msgs/msg/LaserScan", encode_arrays.LaserScanPacker(frame)(STAMP, scan))
     assert (read.stamp, read.frame, list(read.ranges)) == (STAMP, frame, ranges)
@@ -67,7 +67,7 @@ def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
 
 
 @given(numbers, numbers, st.floats(-3, 3), names)
-def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame: str) -> None:
+def test_odometry_is_unchanged_by_serialization(x: float, y: float, yaw: float, frame: str) -> None:
     pack = encode.odometry_with_covariance(frame, "base").packer()
     covariance, variances = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), (10.0, 11.0, 12.0)
     packed = pack(STAMP, Pose3.planar(Pose2(x, y, yaw)), covariance, Twist(x, y, yaw), variances)
@@ -79,7 +79,7 @@ def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame
     assert read.pose == pytest.approx((x, y, yaw))
 
 
-def test_an_imu_a_picture_and_a_map_are_read_as_they_were_packed() -> None:
+def test_imu_picture_and_map_are_unchanged_by_serialization() -> None:
     packed = encode.imu("base").packer()(STAMP, (1.0, 2.0, 3.0), 0.25, (4.0, 5.0, 6.0), 0.5)
     read = messages.read("sensor_msgs/msg/Imu", packed)
     assert (read.angular_velocity, read.linear_acceleration) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))

@@ -40,7 +40,7 @@ def types(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("types")
-def test_a_controller_owes_a_command_in_each_of_its_periods_while_it_executes_a_goal() -> None:
+def test_controller_must_send_a_command_in_each_period_while_it_executes_a_goal() -> None:
     graph = FakeGraph({"follow_path": "/robot1/controller_server"}, {"/robot1/controller_server": 10.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
     actions.subscribe()
@@ -56,7 +56,7 @@ def test_a_controller_owes_a_command_in_each_of_its_periods_while_it_executes_a_
 
 
 @pytest.mark.usefixtures("types")
-def test_a_server_may_miss_commands_for_a_simulated_second() -> None:
+def test_server_may_miss_commands_for_one_simulated_second() -> None:
     graph = FakeGraph({"follow_path": "/controller_server"}, {"/controller_server": 20.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
     actions.subscribe()
@@ -72,7 +72,7 @@ def test_a_server_may_miss_commands_for_a_simulated_second() -> None:
 
 
 @pytest.mark.usefixtures("types")
-def test_servers_without_a_rate_or_without_a_status_owe_nothing() -> None:
+def test_servers_without_rate_or_status_need_not_send_commands() -> None:
     graph = FakeGraph({"spin": "/behavior_server", "follow_path": "/silent"}, {"/behavior_server": 0.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
     actions.subscribe()

@@ -31,11 +31,11 @@ def parameter(number: int, **fields: object) -> SimpleNamespace:
         (parameter(9, string_array_value=["a", "b"]), ["a", "b"]),
     ],
 )
-def test_a_parameter_becomes_a_value_of_json(value: SimpleNamespace, expected: object) -> None:
+def test_parameter_is_converted_to_json(value: SimpleNamespace, expected: object) -> None:
     assert plain_value(value) == expected
 
 
-def test_lines_are_taken_once_and_sorted_by_logger() -> None:
+def test_log_lines_are_returned_once_and_sorted_by_logger() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
     report._add_log_line(SimpleNamespace(level=40, name="planner_server", msg="no path"))
@@ -60,7 +60,7 @@ def test_the_last_different_errors_are_listed() -> None:
     assert report.errors() == []
 
 
-def test_a_lifecycle_manager_that_gives_up_is_known_by_name() -> None:
+def test_lifecycle_manager_that_gives_up_is_named() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
     report._add_log_line(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))

@@ -60,12 +60,12 @@ def test_a_behavior_starts_and_ends_once_although_its_status_is_repeated(graph, 
     ]
 
 
-def test_a_behavior_of_which_only_the_end_was_seen_has_both_events(graph, events, followed) -> None:
+def test_behavior_with_only_an_observed_end_has_both_events(graph, events, followed) -> None:
     graph.report("wait", (1, 4))
     assert events == [("recovery.started", "wait"), ("recovery.ended", "wait", "succeeded")]
 
 
-def test_counted_recoveries_that_are_no_behavior_are_costmap_clearing(graph, events, followed) -> None:
+def test_counted_recoveries_without_a_behavior_are_costmap_clearing(graph, events, followed) -> None:
     followed.begin_goal()
     followed.update_count(1)
     followed.report_clearing(0)
@@ -87,7 +87,7 @@ def test_a_counted_behavior_is_not_reported_twice(graph, events, followed) -> No
     assert events == [("recovery.started", "backup")]
 
 
-def test_each_goal_counts_from_zero(graph, events, followed) -> None:
+def test_recovery_count_restarts_with_each_goal(graph, events, followed) -> None:
     for now in (0, 10 * S):
         followed.begin_goal()
         followed.update_count(2)

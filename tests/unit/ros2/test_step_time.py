@@ -64,7 +64,7 @@ def test_each_step_has_its_own_time(time: FakeTime, step) -> None:
         assert step.wait_for(until(time, controller_server=4.5), 5.0)
 
 
-def test_a_node_that_exceeds_its_own_limit_is_left_to_the_caller(time: FakeTime, step) -> None:
+def test_wait_with_its_own_limit_ends_before_the_step(time: FakeTime, step) -> None:
     step.begin(8.0)
     assert not step.wait_for(until(time, planner_server=30.0), 2.0)
     assert 5.5 < step.remaining < 6.1

@@ -31,7 +31,7 @@ def build(sensors=SENSORS, seed=1, view=None):
     return build_sensors(robot(sensors), Clock(240), Streams(seed), view or Puppet(), SquareRoom(3.0))
 
 
-def test_sensors_come_in_the_order_of_their_names_whatever_the_file_says():
+def test_sensors_are_sorted_by_name():
     reversed_file = dict(reversed(SENSORS.items()))
     assert [sensor.name for sensor in build()] == ["back", "bumper", "front", "imu", "odom", "zed"]
     assert [sensor.name for sensor in build(reversed_file)] == [sensor.name for sensor in build()]
@@ -47,18 +47,18 @@ def test_a_rate_that_does_not_divide_the_clock_is_refused_with_the_nearest_that_
         build({"lidar": {"lidar": {"rate": 7.0}}})
 
 
-def test_every_kind_of_sensor_gives_its_kind_of_reading():
+def test_each_sensor_type_returns_its_reading_type():
     kinds = {type(sensor.read(0)) for sensor in build()}
     assert kinds == {Scan, Odometry, Imu, Bump, Image}
 
 
-def test_one_sensor_more_changes_nothing_for_the_others():
+def test_additional_sensor_does_not_change_the_others():
     alone = build({"front": SENSORS["front"]})[0].read(0)
     among = next(sensor for sensor in build() if sensor.name == "front").read(0)
     assert np.array_equal(alone.ranges, among.ranges)
 
 
-def test_two_lidars_have_noise_of_their_own():
+def test_noise_of_two_lidars_differs():
     back, *_, front = (s.read(0) for s in build() if s.name in {"back", "front"})
     assert not np.array_equal(back.ranges, front.ranges)
 

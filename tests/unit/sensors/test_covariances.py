@@ -38,7 +38,7 @@ def test_wheels_at_rest_have_no_variance() -> None:
 
 @pytest.mark.parametrize("rate", [10, 40])
 @pytest.mark.parametrize(("vx", "wz"), [(0.5, 0.0), (0.0, 1.0), (0.3, -0.9)])
-def test_twists_scatter_as_their_variance_says(vx: float, wz: float, rate: int) -> None:
+def test_scatter_of_twists_matches_their_variance(vx: float, wz: float, rate: int) -> None:
     twists, variances = [], []
     for seed in range(3000, 3000 + RUNS):
         view = Puppet()
@@ -51,7 +51,7 @@ def test_twists_scatter_as_their_variance_says(vx: float, wz: float, rate: int) 
     assert np.var(twists, axis=0) == pytest.approx(np.mean(variances, axis=0), rel=0.25, abs=1e-15)
 
 
-def test_poses_scatter_as_their_covariance_says() -> None:
+def test_scatter_of_poses_matches_their_covariance() -> None:
     """An arc of 2 m and 1.6 rad: the mean NEES of the accumulated pose is within its 99.9 % bounds around 3."""
     ends, covariances = [], []
     for seed in range(4000, 4000 + RUNS):

@@ -31,7 +31,7 @@ def test_imu_measures_acceleration_in_its_own_frame():
     assert sensor.read(8).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
 
 
-def test_on_a_slope_gravity_leans_back():
+def test_imu_on_a_slope_measures_tilted_gravity():
     reading = imu(Puppet(Pose3.from_rpy(0, 0, 0, 0, -0.1, 0)), **EXACT).read(4)
     assert reading.linear_acceleration == pytest.approx((9.81 * math.sin(0.1), 0.0, 9.81 * math.cos(0.1)))
 
@@ -41,7 +41,7 @@ def test_turn_rates_are_about_its_own_axes():
     assert imu(view, **EXACT).read(4).angular_velocity == pytest.approx((0.0, 1.0, 0.0))
 
 
-def test_noise_is_new_each_time_and_the_bias_stays():
+def test_noise_changes_between_readings_and_bias_does_not():
     spec = {"gyro_noise": 0.01, "gyro_bias": 0.5, "accelerometer_noise": 0.1}
     sensor = imu(Puppet(), **spec)
     readings = [sensor.read(k) for k in range(3000)]

@@ -34,7 +34,7 @@ def test_ranges_are_whole_steps():
         assert np.allclose(ranges / resolution, np.round(ranges / resolution), atol=1e-6)
 
 
-def test_a_full_circle_has_every_direction_once_and_the_back_first():
+def test_full_circle_has_each_direction_once_and_starts_at_the_back():
     scan = lidar(at(0, 0), Nothing(), beams=360).read(0)
     assert scan.angle_min == pytest.approx(-math.pi)
     assert scan.angles()[-1] + scan.angle_increment == pytest.approx(math.pi)
@@ -59,7 +59,7 @@ def test_ranges_out_of_bounds_follow_rep_117():
     assert np.isneginf(lidar(at(0, 0), SquareRoom(3.0), min_range=5.0).read(0).ranges).all()
 
 
-def test_the_mount_is_where_the_lidar_is_and_where_it_looks():
+def test_mount_sets_position_and_direction_of_the_lidar():
     mount = Mount(x=0.5, y=0.1, z=0.3, yaw=math.pi / 2)
     scan = lidar(at(0, 0), SquareRoom(3.0), noise=0.0, mount=mount).read(0)
     ahead = scan.ranges[180]  # the beam at angle 0 of the lidar, which looks to the left
@@ -81,7 +81,7 @@ def test_beams_of_a_tilted_robot_point_upward():
     assert origin == pytest.approx([-0.2 * math.sin(0.1), 0.0, 0.2 * math.cos(0.1)])
 
 
-def test_noise_has_the_moments_that_were_asked_for():
+def test_noise_has_the_specified_moments():
     sensor = lidar(at(0, 0), SquareRoom(3.0), noise=0.02)
     quiet = lidar(at(0, 0), SquareRoom(3.0), **QUIET).read(0).ranges
     errors = np.concatenate([sensor.read(k).ranges - quiet for k in range(200)])
@@ -101,7 +101,7 @@ def test_noise_of_neighboring_beams_and_scans_is_independent():
     assert abs((errors[1:] * errors[:-1]).mean()) < bound
 
 
-def test_a_scan_is_kept_as_it_was_read():
+def test_next_reading_does_not_change_an_earlier_scan():
     sensor = lidar(at(0, 0), SquareRoom(3.0))
     first = sensor.read(0)
     copy = replace(first, ranges=first.ranges.copy())

@@ -38,7 +38,7 @@ def roll(view, vx, wz, seconds, drive=DRIVE):
     SkidSteer(type="skid_steer", wheel_radius=0.098, wheel_separation=0.376, wheel_base=0.26),
     Ackermann(type="ackermann", wheel_radius=0.08, wheel_separation=0.3, wheel_base=0.4, max_steering=0.5),
 ])  # fmt: skip
-def test_wheels_that_do_not_slip_are_reckoned_exactly(drive):
+def test_odometry_without_noise_and_slip_is_exact(drive):
     """An eighth of a circle in one increment: the arc, not its chord."""
     view = Puppet()
     sensor = odometry(view, drive, **EXACT)
@@ -54,7 +54,7 @@ def test_the_twist_is_the_mean_velocity_since_the_last_reading():
     assert sensor.read(6).twist == pytest.approx(Twist(0.4, 0.0, -0.3))
 
 
-def test_skid_steering_reckons_with_its_turning_scale():
+def test_skid_steer_odometry_uses_the_turning_scale():
     drive = SkidSteer(type="skid_steer", wheel_radius=0.1, wheel_separation=0.4, wheel_base=0.3, turning_scale=1.5)
     view = Puppet()
     sensor = odometry(view, drive, **EXACT)
@@ -62,14 +62,14 @@ def test_skid_steering_reckons_with_its_turning_scale():
     assert sensor.read(6).pose.yaw == pytest.approx(0.2)
 
 
-def test_an_omnidirectional_base_reckons_sideways_too():
+def test_omnidirectional_odometry_includes_sideways_motion():
     view = Puppet(rolled=(0.0, 0.0, 0.0))
     sensor = odometry(view, Omnidirectional(type="omnidirectional"), **EXACT)
     view.rolled = (0.0, 0.5 * math.pi, math.pi)
     assert sensor.read(6).pose == pytest.approx(Pose2(-1.0, 0.0, math.pi))
 
 
-def test_the_odom_frame_begins_where_the_sensor_was_switched_on():
+def test_odom_frame_starts_at_the_initial_pose():
     sensor = odometry(Puppet(rolled=(123.0, 45.0)), **EXACT)
     assert sensor.read(0).pose == Pose2(0.0, 0.0, 0.0)
 
@@ -110,6 +110,6 @@ def test_errors_after_a_radian_are_those_of_the_specification():
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3))
-def test_two_halves_of_an_arc_are_the_arc(vx, vy, wz):
+def test_arc_in_two_steps_equals_arc_in_one_step(vx, vy, wz):
     half = integrate_arc(Twist(vx / 2, vy / 2, wz / 2))
     assert half.compose(half) == pytest.approx(integrate_arc(Twist(vx, vy, wz)), abs=1e-8)

@@ -55,7 +55,7 @@ def test_a_time_is_reached_at_its_tick(tick, expected):
 
 
 @pytest.mark.parametrize(("meters", "expected"), [(1.99, False), (2.0, True), (2.01, True)])
-def test_a_way_is_travelled_when_it_is_as_long(meters, expected):
+def test_distance_traveled_holds_from_the_given_distance(meters, expected):
     assert holds({"travelled": 2.0}, travelled=meters) is expected
 
 
@@ -69,7 +69,7 @@ def test_a_way_is_travelled_when_it_is_as_long(meters, expected):
         (Twist(0.0, 0.0, 3.0), True, False),
     ],
 )
-def test_a_speed_is_over_ground_and_neither_below_nor_above_itself(twist, below, above):
+def test_speed_is_over_ground_and_compared_strictly(twist, below, above):
     assert holds({"speed_below": 0.5}, twist=twist) is below
     assert holds({"speed_above": 0.5}, twist=twist) is above
 
@@ -80,17 +80,17 @@ def test_distance_remaining_is_euclidean(x, expected):
     assert holds({"distance_remaining": 2}, robot=Pose2(x, 2.0), goal=goal) is expected
 
 
-def test_without_a_goal_nothing_remains():
+def test_distance_remaining_does_not_hold_without_a_goal():
     assert not holds({"distance_remaining": 100})
 
 
 @pytest.mark.parametrize(("off", "expected"), [(0.49, False), (0.5, False), (0.51, True)])
-def test_an_error_of_localization_is_more_than_the_bound(off, expected):
+def test_localization_error_holds_above_the_bound(off, expected):
     belief = Belief(Pose2(1.0, 1.0 + off), np.eye(3))
     assert holds({"localization_error": 0.5}, robot=Pose2(1.0, 1.0), belief=belief) is expected
 
 
-def test_without_a_belief_nothing_is_in_error():
+def test_localization_error_does_not_hold_without_a_belief():
     assert not holds({"localization_error": 0})
 
 
@@ -105,7 +105,7 @@ def test_believed_distance_remaining_uses_the_estimate(x, expected):
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("rate", "below", "above"), [(0.49, True, False), (0.5, False, False), (0.51, False, True)])
-def test_a_turn_has_a_rate_and_no_side(rate, below, above, side):
+def test_turn_rate_ignores_the_direction(rate, below, above, side):
     twist = Twist(3.0, 0.0, side * rate)
     assert holds({"turning_below": "0.5 rad/s"}, twist=twist) is below
     assert holds({"turning_above": "0.5 rad/s"}, twist=twist) is above
@@ -119,7 +119,7 @@ def test_clearance_below_compares_strictly(clearance, expected):
 
 
 @pytest.mark.parametrize(("tick", "expected"), [(219, False), (220, False), (221, True)])
-def test_a_scan_is_as_old_as_the_time_since_the_stack_received_it(tick, expected):
+def test_scan_age_counts_from_reception_by_the_stack(tick, expected):
     scans = {"lidar": 100, "rear": 90}
     assert holds({"scan_age": {"above": "0.5 s"}}, tick=tick, scans=scans) is expected
     assert holds({"scan_age": {"above": "0.5 s", "sensor": "lidar"}}, tick=tick, scans=scans) is expected
@@ -127,7 +127,7 @@ def test_a_scan_is_as_old_as_the_time_since_the_stack_received_it(tick, expected
 
 
 @pytest.mark.parametrize(("tick", "expected"), [(120, False), (121, True)])
-def test_before_the_first_scan_its_age_counts_from_the_start(tick, expected):
+def test_scan_age_counts_from_the_start_before_the_first_scan(tick, expected):
     assert holds({"scan_age": {"above": "0.5 s"}}, tick=tick) is expected
     assert holds({"scan_age": {"above": "0.5 s", "sensor": "rear"}}, tick=tick, scans={"lidar": tick}) is expected
 
@@ -135,13 +135,13 @@ def test_before_the_first_scan_its_age_counts_from_the_start(tick, expected):
 @pytest.mark.parametrize(
     ("off", "turn", "expected"), [(0.5, 0.5, False), (0.51, 0.0, True), (0.0, 0.53, True), (0.0, 2 * np.pi, False)]
 )
-def test_a_robot_is_lost_when_its_position_or_its_heading_is_off(off, turn, expected):
+def test_robot_is_lost_if_position_or_heading_is_wrong(off, turn, expected):
     belief = Belief(Pose2(1.0, 1.0 + off, 3.0 + turn), np.eye(3) * 100)
     assert holds({"localization_lost": {}}, robot=Pose2(1.0, 1.0, 3.0), belief=belief) is expected
 
 
 @pytest.mark.parametrize(("bound", "expected"), [(0.499, True), (0.501, False)])
-def test_a_robot_that_is_unsure_is_lost_as_far_as_it_is_least_sure(bound, expected):
+def test_uncertain_robot_is_lost_by_its_largest_standard_deviation(bound, expected):
     turned = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     covariance = np.eye(3)
     covariance[:2, :2] = turned @ np.diag([0.5**2, 0.1**2]) @ turned.T
@@ -158,29 +158,29 @@ def test_a_belief_at_its_limits_is_not_lost():
     assert holds({"localization_lost": {"std": 0.0999}}, robot=Pose2(0.0, 0.0), belief=certain)
 
 
-def test_without_a_belief_nothing_is_lost():
+def test_robot_is_not_lost_without_a_belief():
     assert not holds({"localization_lost": {"std": 0.001}})
 
 
 @pytest.mark.parametrize(("x", "expected"), [(1.0, True), (2.0, True), (2.001, False)])
-def test_a_region_has_its_edge(x, expected):
+def test_region_includes_its_edge(x, expected):
     assert holds({"robot_in": {"region": "hall"}}, robot=Pose2(x, 1.0)) is expected
 
 
 @pytest.mark.parametrize(("x", "expected"), [(3.49, True), (3.5, True), (3.51, False)])
-def test_near_is_at_most_the_distance(x, expected):
+def test_robot_within_includes_the_given_distance(x, expected):
     assert holds({"robot_within": {"region": "hall", "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
     assert holds({"robot_within": {"of": [2, 1], "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
     there = {"cart": Pose2(2.0, 1.0)}
     assert holds({"robot_within": {"object": "cart", "distance": 1.5}}, robot=Pose2(x, 1.0), objects=there) is expected
 
 
-def test_a_point_has_both_its_coordinates():
+def test_x_and_y_of_a_point_are_not_swapped():
     assert holds({"robot_within": {"of": [5, 7], "distance": 0}}, robot=Pose2(5.0, 7.0))
     assert not holds({"robot_within": {"of": [5, 7], "distance": 1}}, robot=Pose2(7.0, 5.0))
 
 
-def test_nothing_is_near_a_missing_object():
+def test_robot_is_not_within_any_distance_of_a_missing_object():
     assert not holds({"robot_within": {"object": "cart", "distance": 1000}})
 
 
@@ -210,7 +210,7 @@ def test_logged_events_count_by_kind_and_name(kind):
 
 
 @pytest.mark.parametrize("kind", ["goal", "recovery", "collision", "pedestrian"])
-def test_without_a_name_any_counts(kind):
+def test_condition_without_a_name_counts_all_events(kind):
     words, logged = LOGGED[kind]
     bare = {key: value for key, value in words.items() if key == "status"}
     assert holds({kind: bare}, events=(Event(1, logged, "whatever"),))
@@ -218,7 +218,7 @@ def test_without_a_name_any_counts(kind):
 
 
 @pytest.mark.parametrize("kind", ["goal", "recovery", "pedestrian"])
-def test_as_often_as_is_asked(kind):
+def test_event_must_happen_the_given_number_of_times(kind):
     words, logged = LOGGED[kind]
     name = words["name"]
     once, twice = (tuple(Event(k, logged, name) for k in range(n)) for n in (1, 2))
@@ -227,13 +227,13 @@ def test_as_often_as_is_asked(kind):
     assert holds({kind: words}, events=once)
 
 
-def test_an_end_is_no_start():
+def test_end_of_an_event_does_not_count_as_its_start():
     ended = (Event(1, EventKind.EVENT_ENDED, "a"),)
     assert not holds({"event": {"name": "a"}}, events=ended)
     assert holds({"event": {"name": "a", "status": "ended"}}, events=ended)
 
 
-def test_a_fault_that_has_started_or_ended_counts_as_an_event_does():
+def test_start_and_end_of_a_fault_count_like_those_of_an_event():
     began, over = Event(1, EventKind.FAULT_STARTED, "lidar.off"), Event(2, EventKind.FAULT_ENDED, "lidar.off")
     assert holds({"event": {"name": "lidar.off"}}, events=(began,))
     assert not holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(began,))

@@ -23,7 +23,7 @@ def limits(value, *, percent=True, base=0.0, multiplier=1.0):
         (50, {"base": 100.0}, None),  # 150 percent
     ],
 )
-def test_a_cell_limits_as_nav2s_speed_filter_says(value, how, limit):
+def test_speed_limit_of_a_cell_equals_that_of_nav2(value, how, limit):
     assert limits(value, **how).at(Pose2(1.0, 1.0), 0.5) == (None if limit is None else pytest.approx(limit))
 
 

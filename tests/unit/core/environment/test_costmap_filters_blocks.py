@@ -13,7 +13,7 @@ CELLS = arrays(
 
 
 @given(CELLS)
-def test_a_mask_in_blocks_has_every_cell_that_says_something_once(cells):
+def test_blocks_of_a_mask_contain_each_marked_cell_once(cells):
     mask = mask_blocks(OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, 0.3)))
     said = np.where(cells > 0, cells, 0)
     again = mask.grid

@@ -17,6 +17,6 @@ def test_coarse_map_is_split_into_equal_cells(cell, finest, expected):
     assert np.array_equal(fine.values_at(places), coarse.values_at(places))
 
 
-def test_a_huge_coarse_map_is_split_no_further_than_memory_allows():
+def test_split_of_a_huge_coarse_map_is_limited():
     assert OccupancyGrid(np.zeros((2000, 3000), dtype=np.int8), 0.5).refined(0.05).shape == (2000, 3000)
     assert OccupancyGrid(np.zeros((1000, 1000), dtype=np.int8), 0.5).refined(0.05).resolution == 0.125

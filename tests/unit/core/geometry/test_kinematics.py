@@ -28,7 +28,7 @@ def test_mecanum_wheels_have_the_usual_directions(motion, signs):
     assert tuple(round(math.copysign(1, w)) if abs(w) > 1e-9 else 0 for w in YOUBOT.speeds(motion)) == signs
 
 
-def test_the_published_equations():
+def test_mecanum_kinematics_match_the_published_equations():
     """omega = 1/r (vx -+ vy -+ (lx + ly) wz), Taheri et al., for rollers at 45 degrees."""
     vx, vy, wz, r, k = 0.5, -0.3, 0.8, 0.0475, 0.15 + 0.235
     assert YOUBOT.speeds(Twist(vx, vy, wz)) == pytest.approx(
@@ -48,7 +48,7 @@ def test_no_roller_slips_along_its_axis(vx, vy, wz, angle):
 
 
 @given(SPEED, SPEED, SPEED, st.floats(0.3, 1.3))
-def test_the_encoders_give_back_the_motion(vx, vy, wz, angle):
+def test_encoder_increments_reproduce_the_motion(vx, vy, wz, angle):
     wheels = MecanumWheels(0.05, 0.2, 0.3, 1 / math.tan(angle))
     assert wheels.motion(wheels.speeds(Twist(vx, vy, wz))) == pytest.approx((vx, vy, wz), abs=1e-9)
 

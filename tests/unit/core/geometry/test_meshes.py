@@ -23,7 +23,7 @@ def cube(corner=(0.0, 0.0, 0.0), out=0.0, scale=1.0):
 
 
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
-def test_a_cube_is_convex_of_any_size_and_with_a_corner_drawn_out(scale):
+def test_cube_of_any_size_is_convex_also_with_a_stretched_corner(scale):
     assert is_convex(cube(scale=scale))
     assert is_convex(Mesh(CORNERS * scale, FACES))
     assert is_convex(Mesh(CORNERS * scale, np.vstack((FACES, [(0, 0, 1)])).astype(np.int32))), "a face without area"
@@ -36,6 +36,6 @@ def test_dented_or_inverted_mesh_is_not_convex():
 
 
 @pytest.mark.parametrize(("part", "convex"), [(0.4, True), (0.6, False)])
-def test_a_corner_may_stand_out_of_a_face_by_a_micrometer(part, convex):
+def test_convexity_tolerates_a_micrometer(part, convex):
     # Of the faces that end in the middle of the edge, the edge's end is twice as far out as that is in.
     assert is_convex(cube(out=-part * CONVEX_TOLERANCE_M)) == convex

@@ -13,7 +13,7 @@ def grid(edge: int):
     return vertices, np.concatenate((lower, lower + np.array((1, edge + 1, 0)))).astype(np.int32)
 
 
-def test_the_lots_near_a_place_hold_every_face_that_is_so_near_and_none_of_the_far_corners():
+def test_blocks_near_a_point_contain_all_near_faces_and_no_far_corner():
     vertices, faces = grid(40)
     lots = tile_faces(vertices, faces, 4.0)
     near = lots.near(10.5, 20.0, 9.0)
@@ -24,7 +24,7 @@ def test_the_lots_near_a_place_hold_every_face_that_is_so_near_and_none_of_the_f
 
 
 @pytest.mark.parametrize("count", [3, 1000])
-def test_some_faces_of_a_mesh_come_with_their_own_vertices_in_the_order_of_the_mesh(count):
+def test_submesh_contains_only_its_vertices_in_mesh_order(count):
     vertices, faces = grid(40)
     some = np.random.default_rng(3).permutation(faces)[:count]
     part = submesh(vertices, some)

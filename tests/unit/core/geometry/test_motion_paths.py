@@ -13,7 +13,7 @@ from simscen.core.geometry.shapes import MotionPath
 THERE = (Pose2(0, 0, 0), Pose2(2, 0, 0), Pose2(2, 1, math.pi / 2))
 
 
-def test_a_path_taken_once_stays_at_its_end():
+def test_path_without_repetition_stays_at_its_end():
     path = MotionPath((0.0, 2.0, 3.0), THERE, "once", start=1.0)
     assert pose_at(path, 0.5) == Pose2(0, 0, 0)
     assert pose_at(path, 2.0) == Pose2(1, 0, 0)
@@ -21,23 +21,23 @@ def test_a_path_taken_once_stays_at_its_end():
     assert pose_at(path, 99.0) == THERE[-1]
 
 
-def test_a_loop_starts_over():
+def test_loop_restarts_at_its_first_pose():
     path = MotionPath((0.0, 2.0, 3.0), THERE, "loop")
     assert pose_at(path, 3.0 + 1.0) == pytest.approx(Pose2(1, 0, 0))
 
 
-def test_back_and_forth_returns_the_way_it_came():
+def test_back_and_forth_returns_along_the_same_path():
     path = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth")
     assert pose_at(path, 3.0 + 1.0 + 0.5) == pytest.approx(pose_at(path, 1.5))
     assert pose_at(path, 6.0 + 1.0) == pytest.approx(pose_at(path, 1.0))
 
 
-def test_headings_turn_the_shorter_way():
+def test_headings_are_interpolated_the_shorter_way():
     path = MotionPath((0.0, 1.0), (Pose2(0, 0, 3.0), Pose2(0, 0, -3.0)))
     assert abs(pose_at(path, 0.5).yaw) == pytest.approx(math.pi)
 
 
-def test_a_single_waypoint_is_where_it_is():
+def test_path_with_one_waypoint_stays_there():
     assert pose_at(MotionPath((0.0,), (Pose2(1, 2, 3),), "loop"), 5.0) == Pose2(1, 2, 3)
 
 
@@ -71,7 +71,7 @@ def hermite(path, closed):
 
 
 @pytest.mark.parametrize("mode", ["once", "loop"])
-def test_a_spline_is_the_cubic_hermite_curve_that_it_is_said_to_be(mode):
+def test_spline_is_the_documented_cubic_hermite_curve(mode):
     path = MotionPath(UNEVEN, ROUND, mode, ease="spline")
     expected = hermite(path, mode == "loop")
     for seconds in np.linspace(0.0, 4.999, 97):
@@ -79,7 +79,7 @@ def test_a_spline_is_the_cubic_hermite_curve_that_it_is_said_to_be(mode):
         assert pose_at(path, seconds) == pytest.approx(Pose2(x, y, wrap(yaw)), abs=1e-12)
 
 
-def test_a_smooth_way_begins_and_ends_at_rest_and_is_half_as_fast_again_in_its_middle():
+def test_smooth_segment_starts_and_ends_at_rest_and_peaks_at_1_5_times_the_mean_speed():
     path = MotionPath((0.0, 2.0), (Pose2(0, 0), Pose2(3, 0)), ease="smooth")
     assert pose_at(path, 0.5).x == pytest.approx(3 * (3 * 0.25**2 - 2 * 0.25**3))
     speeds = np.diff([pose_at(path, t).x for t in np.linspace(0, 2, 2001)]) / 0.001
@@ -90,7 +90,7 @@ def test_a_smooth_way_begins_and_ends_at_rest_and_is_half_as_fast_again_in_its_m
 
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
-def test_nothing_is_ever_faster_than_the_top_speed(ease, mode):
+def test_speed_never_exceeds_the_top_speed(ease, mode):
     path = MotionPath(UNEVEN, ROUND, mode, ease=ease)
     step = 1 / 500
     poses = [pose_at(path, step * k) for k in range(5500)]
@@ -99,7 +99,7 @@ def test_nothing_is_ever_faster_than_the_top_speed(ease, mode):
 
 
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
-def test_a_spline_never_changes_its_velocity_at_once(mode):
+def test_velocity_of_a_spline_is_continuous(mode):
     path = MotionPath(UNEVEN, ROUND, mode, ease="spline")
     step = 1e-4
     poses = [pose_at(path, step * k) for k in range(110_000)]
@@ -107,7 +107,7 @@ def test_a_spline_never_changes_its_velocity_at_once(mode):
     assert np.abs(np.diff(velocity, axis=0)).max() < 0.02
 
 
-def test_phase_is_how_far_into_the_path_it_begins_and_start_when_it_goes_on():
+def test_phase_sets_the_first_pose_and_start_the_time_of_departure():
     whole = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth")
     late = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth", start=1.5, phase=4.0)
     assert pose_at(late, 0.0) == pose_at(late, 1.5) == pose_at(whole, 4.0)
@@ -119,7 +119,7 @@ def test_phase_is_how_far_into_the_path_it_begins_and_start_when_it_goes_on():
 
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
-def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
+def test_path_sampler_equals_pose_at_bit_for_bit(mode, ease):
     """In whatever order it is asked, with legs that last no time, that turn, and that do not."""
     poses = (Pose2(0, 0, 3.0), Pose2(1, 0, 3.0), Pose2(1, 2, -3.0), Pose2(4, 2, -3.0), Pose2(0.3, 0, 3.0))
     path = MotionPath((1.0, 2.0, 3.5, 3.5, 5.0), poses, mode, 0.7, ease, 0.2)
@@ -163,7 +163,7 @@ def swept(path, begin, end, reach):
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
-def test_no_part_ever_moves_farther_than_the_largest_step(mode, ease):
+def test_no_point_moves_farther_than_the_largest_step(mode, ease):
     rng = random.Random(f"{mode} {ease}")
     for _ in range(40):
         count, reach = rng.randint(2, 6), rng.uniform(0, 1)
@@ -177,13 +177,13 @@ def test_no_part_ever_moves_farther_than_the_largest_step(mode, ease):
             assert swept(path, begin, begin + step, reach) <= most + 1e-9
 
 
-def test_the_largest_step_of_even_motion_is_speed_times_time():
+def test_largest_step_of_uniform_motion_is_speed_times_time():
     assert largest_step(MotionPath((0.0, 2.0, 3.0), THERE), 0.1) == pytest.approx(0.1)
     turn = MotionPath((0.0, 0.004), (Pose2(0, 0, 0), Pose2(0, 0, math.pi / 2)))
     assert largest_step(turn, 1 / 240, 0.5) == pytest.approx(math.pi / 4)
     assert largest_step(MotionPath((0.0,), THERE[:1]), 1.0) == 0.0
 
 
-def test_a_jump_is_no_step():
+def test_jumps_do_not_count_as_steps():
     there = (Pose2(0, 0, 0), Pose2(1, 0, 0), Pose2(5, 0, 1), Pose2(6, 0, 1))
     assert largest_step(MotionPath((0.0, 1.0, 1.0, 2.0), there, "loop"), 0.1, 0.5) == pytest.approx(0.1)

@@ -34,7 +34,7 @@ RINGS = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=3, 
 
 
 @given(RINGS)
-def test_a_ring_is_sound_exactly_when_shapely_says_so(ring):
+def test_validity_of_a_ring_equals_that_of_shapely(ring):
     assert (polygon_defect(ring) is None) == shapely.Polygon(ring).is_valid
 
 
@@ -49,7 +49,7 @@ def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(
     assert shapely.union_all(pieces).symmetric_difference(shapely.Polygon(ring)).area == pytest.approx(0, abs=1e-9)
 
 
-def test_a_convex_ring_stays_whole():
+def test_convex_ring_is_a_single_piece():
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
     assert convex_pieces(ring) == [ring]

@@ -23,17 +23,17 @@ def test_composition_is_matrix_multiplication(a, b):
 
 
 @given(poses)
-def test_the_inverse_undoes(pose):
+def test_composition_with_the_inverse_is_the_identity(pose):
     assert np.allclose(matrix(pose.inverse()), np.linalg.inv(matrix(pose)), atol=1e-9)
 
 
 @given(poses, poses)
-def test_between_is_the_step_from_one_pose_to_the_other(a, b):
+def test_between_returns_the_relative_pose(a, b):
     assert np.allclose(matrix(a.compose(a.between(b))), matrix(b), atol=1e-7)
 
 
 @given(st.floats(-1e3, 1e3))
-def test_wrapping_keeps_the_direction_and_lands_in_range(angle):
+def test_wrapped_angle_is_equivalent_and_in_range(angle):
     wrapped = wrap(angle)
     assert -math.pi < wrapped <= math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)

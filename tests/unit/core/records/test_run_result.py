@@ -5,7 +5,7 @@ from itertools import product
 from simscen.core.records.run_result import RunKey
 
 
-def test_a_run_is_called_by_its_variation_as_pytest_calls_parameters() -> None:
+def test_run_id_has_the_variation_in_brackets_as_in_pytest() -> None:
     assert RunKey("aisle", 1).test == "aisle"
     assert RunKey("a/aisle", 1, "speed=0.5").test == "a/aisle[speed=0.5]"
 

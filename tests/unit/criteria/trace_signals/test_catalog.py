@@ -15,7 +15,7 @@ QUESTIONS = (
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-def test_a_signal_has_a_range_that_it_can_fill(name):
+def test_range_of_each_signal_is_reachable(name):
     expected = (0.0, math.inf)
     if name in EITHER_WAY:
         expected = (-math.inf, math.inf)

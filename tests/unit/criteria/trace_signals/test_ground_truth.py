@@ -17,13 +17,13 @@ from simscen.criteria.trace_signals.trace_checks import check_recorded_signals
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
-def test_a_circle_is_as_long_as_its_circumference():
+def test_distance_along_a_circle_is_its_circumference():
     angles = np.linspace(0, 2 * math.pi, 400)
     circle = [[10 * k / 399, 2 * math.cos(a), 2 * math.sin(a), a + math.pi / 2] for k, a in enumerate(angles)]
     assert drive(synthetic_trace({"seconds": 10, "truth": circle})).length == pytest.approx(4 * math.pi, rel=1e-3)
 
 
-def test_the_way_until_a_moment_grows_with_it():
+def test_distance_driven_increases_with_time():
     way = drive(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 8, 0]]}))
     assert way.until(0) == 0.0
     assert way.until(1200) == pytest.approx(4.0, abs=0.021)
@@ -37,7 +37,7 @@ def test_pose_error_is_the_distance_at_the_moment_of_the_belief():
     assert error.values[:, 1] == pytest.approx(np.full(len(error), 0.1))
 
 
-def test_a_belief_that_falls_silent_grows_wrong_after_a_second():
+def test_error_of_an_outdated_belief_grows_after_one_second():
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]})
     early = trace.belief.ticks <= 2 * 240
     silent = type(trace)(
@@ -50,7 +50,7 @@ def test_a_belief_that_falls_silent_grows_wrong_after_a_second():
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=30), st.integers(0, 40))
-def test_the_first_lasting_stretch_is_the_one_brute_force_finds(true, hold):
+def test_first_lasting_interval_equals_brute_force(true, hold):
     ticks = np.arange(len(true), dtype=np.int64) * 3
     end = int(ticks[-1]) + 2
     expected = (None, False)
@@ -73,7 +73,7 @@ def at_half_seconds(xy, placed=()):
     return replace(synthetic_trace({"seconds": len(xy) / 2, "truth": [[0, 0, 0]], "events": events}), truth=truth)
 
 
-def test_small_motions_count_when_they_add_up():
+def test_small_motions_accumulate():
     still = at_half_seconds([(0, 0), (0.0078125, 0), (0, 0), (0, 0.0078125), (0, 0)])
     assert drive(still).length == 0.0
     creeping = drive(at_half_seconds([(0.0078125 * k, 0) for k in range(9)]))
@@ -87,14 +87,14 @@ def test_a_move_of_exactly_a_centimeter_counts():
     assert drive(at_half_seconds([(0, 1), (0, 1.5)])).length == 0.5
 
 
-def test_being_set_down_elsewhere_is_no_drive_but_what_follows_is():
+def test_teleport_is_not_driven_but_the_motion_after_it_is():
     way = drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)], placed=[0.5]))
     assert way.length == 2.0
     assert way.travelled.tolist() == [0.0, 1.0, 1.0, 2.0]
     assert drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)])).length > 12
 
 
-def test_the_way_until_a_moment_is_what_was_left_behind_by_then():
+def test_distance_driven_at_a_time_is_that_of_the_samples_before():
     way = drive(at_half_seconds([(0, 0), (1, 0), (2, 0)]))
     assert [way.until(tick) for tick in (-1, 0, 119, 120, 239, 240, 9999)] == [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
 
@@ -108,7 +108,7 @@ def test_empty_trace_has_no_distance():
     assert len(pose_error(replace(trace, belief=Samples(trace.truth.ticks[:0], np.empty((0, 9)))))) == 0
 
 
-def test_speed_is_over_ground_and_turning_has_no_sign():
+def test_speed_is_over_ground_and_turn_rate_is_unsigned():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace.velocity.values[3] = (-3.0, 4.0, -2.0)
     assert (speed(trace).values[3, 0], turn_rate(trace).values[3, 0]) == (5.0, 2.0)
@@ -116,7 +116,7 @@ def test_speed_is_over_ground_and_turning_has_no_sign():
 
 
 @pytest.mark.parametrize(("column", "value"), [(0, np.nan), (1, np.inf), (2, -np.inf)])
-def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, value):
+def test_nonfinite_signal_is_reported_with_its_first_time(column, value):
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.truth.values[[80, 120], column] = value
     with pytest.raises(InvalidTrace, match=r"the true pose is not finite at t = 2\.00 s"):
@@ -124,7 +124,7 @@ def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, valu
 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf])
-def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
+def test_nan_clearance_is_reported_with_its_first_time(value):
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.clearance.values[[80, 120]] = value
     with pytest.raises(InvalidTrace, match=r"the clearance is not a number at t = 2\.00 s"):
@@ -145,12 +145,12 @@ def test_the_true_pose_at_a_tick_is_the_newest_sample():
     assert [true_pose(trace, tick).x for tick in (0, 119, 120, 500)] == [0.0, 0.0, 1.0, 2.0]
 
 
-def test_an_error_of_heading_goes_the_short_way_round_between_samples_too():
+def test_heading_error_between_samples_is_wrapped():
     words = {"seconds": 2, "truth": [[0, 0, 0, 3.1], [2, 0, 0, 3.2]], "belief": [[0, 0, 0, -3.1], [2, 0, 0, -3.0]]}
     assert pose_error(synthetic_trace(words)).values[:, 1] == pytest.approx(np.full(21, 2 * math.pi - 6.2))
 
 
-def test_an_error_is_against_the_truth_at_that_very_moment():
+def test_error_is_measured_against_the_truth_at_the_same_time():
     ticks = np.array([0, 240], dtype=np.int64)
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": [[0, 1, 1, 3.2]]})
     rare = replace(trace, truth=Samples(ticks, np.array([[0.0, 0.0, 3.0], [4.0, 8.0, 3.4 - 2 * math.pi]])))
@@ -159,7 +159,7 @@ def test_an_error_is_against_the_truth_at_that_very_moment():
     assert error.values[5] == pytest.approx([math.hypot(1 - 2, 1 - 4), 0.0])
 
 
-def test_each_belief_is_relied_on_for_a_second_also_the_first():
+def test_each_belief_is_valid_for_one_second():
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 0]]})
     few = np.array([240, 720])
     error = pose_error(replace(trace, belief=Samples(few, trace.belief.at(few))))

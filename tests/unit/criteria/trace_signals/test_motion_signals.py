@@ -21,7 +21,7 @@ def driving(velocity):
     return replace(trace, velocity=Samples(trace.truth.ticks, np.array(velocity, dtype=np.float64)))
 
 
-def test_speed_is_over_ground_and_its_parts_have_signs():
+def test_speed_is_over_ground_and_its_components_are_signed():
     trace = driving([[-3.0, 4.0, -0.5]] * 5)
     assert read_signal("speed", trace, synthetic_case({}), {}).tolist() == [5.0] * 5
     assert read_signal("forward_speed", trace, synthetic_case({}), {}).tolist() == [-3.0] * 5
@@ -57,7 +57,7 @@ def test_jerk_needs_three_samples_and_acceleration_two():
         read_signal("acceleration", driving([[0, 0, 0]]), case, {})
 
 
-def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
+def test_teleporting_causes_no_acceleration_and_no_jerk():
     trace = driving([[1, 0, 0]] * 4 + [[0, 0, 0]] * 4)
     carried = synthetic_trace({"seconds": 7 * STEP, "truth": [[0, 0, 0]], "events": [[3 * STEP, "robot.placed"]]})
     trace, stays = replace(trace, events=carried.events), replace(trace, events=())
@@ -71,7 +71,7 @@ def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
 @pytest.mark.parametrize(
     ("after", "still", "smooth"), [(0, [0, 1], [0, 1]), (3, [4], [3, 4]), (7, [8], [7, 8]), (8, [], []), (9, [], [])]
 )
-def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth):
+def test_only_differences_across_a_teleport_are_excluded(after, still, smooth):
     """Speeds of a parabola; set down elsewhere after a sample, so that the change to the next one is none."""
     trace = driving([[0.05 * k * k, 0, 0] for k in range(9)])
     events = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[after * STEP, "robot.placed"]]}).events
@@ -84,7 +84,7 @@ def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth)
     assert read_signal("jerk", trace, case, {}) == pytest.approx(jerks)
 
 
-def test_being_set_down_before_the_first_sample_changes_nothing_after_it():
+def test_teleport_before_the_first_sample_has_no_effect():
     trace = driving([[0, 0, 0]] * 4 + [[1, 0, 0]])
     placed = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "robot.placed"]]}).events
     later = Samples(trace.truth.ticks + 240, trace.truth.values)
@@ -115,7 +115,7 @@ def test_differences_are_not_known_across_a_long_gap():
     assert read_signal("acceleration", bridged, synthetic_case({}), {}).tolist() == [0.0] * 6
 
 
-def test_being_set_down_is_no_acceleration_of_uneven_samples_either():
+def test_teleporting_causes_no_acceleration_of_uneven_samples():
     placed = Event(30, EventKind.ROBOT_PLACED, "robot")
     trace = replace(uneven([0, 11, 25, 36, 48, 60], [0.0, 0.0, 0.0, 2.0, 2.0, 2.0]), events=(placed,))
     assert np.abs(read_signal("acceleration", trace, synthetic_case({}), {})).max() < 40.0

@@ -20,7 +20,7 @@ def of(error, covariance):
 
 
 @pytest.mark.parametrize(("error", "expected"), [((1, 0, 0), 4.0), ((0, 0.4, 0), 4.0), ((0, 0, 0.3), 9.0)])
-def test_errors_count_in_standard_deviations_squared(error, expected):
+def test_nees_is_the_squared_error_in_standard_deviations(error, expected):
     assert of(error, APART) == pytest.approx(expected)
     assert of([-part for part in error], APART) == pytest.approx(expected)
 
@@ -50,11 +50,11 @@ def test_nees_is_weighted_by_the_inverse_covariance():
         [1e-320, 0, 0, 1, 0, 1],
     ],
 )
-def test_a_covariance_that_is_not_positive_definite_claims_to_know_a_direction_exactly(covariance):
+def test_nees_of_a_singular_covariance_is_infinite(covariance):
     assert of((1, 1, 1), covariance) == math.inf
 
 
-def test_a_filter_of_three_dimensions_that_tells_the_truth_has_three():
+def test_mean_nees_of_a_consistent_filter_is_its_dimension():
     assert DIMENSIONS == 3
 
 
@@ -75,19 +75,19 @@ def test_each_belief_is_compared_with_the_truth_at_its_tick():
     assert found.values == pytest.approx(np.array([[0.0], [4.0], [5.0]]))
 
 
-def test_headings_differ_by_the_short_way_round():
+def test_heading_difference_is_wrapped():
     trace = believing([(0, 0, 0, 3.1), (240, 0, 0, 3.2 - 2 * math.pi)], [(120, 0, 0, 3.05 - 2 * math.pi)])
     assert nees_samples(trace).values[0, 0] == pytest.approx(1.0)
 
 
-def test_each_covariance_is_that_of_its_belief():
+def test_each_belief_uses_its_own_covariance():
     trace = believing([(0, 0, 0, 0)], [(0, 1, 0.2, 0.1)], [0.25, 0.03, 0.01, 0.04, 0.002, 0.01])
     full = np.array([[0.25, 0.03, 0.01], [0.03, 0.04, 0.002], [0.01, 0.002, 0.01]])
     error = np.array([1, 0.2, 0.1])
     assert nees_samples(trace).values[0, 0] == pytest.approx(error @ np.linalg.inv(full) @ error)
 
 
-def test_without_covariances_beliefs_or_the_truth_there_is_none():
+def test_nees_is_undefined_without_covariances_beliefs_or_truth():
     trace = believing([(0, 0, 0, 0)], [(0, 0, 0, 0)])
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
     bare = Samples(trace.belief.ticks, trace.belief.values[:, :8])

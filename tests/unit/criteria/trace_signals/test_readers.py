@@ -28,7 +28,7 @@ def at(values, seconds):
     return values[round(seconds / STEP)]
 
 
-def test_every_name_has_a_signal_and_every_signal_a_name():
+def test_signal_names_and_readers_correspond():
     assert tuple(SIGNALS) == get_args(SignalName)
 
 
@@ -56,7 +56,7 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
     assert values.max() <= SIGNALS[name].maximum
 
 
-def test_a_belief_without_a_covariance_does_not_say_how_sure_it_is():
+def test_uncertainty_is_unknown_without_a_covariance():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
     for name in ("position_std", "yaw_std"):
@@ -64,7 +64,7 @@ def test_a_belief_without_a_covariance_does_not_say_how_sure_it_is():
             read_signal(name, bare, synthetic_case({}), {})
 
 
-def test_a_kidnapped_robot_has_not_travelled():
+def test_kidnapping_does_not_count_as_distance_driven():
     events = [[2, "robot.placed"]]
     truth = [[0, 0, 0], [2, 1, 0], [2.025, 9, 0], [4, 10, 0]]
     values = signal("travelled", {"seconds": 4, "truth": truth, "events": events})
@@ -72,7 +72,7 @@ def test_a_kidnapped_robot_has_not_travelled():
     assert values[-1] == pytest.approx(2.0, abs=0.02)
 
 
-def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
+def test_goal_is_the_last_accepted_one_also_from_an_event():
     words = {
         "seconds": 6,
         "truth": [[0, 1, -2, 3.0]],
@@ -84,7 +84,7 @@ def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
     assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.1, 2 * math.pi - 6.0])
 
 
-def test_a_goal_of_the_scenario_is_where_its_name_says_unless_its_acceptance_says_all_of_it():
+def test_goal_pose_comes_from_its_name_unless_its_acceptance_has_a_pose():
     words = {"seconds": 2, "truth": [[0, 0, 0]], "events": [[1, "goal.accepted", "shelf", {"x": 1.0, "y": 0.0}]]}
     case = {"goals": [{"name": "first", "pose": [0, 2, 0]}, {"name": "shelf", "pose": [3, 4, 0]}]}
     assert set(signal("goal_distance", words, case)) == {5.0}
@@ -104,24 +104,24 @@ def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is
         signal("goal_distance", words)
 
 
-def test_scans_grow_old_from_the_start_and_from_the_newest():
+def test_scan_age_counts_from_the_start_and_from_the_newest_scan():
     age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": [[1, 2]]})
     assert [at(age, t) for t in (0, 0.5, 1.0, 1.05, 2.0, 4.0)] == pytest.approx([0, 0.5, 0, 0.05, 0, 2.0])
 
 
-def test_without_any_scan_its_age_is_that_of_the_run():
+def test_scan_age_without_scans_is_the_time_of_the_run():
     age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": []})
     assert [at(age, t) for t in (0, 0.5, 4.0)] == [0, 0.5, 4.0]
 
 
-def test_the_belief_error_is_held_from_one_belief_to_the_next():
+def test_belief_error_is_held_until_the_next_belief():
     words = {"seconds": 2, "truth": [[0, 0, 0], [2, 2, 0]], "belief": {"offset": [0.3, 0.4, -0.2]}}
     assert signal("localization_error", words) == pytest.approx([0.5] * 81)
     assert signal("localization_yaw_error", words) == pytest.approx([0.2] * 81)
     assert at(signal("belief_age", words), 0.175) == pytest.approx(0.075)
 
 
-def test_the_position_is_as_unsure_as_its_worst_direction():
+def test_position_uncertainty_is_that_of_the_worst_direction():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     turn, variances = 0.7, np.diag([0.09, 0.01])
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
@@ -134,7 +134,7 @@ def test_the_position_is_as_unsure_as_its_worst_direction():
 
 
 @pytest.mark.parametrize(("std", "known"), [(0.5, 1.0), (0.51, 0.0)])
-def test_a_robot_that_is_unsure_is_not_localized(std, known):
+def test_uncertain_robot_is_not_localized(std, known):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     values = trace.belief.values.copy()
     values[:, 3] = values[:, 6] = std * std
@@ -158,7 +158,7 @@ def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
             signal(name, words, {"goals": [{"name": "a", "pose": [1, 0, 0]}]})
 
 
-def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
+def test_command_is_held_and_zero_before_the_first():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     command = Samples(np.array([120, 180]), np.array([[0.3, 0.4, -1.0], [0.0, 0.0, 0.0]]))
     trace = replace(trace, command=command)
@@ -167,7 +167,7 @@ def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
     assert [at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
 
 
-def test_an_object_is_infinitely_far_while_it_is_not_there():
+def test_distance_to_an_absent_object_is_infinite():
     words = {
         "seconds": 4,
         "truth": [[0, 1, -2]],
@@ -178,7 +178,7 @@ def test_an_object_is_infinitely_far_while_it_is_not_there():
     assert [at(values, t) for t in (0.975, 1.0, 2.975, 3.0)] == [math.inf, 5.0, 5.0, math.inf]
 
 
-def test_distances_to_what_does_not_move():
+def test_distance_to_static_objects():
     words = {"seconds": 1, "truth": [[0, 1, -2]], "events": [[0, "object.spawned", "box", {"x": 1.0, "y": 0.0}]]}
     case = {"goals": [{"name": "shelf", "pose": [4, 2, 0]}]}
     assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
@@ -203,21 +203,21 @@ def test_remaining_plan_length_starts_at_the_estimated_position():
     assert at(left, 4.0) == pytest.approx(1.0)
 
 
-def test_a_newer_plan_takes_the_place_of_the_old_one():
+def test_newer_plan_replaces_the_old_one():
     words = {"seconds": 4, "truth": [[0, 1, 1]], "plans": [[1, [[0, 0], [2, 0]]], [2, [[0, 4], [2, 4]]]]}
     assert [at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
     with pytest.raises(SignalUnavailable, match="no plan"):
         signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
 
 
-def test_a_plan_that_came_after_the_last_sample_was_never_followed():
+def test_plan_after_the_last_sample_is_ignored():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 1, 1]]})
     late = Path(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 241)
     with pytest.raises(SignalUnavailable, match="no plan"):
         read_signal("plan_deviation", replace(trace, plans=(late,)), synthetic_case({}), {})
 
 
-def test_a_plan_of_one_point_is_a_place():
+def test_deviation_from_a_plan_of_one_point_is_the_distance_to_it():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 3, 4]]})
     trace = replace(trace, plans=(Path(np.array([[0.0, 0.0, 0.0]]), 0), Path()))
     assert set(read_signal("plan_deviation", trace, synthetic_case({}), {})) == {5.0}
@@ -232,12 +232,12 @@ def test_a_robot_is_in_a_region_with_its_center():
 
 
 @pytest.mark.parametrize("corners", [[[1, 0], [0, 1], [-1, 0], [0, -1]], [[1, 0], [0, -1], [-1, 0], [0, 1]]])
-def test_inside_is_inside_at_the_height_of_a_corner_too(corners):
+def test_point_at_the_height_of_a_corner_is_classified_correctly(corners):
     points = np.array([[-2.0, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [-0.5, 1.0], [-0.5, -1.0]])
     assert points_in_polygon(corners, points).tolist() == [False, True, True, True, False, False, False]
 
 
-def test_of_regions_side_by_side_each_place_is_in_one():
+def test_each_point_is_in_one_of_two_adjacent_regions():
     square, right, above = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + by for by in ([0, 0], [1, 0], [0, 1]))
     border = np.array([[0.0, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 1.0]])
     assert points_in_polygon(square.tolist(), border).tolist() == [True, True, False, False]
@@ -245,7 +245,7 @@ def test_of_regions_side_by_side_each_place_is_in_one():
     assert points_in_polygon(above.tolist(), border).tolist() == [False, False, False, True]
 
 
-def test_inside_are_the_points_that_are_inside_for_shapely():
+def test_points_inside_equal_those_of_shapely():
     corners = [[0, 0], [4, 1], [3, 5], [2, 1.5], [-1, 4]]
     rng = np.random.default_rng(5)
     points = rng.uniform(-2, 6, (400, 2))
@@ -253,7 +253,7 @@ def test_inside_are_the_points_that_are_inside_for_shapely():
     assert points_in_polygon(corners, points).tolist() == within.tolist()
 
 
-def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without_one_to_the_last_sample():
+def test_fault_is_active_until_its_end_and_event_without_end_until_the_last_sample():
     events = [[1, "fault.started", "lidar.off"], [2, "fault.ended", "lidar.off"], [1.5, "event.started", "cart"]]
     words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
     fault, event = signal("fault_active", words, fault="lidar.off"), signal("event_active", words, event="cart")

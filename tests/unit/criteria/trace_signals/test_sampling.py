@@ -24,7 +24,7 @@ def samples(*ticks: int) -> Samples:
 @pytest.mark.parametrize(
     ("ticks", "period"), [([], 1), ([5], 1), ([5, 9], 4), ([0, 1], 1), ([0, 1, 2], 1), ([0, 8, 16, 30], 8), ([3, 3], 1)]
 )
-def test_usual_period_is_the_median_spacing(ticks: list[int], period: int) -> None:
+def test_period_is_the_median_spacing(ticks: list[int], period: int) -> None:
     assert usual_period(np.array(ticks)) == period
 
 
@@ -51,7 +51,7 @@ def test_too_few_samples_are_refused() -> None:
 
 
 @pytest.mark.parametrize("ticks", [(0, 0, 0), (0, 10, 10, 20), (0, 20, 10)])
-def test_samples_out_of_order_have_no_spacing(ticks: tuple[int, ...]) -> None:
+def test_spacing_of_unordered_samples_is_undefined(ticks: tuple[int, ...]) -> None:
     with pytest.raises(SignalUnavailable, match="chronological order"):
         evenly_spaced(samples(*ticks), RATE)
 

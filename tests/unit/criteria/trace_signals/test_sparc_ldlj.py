@@ -37,11 +37,11 @@ PROFILES = {
 
 @pytest.mark.parametrize("rate", [5.0, 40.0, 100.0])
 @pytest.mark.parametrize("profile", PROFILES)
-def test_sparc_is_the_length_of_the_arc_of_the_spectrum(profile, rate):
+def test_sparc_is_the_arc_length_of_the_spectrum(profile, rate):
     assert sparc(PROFILES[profile], rate) == pytest.approx(by_definition(PROFILES[profile].tolist(), rate))
 
 
-def test_a_frequency_with_just_five_per_cent_of_the_greatest_belongs_to_the_arc():
+def test_frequency_at_five_percent_of_the_peak_belongs_to_the_arc():
     """At half the rate, where 10.5 - 9.5 is 5 % of 10.5 + 9.5."""
     assert sparc(np.array([10.5, 9.5]), 20.0) == pytest.approx(by_definition([10.5, 9.5], 20.0), rel=1e-12)
 
@@ -53,7 +53,7 @@ def test_sparc_needs_two_frequencies_below_the_cutoff_and_two_samples():
 
 
 @pytest.mark.parametrize("speeds", [[], [0.0], [0.0, 0.0], [0.0, 0.0, 0.0]])
-def test_a_robot_that_never_moved_is_neither_smooth_nor_not(speeds):
+def test_smoothness_of_a_stationary_robot_is_undefined(speeds):
     assert (sparc(np.array(speeds), 40.0), ldlj(np.array(speeds), 40.0)) == (None, None)
 
 
@@ -70,5 +70,5 @@ def test_the_ldlj_of_a_slope_that_hardly_changes_is_above_zero():
 
 
 @pytest.mark.parametrize("speeds", [[1.0], [1.0, 2.0], [1.0, 2.0, 3.0]])
-def test_without_a_change_of_slope_there_is_no_ldlj(speeds):
+def test_ldlj_without_jerk_is_undefined(speeds):
     assert ldlj(np.array(speeds), 40.0) is None
