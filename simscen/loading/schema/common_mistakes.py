@@ -1,6 +1,6 @@
-"""Hints for common mistakes in YAML files.
+"""Hints for common mistakes in YAML files: wrong types, misplaced keys, and reserved keys.
 
-A choice is a mapping whose only key selects its kind, such as the criterion `collisions: {max: 0}`. A `loc` is the
+A Choice is a mapping with one key that selects its kind, such as the criterion `collisions: {max: 0}`. A `loc` is the
 location of a validation error in pydantic: keys and list indices, with tags of union members between them.
 """
 
@@ -19,13 +19,13 @@ HINTS_FOR_BOUNDS: dict[Keys, str] = {
 }
 """Hints for values outside their bounds, by the keys of the value."""
 MAX_SEARCH_DEPTH = 3
-"""Number of levels below a mapping in which the place of a misplaced key is searched."""
+"""Number of levels below a mapping that are searched for the right place of a misplaced key."""
 
 
 def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
-    """Return how to write the value `node` at `loc` as the mapping or list that `model` expects; "" if unknown.
+    """Return a hint on how to write `node`, the value at `loc`, as the expected mapping or list; "" if unknown.
 
-    `error_type` is pydantic's type of the error, such as "list_type".
+    `model` is the model of the whole file. `error_type` is pydantic's type of the error, such as "list_type".
     """
     models = models_at(model, loc)
     in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
@@ -40,9 +40,9 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return where to move the unknown `key` of the mapping at `loc`; "" if no suitable place is found.
+    """Return a hint on where to move the unknown `key` of the mapping at `loc`; "" if no suitable place is found.
 
-    A key in an item of a list is only moved inside this item.
+    Inside an item of a list, only places in the same item are suitable.
     """
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
@@ -66,7 +66,7 @@ def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
 
 
 def _list_hint(node: Node, in_list: bool) -> str:
-    """Return how to write `node` as a list; "" if unknown. With `in_list`, `node` is itself an item of a list."""
+    """Return a hint on how to write `node` as a list; "" if unknown. With `in_list`, `node` is an item of a list."""
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
@@ -75,7 +75,7 @@ def _list_hint(node: Node, in_list: bool) -> str:
 
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
-    """Return how to write a list as a mapping: without `-`, or as a pose; "" if unknown."""
+    """Return a hint on how to write a list as a mapping: without `-`, or as a pose; "" if unknown."""
     if all(isinstance(item, MappingNode) for item in node.items):
         return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
@@ -91,7 +91,7 @@ def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: Sequence
 
 
 def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
-    """Return how to write a value as the mapping `{key: value}`, or `true` as the mapping `{}`; "" if unknown."""
+    """Return a hint on how to write a value as `{key: value}`, or `true` as `{}`; "" if unknown."""
     plain_models = [model for model in models if not issubclass(model, Choice)]
     matching = {key for model in plain_models for key in keys_of([model]) if _is_valid(model, {key: node.value})}
     if len(matching) == 1 and not isinstance(node.value, bool):
@@ -109,13 +109,13 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
 
 
 def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Return a hint to use `simscen explain` if the last key of `loc` is a key of a choice; "" otherwise."""
+    """Return a hint to use `simscen explain` if the last key of `loc` selects the kind of a Choice; "" otherwise."""
     chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
     return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
 
 def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
-    """Return how to write the text `word` as a key of a choice, with a colon and a value; "" if unknown."""
+    """Return a hint on how to write the text `word` as a key of a Choice, with a colon and a value; "" if unknown."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
         if word not in keys:
@@ -129,7 +129,7 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
 
 
 def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
-    """Return the keys from `models` down to the nearest mapping in which `key` is valid; None if there is none."""
+    """Return the keys of the nearest mapping below `models` in which `key` is valid; None if there is none."""
     holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     for name, below in holders:

@@ -1,7 +1,7 @@
-"""Pydantic models that are possible at a location in a YAML file, and their keys.
+"""Lookup of the pydantic models, and of their keys, that are possible at a location in a YAML file.
 
 A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of union members between
-them. Models of installed packages are included.
+them. `kind` is a type annotation. Models of installed packages are included.
 """
 
 from collections.abc import Iterable, Sequence
@@ -36,7 +36,7 @@ def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
 
 
 def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
-    """Return the other values of the key `type` with which `key` would be valid in the mapping at `loc`."""
+    """Return the other values of `type` with which `key` would be valid in the mapping at `loc`."""
     own = type_values_at(model, loc)
     if not loc or loc[-1] not in own:
         return []
@@ -56,7 +56,7 @@ def has_no_required_keys(model: type[BaseModel]) -> bool:
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """Return the type of the field with this key in YAML; None if it is unknown, or its package cannot be imported."""
+    """Return the type of the field with this key in YAML; None if it is unknown or cannot be imported."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
             return _type_of(field)
@@ -64,7 +64,7 @@ def field_type(model: type[BaseModel], key: str) -> Any:
 
 
 def _type_of(field: FieldInfo) -> Any:
-    """Return the type of a field; None if its package cannot be imported."""
+    """Return the type of a field; None if it cannot be imported from its package."""
     if mark := next((mark for mark in field.metadata if isinstance(mark, ExtensibleUnion)), None):
         return Annotated[field.annotation, mark]
     try:
@@ -129,11 +129,12 @@ def _extensible_union(kind: Any) -> ExtensibleUnion | None:
 
 
 def _unwrapped(kind: Any) -> Any:
-    """Return the type inside `Annotated`. Import a LazySpec, and extend a Choice by the keys of installed packages."""
+    """Return the type inside `Annotated`. A LazySpec is imported, and a Choice is extended by installed packages."""
     while get_origin(kind) is Annotated:
         kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, LazySpec)), get_args(kind)[0])
     return with_installed_choices(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
 
 
 def _is_model(kind: Any) -> bool:
+    """Return whether a type is a pydantic model."""
     return isinstance(kind, type) and issubclass(kind, BaseModel)

@@ -1,4 +1,4 @@
-"""Messages for users about validation errors of pydantic, and formatting of values and suggestions in messages."""
+"""Messages about validation errors of pydantic, and formatting of values and suggestions in messages."""
 
 import difflib
 import re
@@ -27,7 +27,7 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
-"""Words for a bound, and the key of its value in the context of the error, by error type of pydantic."""
+"""Words for a bound, and the key of the bound in the context of the error, by error type of pydantic."""
 MAX_LISTED_CHOICES = 40
 """Largest number of choices in a message."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?")
@@ -40,7 +40,7 @@ _TEMPLATES = {
     "path_name": ("SC017", "a name must not be a path"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
 }
-"""Error code, and message with placeholders for values of the error's context, by error type of pydantic."""
+"""Error code, and message with placeholders for values from the context of the error, by error type of pydantic."""
 
 
 class Message(NamedTuple):
@@ -84,13 +84,13 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def _listed(choices: list[str]) -> str:
-    """Return the choices separated by commas; at most MAX_LISTED_CHOICES and the number of further choices."""
+    """Return the choices separated by commas: at most MAX_LISTED_CHOICES, then the number of further choices."""
     more = len(choices) - MAX_LISTED_CHOICES
     return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
 
 
 def translate_error(error_type: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """Return the message for a validation error of pydantic at `node`.
+    """Return the message for a validation error of pydantic in the value `node`.
 
     `error_type`, `context`, and `text` are the fields `type`, `ctx`, and `msg` of the error.
     """
@@ -128,7 +128,7 @@ def translate_error(error_type: str, context: Mapping[str, Any], node: Node, tex
 
 
 def _type_hint(error_type: str, node: Node) -> str:
-    """Return how to correct a value of the wrong type; "" if unknown."""
+    """Return a hint on how to correct a value of the wrong type; "" if unknown."""
     if error_type == "string_type" and isinstance(node, ScalarNode) and node.value is not None:
         return "put it in quotes"
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
@@ -145,7 +145,7 @@ def _type_hint(error_type: str, node: Node) -> str:
 
 
 def _quoted_number_hint(node: Node) -> str:
-    """Return how to correct text that is a number in quotes or with a leading zero; "" for other values."""
+    """Return a hint on how to correct a number in quotes or with a leading zero; "" for other values."""
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
         return ""
     return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
@@ -159,6 +159,7 @@ def short_value(node: Node) -> str:
 
 
 def _number(value: Any) -> str:
+    """Return a bound as text."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

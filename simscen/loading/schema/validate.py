@@ -32,11 +32,14 @@ LANGUAGE_VERSION = 1
 """Version of the scenario language, which files state under the key `simscen`."""
 
 FindMissingKeys = Callable[[MappingNode], list[Problem]]
-"""Function that returns problems for missing keys of a file that are only required if other keys are absent."""
+"""Function that returns the problems of missing keys that pydantic does not report.
+
+Such a key is only required if another key is absent.
+"""
 
 
 def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | None = None) -> Model | list[Problem]:
-    """Return the specification in `tree`; or all its problems, including those of `find_missing_keys`."""
+    """Return the specification in `tree`; or all its problems, including the problems from `find_missing_keys`."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -47,7 +50,7 @@ def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | N
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """Return the problems of a file in which keys may be missing, except in items of lists."""
+    """Return the problems of an incomplete file. Missing keys are only reported in items of lists."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -56,14 +59,14 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
 
 
 def _supported_mapping(tree: Node) -> MappingNode | Problem:
-    """Return the tree; or a problem if it is not a mapping, or written for another version of the language."""
+    """Return the tree; or a problem if it is not a mapping, or is written for another version of the language."""
     if isinstance(tree, MappingNode):
         return _wrong_version(tree) or tree
     return Problem(*tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
 
 def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list[dict[str, Any]]]:
-    """Return the specification (None if it is invalid), and pydantic's errors that empty values do not cause."""
+    """Return the specification (None if it is invalid), and pydantic's errors except errors that empty values cause."""
     try:
         return model.model_validate(tree.plain, by_alias=True, by_name=False), []
     except ValidationError as error:
@@ -74,13 +77,13 @@ def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list
 def _problems(
     model: type[BaseModel], tree: MappingNode, errors: list[dict[str, Any]], missing: Sequence[Problem] = ()
 ) -> list[Problem]:
-    """Return problems for empty values, then the problems `missing`, then problems for pydantic's errors."""
+    """Return the problems of empty values, the problems `missing`, and the problems for pydantic's `errors`."""
     empty = [_empty_value_problem(model, tree, keys) for keys in _empty_values(tree)]
     return _without_duplicates([*empty, *missing, *(_translate(model, tree, error) for error in errors)])
 
 
 def _is_missing_key(error: dict[str, Any]) -> bool:
-    """Return whether an error of pydantic reports a missing key outside of lists."""
+    """Return whether an error of pydantic reports a missing key that is not in an item of a list."""
     in_a_list = any(isinstance(part, int) for part in error["loc"])
     return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
 
@@ -199,7 +202,7 @@ def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
 def _without_duplicates(problems: list[Problem]) -> list[Problem]:
     """Return one problem for each mistake.
 
-    Pydantic reports a mistake once for each member of a union. It reports a misspelled key also as a missing key.
+    Pydantic reports a mistake for each member of a union, and a misspelled key also as a missing key.
     """
     first_at: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:
@@ -214,5 +217,5 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
 
 
 def _spelling_hint(missing: Problem) -> str:
-    """Return the hint for a misspelling of this missing key."""
+    """Return the hint that a misspelling of this missing key would have."""
     return f"did you mean {missing.message.split()[2]}?"

@@ -1,4 +1,4 @@
-"""Reading of a YAML file, merged with the files that it extends and with the `defaults.yaml` in its folder."""
+"""Reading of a YAML file and of its base files: files that it `extends`, and the `defaults.yaml` in its folder."""
 
 import os
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, Scalar
 DEFAULTS_FILE = "defaults.yaml"
 """Name of the file whose values apply to all scenarios in its folder."""
 EXTENDS = "extends"
-"""Key with the path of the file that a file extends."""
+"""Key of a file with the path of another file that it extends."""
 MAX_FILES = 32
 """Largest number of YAML files of one scenario."""
 APPEND_SUFFIX = "+"
@@ -24,7 +24,7 @@ APPEND_SUFFIX = "+"
 
 @dataclass
 class Library:
-    """Reader of the YAML files of one scenario. Keeps their texts, so that problems can show their lines."""
+    """Reader of the YAML files of one scenario. It keeps their texts for the source lines of problems."""
 
     sandbox: PathSandbox
     texts: dict[str, str] = field(default_factory=dict)
@@ -32,7 +32,7 @@ class Library:
     files: dict[str, Path] = field(default_factory=dict)
     """Absolute paths of the same files, by path as in messages."""
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
-    """Worlds, maps, and robots loaded so far, by name of the loading method of Assets, and path."""
+    """Worlds, maps, and robots loaded so far, by the name of the method of Assets that loaded them, and by path."""
     unsaved: Mapping[Path, str] = field(default_factory=dict)
     """Texts that replace the content of files, by absolute path, such as unsaved texts of an editor."""
 
@@ -74,7 +74,7 @@ class Library:
         return self.files[position.path].parent
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
-        """Return the problems with the texts of their source lines. Existing texts are kept."""
+        """Return the problems with their source lines. Problems that have one are unchanged."""
         return [problem if problem.source else with_source_line(problem, self.texts) for problem in problems]
 
     def _read_with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
@@ -96,10 +96,12 @@ class Library:
         return own, problems + more
 
     def _read_defaults(self, defaults_file: Path) -> tuple[Node | None, list[Problem]]:
+        """Return the tree of a `defaults.yaml`, merged with the files that it extends, and all problems."""
         path = self.sandbox.resolve_argument(defaults_file)
         return (None, [path]) if isinstance(path, Problem) else self._read_with_base(path, ())
 
     def _read_file(self, path: Path) -> tuple[Node | None, list[Problem]]:
+        """Return the tree of a file alone, and all problems. Keep its text and path."""
         name = self.sandbox.display_name(path)
         self.files[name] = path
         text = self.unsaved[path] if path in self.unsaved else read_text(path, name)
@@ -109,7 +111,7 @@ class Library:
         return parse_yaml(text, name)
 
     def _base_file(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
-        """Return the file that the file `path` extends according to its `extends` entry; or a problem."""
+        """Return the file that the file `path` extends; or a problem. `entry` is the entry of its key `extends`."""
         position = entry.value.position
         if not isinstance(entry.value, ScalarNode) or not isinstance(entry.value.value, str):
             return Problem(*position, "SC011", f"`{EXTENDS}` must be the path of one file")
@@ -125,10 +127,10 @@ class Library:
 
 
 def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
-    """Return the content `own` of a file merged with the content `base` of the file that it extends.
+    """Return `own`, the content of a file, merged with `base`, the content of the file that it extends.
 
     The items of a key such as `pass+` in `own` are appended to the list `pass` or `pass+` in `base`. If `base` has
-    neither, the key `pass+` is kept.
+    neither of them, the key `pass+` is kept.
     """
     entries = dict(own.entries)
     for key, more in own.entries.items():
@@ -148,7 +150,7 @@ def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
 def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
     """Return a mapping with the keys of both. For a key in both, the value in `own` replaces the value in `base`.
 
-    Two mappings under one key are merged, unless they have another `type`, or only one is an external stack.
+    If both values are mappings, they are merged, unless they have different types, or only one is an external stack.
     """
     entries = dict(own.entries)
     for key, base_entry in base.entries.items():

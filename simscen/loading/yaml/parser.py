@@ -1,4 +1,4 @@
-"""YAML parser that returns a tree with positions, and limits the depth and size of files."""
+"""YAML parser. It returns a tree with positions, and limits the depth and the number of values of files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ MAX_VALUES = 100_000
 # overflow the C stack at 30 000 brackets. libyaml yields the same events ten times faster, if PyYAML was built with it.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
-"""Message of libyaml if a file exceeds its own limit on the depth."""
+"""Message of libyaml for a file that is deeper than its own limit."""
 
 
 class _ParseError(Exception):
@@ -33,8 +33,8 @@ class _ParseError(Exception):
 def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    `path` is the path of the file in messages. With `allow_duplicates`, the last of several equal keys is used with a
-    warning, as in ROS 2 parameter files.
+    `path` is the path of the file in messages. With `allow_duplicates`, a repeated key is only a warning, and its last
+    value is used, as in ROS 2 parameter files.
     """
     composer = _Composer(path, text, allow_duplicates)
     try:
@@ -46,7 +46,7 @@ def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple
 
 @dataclass(frozen=True)
 class _Anchor:
-    """Node with an anchor. Each alias of the node counts its values and levels again toward the limits."""
+    """Node with an anchor. Each alias of the node adds its values and levels to the limited numbers of the file."""
 
     node: Node
     value_count: int
@@ -59,7 +59,7 @@ class _Anchor:
 class _Composer:
     """Builds the tree of a text from PyYAML's events, and collects problems.
 
-    `depth` is the level of a node, from 1. A method that returns a node also returns its height, the number of levels
+    `depth` is the level of a node, from 1. Methods that return a node also return its height, the number of levels
     below the node.
     """
 
@@ -139,6 +139,7 @@ class _Composer:
             return 0
 
     def _compose_sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        """Return the sequence that begins with the event `start`, and its height."""
         items, height = [], 0
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
             item, below = self._compose_node(event, depth + 1)
@@ -147,6 +148,7 @@ class _Composer:
         return SequenceNode(self._position_of(start), tuple(items)), height + 1
 
     def _compose_mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        """Return the mapping that begins with the event `start`, and its height."""
         entries: dict[str, Entry] = {}
         merged: list[Node] = []
         height = 0
@@ -164,9 +166,9 @@ class _Composer:
         return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged)), height + 1
 
     def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Return `entries` with the keys of the mappings `merged`, the values of the merge key `<<`.
+        """Return `entries` with the keys of the mappings `merged`, which are the values of the merge key `<<`.
 
-        Keys in `entries` have priority, then keys of earlier mappings.
+        Keys in `entries` have priority, then keys of earlier mappings in `merged`.
         """
         for other in merged:
             if not isinstance(other, MappingNode):
@@ -186,7 +188,7 @@ class _Composer:
     def _compose_alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
         """Return the node to which an alias refers, and its height.
 
-        Raises _ParseError if there is no such anchor, or if the node contains the alias itself.
+        Raises _ParseError if there is no such node, or if the node contains the alias itself.
         """
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
@@ -256,7 +258,7 @@ class _Composer:
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
 
     def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """Return a problem for the first lookalike character in the lines `first` to `last`, from 0, or None."""
+        """Return a problem for the first lookalike character in the lines `first` to `last` (from 0), or None."""
         for number in range(first, min(last + 1, len(lines))):
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:

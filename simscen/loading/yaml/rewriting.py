@@ -1,4 +1,4 @@
-"""New content for a YAML text. Unchanged parts keep their lines and comments."""
+"""Rewriting of a YAML text with new content. Unchanged parts keep their lines and comments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,15 +10,15 @@ from simscen.loading.yaml.scalars import Dumper, to_yaml
 from simscen.loading.yaml.tree import MappingNode, SequenceNode
 
 LINE_WIDTH_CHARS = 100
-"""Length of a line above which new lists and mappings are continued in the next line."""
+"""Length of a line above which new lists and mappings continue in the next line."""
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
     """Return `content` as YAML text. Top-level keys and list items with the same value in `text` keep their lines.
 
-    The lines of a key or item include the comments directly above it. No lines are kept if the result would not be
-    equal to `content`, for example because of YAML anchors. `path` is the path of `text` in messages. `comment` becomes
-    a comment at the top.
+    The lines of a key or item include the comments directly above it. If the result would not be equal to `content`,
+    for example because of YAML anchors, no lines are kept. `path` is the path of `text` in messages. `comment` is
+    written as a comment at the top.
     """
     original, _ = parse_yaml(text, path)
     lines = text.splitlines()
@@ -96,6 +96,7 @@ def _joined_lines(lines: Sequence[str]) -> str:
 
 
 def _indented(text: str, columns: int) -> str:
+    """Return the text with all lines indented by this number of columns."""
     return "".join(f"{' ' * columns}{line}\n" for line in text.splitlines())
 
 

@@ -1,6 +1,7 @@
-"""Reading and writing of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
+"""Reading and writing of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2), unlike in PyYAML.
 
-PyYAML implements YAML 1.1. A number with a leading zero is text here: YAML 1.1 reads it as octal, YAML 1.2 as decimal.
+PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because YAML 1.1 reads them as octal, but YAML
+1.2 as decimal.
 """
 
 import math
@@ -12,7 +13,7 @@ import yaml
 from simscen.loading.yaml.tree import Scalar
 
 MAX_INTEGER_CHARS = 19
-"""Largest number of characters of an integer, as in the largest 64-bit integer."""
+"""Largest number of characters of an integer: the length of the largest 64-bit integer."""
 
 _CONSTANTS: dict[str, Scalar] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
@@ -22,13 +23,13 @@ _CONSTANTS: dict[str, Scalar] = {
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
 }
-"""Values of null, booleans, infinity, and NaN, by text."""
+"""Values of the texts for null, booleans, infinity, and NaN."""
 _INTEGER_PATTERNS = (
     (re.compile(r"[-+]?(0|[1-9][0-9]*)"), 10),
     (re.compile(r"0o[0-7]+"), 8),
     (re.compile(r"0x[0-9a-fA-F]+"), 16),
 )
-"""Patterns of integers with their bases."""
+"""Patterns of integers, with their bases."""
 _FLOAT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
@@ -47,16 +48,16 @@ def parse_scalar(text: str) -> Scalar:
 
 
 _TAGS = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
-"""Names of types in YAML, by Python type."""
+"""Names of YAML types, by Python type."""
 # Characters that `read_text` rejects, and line breaks of YAML 1.1; strings with one of them are written with escapes.
 _NEEDS_ESCAPES = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 
 
 class Dumper(yaml.SafeDumper):
-    """PyYAML dumper for YAML 1.2. It quotes text such as `1e3`, a number in YAML 1.2, but not `on` or `1:30`."""
+    """PyYAML dumper for YAML 1.2. It quotes text such as `1e3` (a number in YAML 1.2), but not `on` or `1:30`."""
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Return the tag of a node. The tag of a scalar without quotes is the type of its `parse_scalar` value."""
+        """Return the tag of a node. For a scalar without quotes, `parse_scalar` determines the tag."""
         if kind is yaml.ScalarNode and implicit[0]:
             return f"tag:yaml.org,2002:{_plain_type(value)}"
         return super().resolve(kind, value, implicit)  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""Start and end of each value in a YAML text, so that an editor can replace single values."""
+"""Nodes with the start and end of each value in a YAML text, with which an editor can replace single values."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -81,6 +81,7 @@ class _Composer:
         return self._compose_mapping(start, flow)
 
     def _compose_sequence(self, start: int, flow: bool) -> SourceNode:
+        """Return the sequence that begins at the index `start`."""
         items = []
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
             items.append(self.compose_node(event, flow))
@@ -88,6 +89,7 @@ class _Composer:
         return SourceNode("sequence", start, end, flow, items=tuple(items))
 
     def _compose_mapping(self, start: int, flow: bool) -> SourceNode:
+        """Return the mapping that begins at the index `start`."""
         entries: dict[str, SourceEntry] = {}
         last = start
         while not isinstance(event := next(self._events), ev.MappingEndEvent):

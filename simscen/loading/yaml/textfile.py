@@ -1,4 +1,4 @@
-"""Reading of text files from untrusted sources, and messages about control characters and lookalike characters."""
+"""Safe reading of text files, and messages about control characters and lookalike characters in them."""
 
 import errno
 import os
@@ -21,7 +21,7 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u
 def read_text(path: Path, display_name: str) -> str | Problem:
     """Return the text of a file with line breaks as \\n, or a problem. `display_name` is its path in messages.
 
-    It must be a regular file in UTF-8, without control characters, of at most 1 MiB.
+    The file must be a regular file of at most 1 MiB, in UTF-8 and without control characters.
     """
     try:
         raw = _read_bytes(path)
@@ -65,7 +65,7 @@ def _read_bytes(path: Path) -> bytes | str:
 
 
 def _decode(raw: bytes, display_name: str) -> str | Problem:
-    """Return the text in the bytes of a file, or a problem with its encoding or a control character."""
+    """Return the text of the bytes in a file, or the problem of a wrong encoding or a control character."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -82,6 +82,7 @@ def _decode(raw: bytes, display_name: str) -> str | Problem:
 
 
 def _normalize_line_breaks(text: str) -> str:
+    """Return the text with line breaks as \\n."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -92,6 +93,7 @@ def _position(text: str, index: int) -> tuple[int, int]:
 
 
 _SPACE = "a plain space"
+"""Replacement of lookalike spaces, for messages."""
 LOOKALIKES = {
     "\u00a0": ("no-break space", _SPACE),
     "\u2007": ("figure space", _SPACE),
@@ -108,7 +110,7 @@ LOOKALIKES = {
     "\u2014": ("dash", "`-`"),
     "\u2212": ("minus sign", "`-`"),
 }
-"""Names and replacements of characters that look like YAML syntax, but are different characters."""
+"""Names and replacements of characters that look like ASCII characters of YAML, but are others."""
 
 
 def find_lookalike(text: str) -> int | None:

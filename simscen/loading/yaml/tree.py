@@ -1,7 +1,7 @@
-"""Tree of a YAML file with the positions of its keys and values.
+"""Tree of a YAML file with the positions of its keys and values, and functions to search and change it.
 
 Trees are immutable. A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of
-union members between them. Functions skip parts of a `loc` that do not exist in the tree, such as tags.
+union members between them. Functions with a `loc` skip parts that do not exist in the tree, such as tags.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in a file. `path` is that of messages, usually relative to the root. `line` and `col` count from 1."""
+    """Position in a file. `path` is usually relative to the root, as in messages. `line` and `col` count from 1."""
 
     path: str
     line: int
@@ -99,7 +99,7 @@ def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
 
 
 def replace_at(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
-    """Return a copy of the tree `node` with `value` at `keys`. Missing mappings are added at `position`."""
+    """Return a copy of the tree `node` with `value` at `keys`. Missing mappings are added; they get `position`."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]
@@ -149,6 +149,6 @@ def _existing(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
 
 
 def dotted_path(keys: Sequence[Key]) -> str:
-    """Return keys in the form for messages, e.g. `pass[0].goals_reached`."""
+    """Return keys as text for messages, e.g. `pass[0].goals_reached`."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return text.lstrip(".")
