@@ -1,4 +1,4 @@
-"""Stack that `--stack` selects for all scenarios, and stack files (`*.stack.yaml` or Nav2 parameter files)."""
+"""Choice of a stack for all scenarios by `--stack`, and stack files (`*.stack.yaml` or Nav2 parameter files)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,13 +16,13 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, Scalar
 from simscen.model.stack_files import StackFileSpec
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
-"""Keys under `stack` for zones and masks of the world. Another stack does not replace their values."""
+"""Keys under `stack` for zones and masks. Their values belong to the scenario, and apply to every stack."""
 COMMON_STACK_KEYS = ("controller_frequency",)
-"""Keys under `stack` that all types of stacks have."""
+"""Keys under `stack` that are valid for all types of stacks."""
 GOAL_CHECKER = "goal_checker"
-"""Key under `stack`."""
+"""Key under `stack` with the goal tolerances."""
 TOLERANCES = ("xy_goal_tolerance", "yaw_goal_tolerance")
-"""Keys under `goal_checker`."""
+"""Keys under `goal_checker` of the goal tolerances."""
 EXTERNAL = "external"
 """Key under `stack` with the name of an external stack."""
 REFERENCE = "reference"
@@ -63,9 +63,8 @@ class StackChoice:
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree of one robot with the selected stack.
 
-    Zones, masks, and goal tolerances of the scenario are kept. All other parameters are those of the selected stack
-    file. If no stack file is selected, parameters of the scenario are kept: all for a stack of the same type, otherwise
-    only the parameters that all types of stacks have.
+    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type of
+    stack or a command replaces them only if the scenario has a stack of another type. COMMON_STACK_KEYS are then kept.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
@@ -78,7 +77,7 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return the section `stack` of the choice, with the values that are kept of the section `own` of the scenario."""
+    """Return the section `stack` of the choice, with the values of the scenario's section `own` that are kept."""
     scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
         return _with_goal_tolerances(
@@ -135,7 +134,7 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
     """Return the section `stack` of a stack file and warnings about the file; or all problems of the file.
 
-    `path` can also be a Nav2 parameter file. The section contains the parameters of Nav2 files instead of their paths.
+    `path` can also be a Nav2 parameter file. The section contains the parameters in Nav2 files instead of their paths.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -188,9 +187,9 @@ _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 
 
 def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Return STACK_FILE_KIND or NAV2_FILE_KIND for a file with such content; "" for other files.
+    """Recognize a stack file by its content: return STACK_FILE_KIND, NAV2_FILE_KIND, or "" for other files.
 
-    `display_name` is the path of the file in messages.
+    `tree` and `text` are the content of the file, and `display_name` is its path in messages.
     """
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND

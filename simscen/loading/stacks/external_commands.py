@@ -1,4 +1,4 @@
-"""Commands that start external stacks: parsing, check of the program, and digest of its files."""
+"""Parsing of commands that start external stacks: check of the program, and digest of its files."""
 
 import hashlib
 import itertools
@@ -18,13 +18,13 @@ from simscen.loading.yaml.textfile import os_error_reason
 CHUNK_BYTES = 1 << 20
 """Number of bytes of a file that are read at once for the digest."""
 EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
-"""Names of folders that are not part of a stack."""
+"""Names of folders that do not belong to a stack."""
 MAX_FOLDERS = 500
 """Largest number of folders that are searched below a source folder of a stack."""
 MAX_PYTHON_FILES = 1000
 """Largest number of Python files of a source folder in the digest."""
 SIMSCEN_PROGRAM = "simscen"
-"""Program that is started from the running installation if it is not in the PATH."""
+"""Name of the simscen program. If it is not in the PATH, the program of the running installation is started."""
 
 
 def parse_command(
@@ -34,7 +34,7 @@ def parse_command(
     own_variables: Mapping[str, str] | None = None,
     timeouts_s: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
 ) -> ExternalCommand:
-    """Return the command in `text`, which has the syntax of a shell. It will be started in `folder`.
+    """Return the command in `text`, which has shell quoting. The command will be started in `folder`.
 
     `own_variables` are added to the environment variables `environment`. `timeouts_s` are the timeouts for the start of
     the program and for each of its answers. Raises ValueError if the command cannot be parsed or its program cannot be

@@ -1,4 +1,4 @@
-"""Expansion of `stack: {nav2_params: FILE}` to the parameters in the Nav2 parameter file."""
+"""Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file replace its path."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,7 +30,7 @@ NAV2_PARAMS, STACK, ROBOTS = "nav2_params", "stack", "robots"
 
 @dataclass
 class ExpandedTree:
-    """YAML tree of a scenario or stack file with the parameters of its Nav2 files.
+    """YAML tree of a scenario or stack file that contains the parameters of its Nav2 files.
 
     `problems` are errors in the Nav2 files. `notes` are warnings about ignored and changed parameters.
     """
@@ -41,7 +41,7 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """Return a scenario or stack file with the parameters of its Nav2 files in all sections `stack`.
+    """Return the tree of a scenario or stack file with the parameters of its Nav2 files in all sections `stack`.
 
     The texts of the Nav2 files are added to `library`.
     """
@@ -60,7 +60,7 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
 
 
 def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> Any:
-    """Return a scenario, or a mapping under `robots`, with an expanded `stack`. Add problems and notes to `result`."""
+    """Return a scenario, or a robot under `robots`, with an expanded `stack`. Add problems and notes to `result`."""
     stack = child(tree, STACK)
     if not isinstance(tree, MappingNode) or not isinstance(stack, MappingNode) or NAV2_PARAMS not in stack.entries:
         return tree
@@ -69,9 +69,9 @@ def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> 
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
-    """Return a section `stack` with the parameters of its Nav2 file and with `profile: nav2`, Nav2's defaults.
+    """Return a section `stack` with the parameters of its Nav2 file, and with Nav2's defaults (`profile: nav2`).
 
-    Values in the section have priority. Add problems and notes to `result`.
+    Values in the section itself have priority. Add problems and notes to `result`.
     """
     written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
@@ -109,7 +109,7 @@ def _clock(scenario: MappingNode) -> Clock:
 
 
 def _with_valid_frequency(one: Translation, clock: Clock) -> Translation:
-    """Return the translation. A controller frequency becomes the nearest one with a period of whole ticks."""
+    """Return the translation. A controller frequency is replaced by the nearest one with a period of whole ticks."""
     if one.keys != ("controller_frequency",) or not isinstance(one.value, int | float) or one.value <= 0:
         return one
     try:
@@ -131,7 +131,7 @@ def _translated_tree(one: Translation, parameters: Nav2Parameters) -> MappingNod
 
 
 def _parameter_node(value: Any, position: Position) -> Node:
-    """Return the YAML node of a value. All nodes have the same position."""
+    """Return the YAML node of a value. All its nodes have this position."""
     if isinstance(value, list):
         return SequenceNode(position, tuple(_parameter_node(item, position) for item in value))
     return ScalarNode(position, value)
@@ -173,7 +173,7 @@ def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> I
 
 
 def _known_parameters() -> KnownParameters:
-    """Return the names of the parameters of the reference stack."""
+    """Return the names of the parameters of the reference stack, by section or type."""
     from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {

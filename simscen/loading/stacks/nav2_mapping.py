@@ -1,4 +1,4 @@
-"""Tables and types for the translation of Nav2 parameters to parameters of simscen's reference stack."""
+"""Tables and types for the translation of Nav2's parameters to parameters of simscen's reference stack."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ DWB_CRITICS = {
     "GoalAlign": "goal_align_scale", "GoalDist": "goal_dist_scale", "RotateToGoal": "rotate_to_goal_scale",
     "Twirling": "twirling_scale",
 }  # fmt: skip
-"""Parameters in simscen for the weights of DWB critics, by critic."""
+"""Parameters in simscen for the weights of DWB's critics, by critic in Nav2."""
 DWB_CRITICS_WITHOUT_WEIGHT = ("Oscillation", "ObstacleFootprint")
 """DWB critics that only reject trajectories. They are always active in simscen."""
 MPPI_CRITICS = (
@@ -39,7 +39,7 @@ RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("dwb", "Oscillation.oscillation_reset_angle"): "oscillation_reset_angle",
     ("dwb", "Oscillation.x_only_threshold"): "x_only_threshold",
 }
-"""Names in simscen of parameters with another name in Nav2, by type in simscen and name in Nav2."""
+"""Names in simscen of parameters that have another name in Nav2, by type in simscen and name in Nav2."""
 IGNORED_PARAMETERS = frozenset(
     {
         "tf_broadcast", "save_pose_rate", "random_seed", "map_subscribe_transient_local",
@@ -49,25 +49,25 @@ IGNORED_PARAMETERS = frozenset(
         "always_reset_initial_pose", "polygons", "controller_plugin_types",
     }
 )  # fmt: skip
-"""Parameters without an effect in simulation, and parameters that are translated together with others."""
+"""Parameters that have no effect in simulation, or are translated together with others."""
 IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Parts of the names of further parameters without an effect in simulation."""
+"""Parameters have no effect in simulation if their name contains one of these parts."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
     "combination_method": (1,), "footprint_clearing_enabled": (True,),
 }  # fmt: skip
-"""Values with which Nav2 behaves like simscen, by parameter that simscen does not have."""
+"""Parameters that simscen does not have, with the values for which Nav2 behaves like simscen."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {
     **dict.fromkeys(("footprint", "robot_radius"), "the robot file defines the size of the robot"),
     **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario defines the initial pose"),
 }
-"""Messages for parameters that are ignored because the scenario or the robot file defines their values."""
+"""Notes about parameters that are ignored, because the scenario or the robot file defines their values."""
 OLD_NODE_NAMES = {"recoveries_server": "behavior_server"}
-"""Present names of renamed nodes, by name before Humble."""
+"""Names of renamed nodes since Humble, by earlier name."""
 IGNORED_NODES = frozenset(
     {
         "map_server", "map_saver", "lifecycle_manager", "lifecycle_manager_navigation",
@@ -91,13 +91,13 @@ Parameters = Mapping[str, Any]
 KnownParameters = Mapping[str, Sequence[str]]
 """Names of simscen's parameters, by section of `stack`, e.g. "costmap", or by type, e.g. "dwb".
 
-`a.b` is the parameter `b` in the mapping `a`.
+The name `a.b` stands for the parameter `b` in the mapping `a`.
 """
 
 
 @dataclass(frozen=True)
 class Translation:
-    """Result of the translation of a parameter of a Nav2 node: a value in simscen, a note, both, or none."""
+    """Translation of a parameter of a Nav2 node: to a value in simscen, to a note for the user, to both, or to none."""
 
     node: str
     parameter: str
@@ -109,7 +109,7 @@ class Translation:
     note: str = ""
     """Message for the user; "" for none."""
     covers: str | None = None
-    """Beginning of the names of further parameters that this translation includes; None for no further parameters."""
+    """Common beginning of the names of further parameters that this translation includes; None if there are none."""
     hint: str = "it is ignored"
     """Hint for the user, shown with the note."""
 

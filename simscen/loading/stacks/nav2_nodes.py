@@ -63,7 +63,7 @@ def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
 
 
 def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
-    """Yield a note for each plugin of a kind after the first, `chosen`, which alone is used."""
+    """Yield a note for each plugin of a kind that is not used. Only the first one, `chosen`, is used."""
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
         yield Translation(node, listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
@@ -72,9 +72,9 @@ def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: s
 def _translate_plugin(
     node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: KnownParameters
 ) -> Iterator[Translation]:
-    """Translate the type and the parameters of the plugin `name`. `types` are the types in simscen by class.
+    """Translate the type and the parameters of the plugin `name`. `types` are the types in simscen, by class in Nav2.
 
-    For a rotation shim controller, only the primary controller is translated.
+    For a rotation shim controller, only its primary controller is translated.
     """
     inner = f"{name}.primary_controller"
     shimmed = f"{inner}.plugin" in parameters
@@ -114,7 +114,7 @@ def _motion_model(parameters: Parameters, prefix: str) -> str:
 
 
 def _translate_critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """Translate the list of critics `written` of an "mppi" or "dwb" controller, and note unknown critics.
+    """Translate the list of critics `written` of an "mppi" or "dwb" controller. Unknown critics get a note.
 
     MPPI gets the list. DWB gets the weight 0 for each critic that is not in the list.
     """
@@ -197,16 +197,16 @@ def _translate_layer_parameter(
 LASER_SCAN = "LaserScan"
 """Data type of laser scans, and of an observation source without `data_type`."""
 HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
-"""Parameters of observation sources that simscen applies only to camera data. Other parameters are lidar ranges."""
+"""Parameters of observation sources that simscen applies only to camera data. Their other parameters are ranges."""
 
 
 def _translate_observation_sources(
     node: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Sequence[str]
 ) -> Iterator[Translation]:
-    """Translate the parameters of all observation sources. In simscen, they apply to all sensors together.
+    """Translate the parameters of all observation sources to the parameters that apply to all sensors in simscen.
 
-    Ranges come from the first laser scan source. Heights come from the first point cloud source, or else from the first
-    laser scan source.
+    Ranges are taken from the first laser scan source. Heights are taken from the first point cloud source, or else from
+    the first laser scan source.
     """
     types = {
         source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
@@ -314,8 +314,8 @@ def _xy_and_rotation(value: Any) -> list[float]:
 def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterator[Translation]:
     """Yield the translations of the parameters of all nodes. `nodes` are the parameters by name of the node.
 
-    Irrelevant parameters and unknown nodes are left out. A translation without keys and note stands for a parameter
-    that simscen does not have.
+    Irrelevant parameters and unknown nodes are left out. A parameter that simscen does not have gets a translation
+    without keys.
     """
     for node, parameters in nodes.items():
         translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))

@@ -1,4 +1,4 @@
-"""Nav2 parameter files: reading, and check of topics and frames against those that simscen publishes."""
+"""Reading of Nav2 parameter files, and comparison of their topics and frames with those of simscen."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from simscen.ros2.nav2.parameter_rules import PublishedNames, check
 PARAMETERS_KEY = "ros__parameters"
 """Key with the parameters of a node in a ROS 2 parameter file."""
 ALL_NODES = "**"
-"""Name that stands for all nodes, without the `/` before it."""
+"""Name that stands for all nodes: `/**` without the slash."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Nav2Parameters:
     display_name: str
     """Path of the file in messages."""
     nodes: Mapping[str, Mapping[str, Any]]
-    """Parameters by name of the node and dotted name of the parameter. Each node includes the parameters of `/**`."""
+    """Parameters by name of the node, then by dotted name. The parameters of `/**` are included in each node."""
     positions: Mapping[tuple[str, str], Position]
     """Positions of the values, by name of the node and dotted name of the parameter."""
     text: str
@@ -88,7 +88,7 @@ def is_nav2_parameter_file(text: str, display_name: str) -> bool:
 def _ros_nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
     """Yield the name (without namespace) and the parameters of each ROS node in a YAML tree.
 
-    `name` is the key of the tree `node`.
+    `node` is the tree, and `name` is the last part of its key.
     """
     for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
         if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
@@ -98,7 +98,7 @@ def _ros_nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
 
 
 def _dotted_parameters(mapping: MappingNode, prefix: str) -> Iterator[tuple[str, Node]]:
-    """Yield the dotted name and the value of each parameter in nested mappings. `prefix` is put before the names."""
+    """Yield the dotted name and the value of each parameter in nested mappings. All names begin with `prefix`."""
     for key, entry in mapping.entries.items():
         if isinstance(entry.value, MappingNode):
             yield from _dotted_parameters(entry.value, f"{prefix}{key}.")

@@ -1,4 +1,4 @@
-"""User configuration with the commands of external stacks, and problems of stacks without a command."""
+"""User configuration with the commands of external stacks, and problems of missing and conflicting commands."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -88,9 +88,9 @@ def undefined_stack(
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if robots of a scenario need the commands of several `--stack` options; else [].
+    """Return a problem if the robots of a scenario need several of the commands in `--stack` options; else [].
 
-    `given` are the names of the external stacks with a command in `--stack`. `config_file` is the user configuration.
+    `given` are the names of the stacks in these options. `config_file` is the user configuration.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]
