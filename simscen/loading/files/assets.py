@@ -28,8 +28,9 @@ Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 """Suffixes of the files of Gazebo worlds."""
 XML_STARTS = ("<?xml", "<sdf", "<!--")
-"""Possible beginnings of XML files."""
+"""Beginnings of XML files."""
 URDF_SUFFIXES = (".urdf", ".xacro")
+"""Suffixes of URDF files."""
 SHIPPED_ROBOT_SUFFIX = ".robot.yaml"
 """Suffix of the files of robots that ship with simscen."""
 
@@ -39,14 +40,14 @@ class Assets:
     """Loader of the files that a scenario names. Its methods add problems to `problems`.
 
     Methods return None if a file is unusable, or if there is nothing to load. `written` is a name or path in a YAML
-    file, and `position` is its position. Paths are relative to this YAML file.
+    file, and `position` is its position there. Paths are relative to the folder of this YAML file.
     """
 
     library: Library
     problems: list[Problem] = field(default_factory=list)
 
     def world_of(self, world: WorldSpec | str | None, tree: MappingNode, file: Path) -> LoadedWorld | None:
-        """Load the world of the scenario `file`: the inline world, or the world file under the key `world`."""
+        """Load the world of the scenario `file`: the inline world, or the file that the key `world` names."""
         node = node_at(tree, ("world",))
         if isinstance(world, WorldSpec):
             return self.complete_world(world, node, file)
@@ -103,7 +104,7 @@ class Assets:
         return self._ros_map(self._read_tree(path), path)
 
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
-        """Load the robot in the file with the path `written`, or the robot with this name that ships with simscen."""
+        """Load the robot in the file with the path `written`, or the shipped robot with this name."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
             path = self._find_file(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
@@ -139,7 +140,7 @@ class Assets:
         return LoadedRobot(name, path, spec, urdf, bundled, mapping, found)
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """Return `load(path)`, or the same object as before if the file has been loaded without problems."""
+        """Return `load(path)`; from the cache if the file has been loaded without problems before."""
         key = getattr(load, "func", load).__name__, path
         if key in self.library.loaded:
             known: Loaded = self.library.loaded[key]
@@ -176,6 +177,7 @@ class Assets:
         return spec
 
     def _find_file(self, written: str, position: Position) -> Path | None:
+        """Return the existing regular file with the path `written`."""
         found = self._find_path(written, position)
         if found is not None and not found.is_file():
             self._add_problem(position, "SC001", f"not a regular file: {quoted(written)}")
@@ -183,6 +185,7 @@ class Assets:
         return found
 
     def _find_folder(self, written: str, position: Position) -> Path | None:
+        """Return the existing folder with the path `written`."""
         found = self._find_path(written, position)
         if found is not None and not found.is_dir():
             self._add_problem(position, "SC001", f"not a folder: {quoted(written)}")
@@ -202,7 +205,7 @@ class Assets:
 
 
 def is_ros_map(tree: Node | None) -> bool:
-    """Return whether a YAML file is a ROS map, i.e. a file of map_server."""
+    """Return whether a YAML file is a ROS map, a file of map_server."""
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
@@ -219,7 +222,7 @@ def _ignored_key_warnings(tree: Node) -> list[Problem]:
 
 
 def _ignored_key_hint(key: str) -> str:
-    """Return "did you mean …?" for a key that is similar to a key of ROS maps; else that it is ignored."""
+    """Return the hint for a key: "did you mean …?" if it is similar to a key of ROS maps; else that it is ignored."""
     near = suggestion(key, RosMapSpec.model_fields)
     return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 
@@ -232,10 +235,10 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Load the filter masks of the criteria under `pass`, by path as written in the file. Add problems to `assets`.
+    """Load the filter masks of the criteria under `pass`. Return them by path as written. Add problems to `assets`.
 
-    It is a problem if one path leads to two files. This can happen with `pass+` if the scenario and the file that it
-    extends are in different folders.
+    It is a problem if one path leads to two files. This can happen with `pass+` if a scenario extends a file in another
+    folder.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):

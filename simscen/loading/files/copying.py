@@ -1,4 +1,4 @@
-"""Copies of a scenario and of the files that it names in another folder."""
+"""Copying of a scenario, and of the files that it names, to another folder."""
 
 import shutil
 from collections.abc import Iterator
@@ -12,19 +12,19 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import Node, ScalarNode, nodes_with_keys
 
 _MODELINE = "# yaml-language-server:"
-"""Start of the comment with the path of the JSON schema for editors."""
+"""Beginning of the comment that tells editors the path of the JSON schema."""
 _SEARCHED_SUFFIXES = (".yaml", ".yml")
-"""Suffixes of files in which the names of further files are searched."""
+"""Suffixes of files that are searched for names of further files."""
 _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
-"""Suffixes of files that can name further files, but are not searched. They are not copied."""
+"""Suffixes of files that can name further files, but cannot be searched. They are not copied."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
     """Copy a scenario to the file `target`, and return the paths of all copies. Paths in the copy are adapted.
 
-    `root` is the root of `target`. If it is not the root of the scenario, the files that the scenario names are copied
-    to a folder next to `target`, with the name of `target` without suffixes. Raises UsageError if a file cannot be
-    copied, or a copy exists already.
+    `root` is the root of `target`. If the scenario has another root, the files that it names are copied as well, to a
+    folder next to `target` with the name of `target` without suffixes. Raises UsageError if a file cannot be copied, or
+    if a copy already exists.
     """
     text, tree = _text_of(loaded)
     folders = {file.parent for file in loaded.files.values()}
@@ -56,20 +56,21 @@ def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
 
 
 def _scalars(tree: Node) -> Iterator[ScalarNode]:
+    """Yield all scalars in a YAML tree."""
     return (node for _, node in nodes_with_keys(tree) if isinstance(node, ScalarNode))
 
 
 def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
-    """Return the existing file whose path relative to one of `folders` is the value of `leaf`; None without one."""
+    """Return the existing file that the scalar `leaf` names relative to one of `folders`; None if there is none."""
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
     return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
 
 
 def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Yield a file, the files that it names, and so on, except files in `known`.
+    """Yield a file and, recursively, the files that it names, except files in `known`.
 
-    Raises UsageError for a file that can name further files, but is not searched.
+    Raises UsageError for a file with one of _UNSEARCHED_SUFFIXES.
     """
     if file in known:
         return
@@ -85,7 +86,7 @@ def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iter
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
-    """Return the YAML text with `path` instead of the value of `leaf`."""
+    """Return the YAML text with `path` instead of the scalar `leaf`."""
     lines = text.split("\n")
     line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""

@@ -1,4 +1,4 @@
-"""Files with criteria for the judgment of logs."""
+"""Loading of files with criteria (`--scenario`) by which existing logs are judged."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from simscen.model.scenario import CriteriaSpec
 
 @dataclass(frozen=True)
 class LoadedCriteria:
-    """Criteria of a file."""
+    """Loaded criteria file."""
 
     file: Path
     spec: CriteriaSpec
@@ -33,7 +33,7 @@ class LoadedCriteria:
     """Filter masks of the criteria, by path as written in the file."""
 
     def for_robot(self, robot: str) -> "LoadedCriteria":
-        """Return the criteria for the robot of a log with this name; "" stands for the only robot of a log.
+        """Return the criteria for a robot of a log. `robot` is its name; "" for the only robot of a log.
 
         A file without `robots` applies to all robots. Raises InvalidInput if `robots` does not contain the robot.
         """
@@ -48,7 +48,7 @@ class LoadedCriteria:
         raise InvalidInput(self.library.with_source([problem]))
 
     def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
-        """Load the world and the robot of the file; None for a missing world or robot. Raises InvalidInput."""
+        """Load the world and the robot that the file names; None for a missing world or robot. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
         world = assets.world_of(self.spec.world, self.tree, self.file)
         if self.spec.robot is not None:
@@ -78,7 +78,7 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
 
 
 def _load_tree(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
-    """Return the criteria in the YAML tree of `file`. Raises InvalidInput, also for unknown places and masks."""
+    """Return the criteria in the YAML tree of `file`. Raises InvalidInput, for example for unknown places."""
     spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))

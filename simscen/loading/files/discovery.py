@@ -1,4 +1,4 @@
-"""Files that the path arguments of a command select, and the default root folder."""
+"""Search for the files that the path arguments of a command select, and for the default root folder."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,6 +16,7 @@ ROBOT_SUFFIXES = (".robot.yaml", ".robot.yml")
 STUDY_SUFFIXES = (".study.yaml", ".study.yml")
 STACK_SUFFIXES = (".stack.yaml", ".stack.yml")
 BASE_SUFFIXES = (".base.yaml", ".base.yml")
+"""Suffixes of the YAML files of simscen by kind. Scenarios extend base files."""
 SUFFIXES = SCENARIO_SUFFIXES + STUDY_SUFFIXES + WORLD_SUFFIXES + ROBOT_SUFFIXES + STACK_SUFFIXES + BASE_SUFFIXES
 """Suffixes of all kinds of YAML files of simscen."""
 
@@ -31,8 +32,8 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
     """Return the absolute paths of the files that `paths` select, sorted.
 
     A file selects itself. A folder selects all files with one of `suffixes` in it and in its subfolders. Raises
-    InvalidInput for missing paths, and for scenarios with the same output folder. Raises NothingSelected if no file is
-    selected.
+    InvalidInput for missing paths, and for scenarios with conflicting output folders. Raises NothingSelected if no file
+    is selected.
     """
     problems = [problem for path in paths if (problem := _missing_path_problem(path))]
     found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
@@ -58,9 +59,8 @@ def sibling(file: Path, label: str) -> Path:
 def default_root(paths: Iterable[Path]) -> Path:
     """Return the folder of the project that contains all `paths`.
 
-    This is the nearest parent that is a repository. If there is none, it is the nearest parent with a project file,
-    else the parent of the nearest folder `scenarios`, else the working folder if it contains the paths, else their
-    common folder.
+    It is the first that exists of: the nearest parent that is a repository, the nearest parent with a project file, the
+    parent of the nearest folder `scenarios`, the working folder if it contains the paths, their common folder.
     """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
@@ -75,6 +75,7 @@ def default_root(paths: Iterable[Path]) -> Path:
 
 
 def _contains_any(folder: Path, names: tuple[str, ...]) -> bool:
+    """Return whether a folder contains a file or folder with one of these names."""
     return any(exists(folder / name) for name in names)
 
 
@@ -113,7 +114,7 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
 
 
 def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield a problem for each scenario with an output folder inside the folder of a run of another scenario.
+    """Yield a problem for each scenario with an output folder inside the output folder of a run of another scenario.
 
     For example, the scenario `a/seed-1/b` conflicts with the run of the scenario `a` with seed 1.
     """

@@ -1,4 +1,4 @@
-"""Resolution of paths in YAML files. Paths must be relative, and lead into the root or a folder of --world-path."""
+"""Resolution of paths in YAML files. They must be relative, and lead into the root or a folder of --world-path."""
 
 import errno
 import os
@@ -12,7 +12,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import os_error_reason
 
 MODEL_SCHEME = "model://"
-"""Scheme of the URIs with which Gazebo names models."""
+"""Scheme of URIs for models in Gazebo."""
 
 _INVALID_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 """Characters that the id of a scenario cannot contain: control characters, bidirectional characters, and surrogates."""
@@ -20,7 +20,7 @@ _INVALID_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud80
 
 @dataclass(frozen=True)
 class PathSandbox:
-    """Folders from which a scenario may read files: `root`, and the folders of `--world-path` in this order."""
+    """Folders from which a scenario may read files: `root`, and `world_path`, the folders of `--world-path`."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
@@ -86,12 +86,12 @@ def path_in_messages(path: Path, root: Path) -> str:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; False for an invalid path, for which Path.exists raises an error."""
+    """Return whether a path exists. Returns False for an invalid path, for which Path.exists raises an error."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder; False for an invalid path, for which Path.is_dir raises an error."""
+    """Return whether a path is a folder. Returns False for an invalid path, for which Path.is_dir raises an error."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
@@ -132,6 +132,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _outside_problem(written: str) -> PathProblem:
+    """Return the problem that a path in a YAML file leads out of the sandbox."""
     hint = "choose the root with --root, or allow a folder with --world-path"
     return PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
 

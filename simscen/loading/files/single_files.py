@@ -1,4 +1,4 @@
-"""Loading of robot and world files without a scenario, and text of `*.world.yaml` files."""
+"""Loading of robot and world files without a scenario, and formatting of the text of `*.world.yaml` files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class RobotFile:
-    """Loaded robot, and the reader of its files."""
+    """Loaded robot, and the `library` that has read its files."""
 
     robot: LoadedRobot
     library: Library
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """Folders that the files of the robot must lie in: the root and the folders of `--world-path`."""
+        """Folders in which the files of the robot must lie: the root and the folders of `--world-path`."""
         return (self.library.sandbox.root, *self.library.sandbox.world_path)
 
 
@@ -82,7 +82,7 @@ def world_text(spec: WorldSpec) -> str:
 
 
 def _in_order(value: Any) -> Any:
-    """Return the data with the keys `simscen` and `name` first in each mapping."""
+    """Return the data with the keys `simscen` and `name` at the beginning of each mapping."""
     if isinstance(value, list):
         return [_in_order(item) for item in value]
     if not isinstance(value, dict):
@@ -92,7 +92,7 @@ def _in_order(value: Any) -> Any:
 
 
 class CompactDumper(Dumper):
-    """YAML dumper that writes lists without mappings, and mappings with a scalar, in brackets or braces."""
+    """YAML dumper that writes innermost lists in brackets, and mappings that contain a scalar in braces."""
 
 
 def _represent_list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:

@@ -1,4 +1,4 @@
-"""Axes of a block of variations.
+"""Building of the axes of a block of variations from its YAML tree.
 
 An axis is a list of options. An option is a new value for one path, or new values for several paths. Each variation of
 a block combines one option of each axis.
@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass
 class AxisBuilder:
-    """Builds the axes of all blocks of a scenario."""
+    """Builds the axes of all blocks of variations of a scenario, and collects problems."""
 
     tree: MappingNode
     """YAML tree of the scenario without its key `variations`."""
@@ -45,7 +45,7 @@ class AxisBuilder:
     def build_axes(
         self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]
     ) -> list[Sequence[Option]]:
-        """Return the axes of a block: one for each path under `grid`, and one for each other kind of variation.
+        """Return the axes of a block: one for each path under `grid`, and one for each other kind, such as `pairs`.
 
         `node` is the YAML tree of the block, `conditions` are its conditions.
         """
@@ -64,9 +64,9 @@ class AxisBuilder:
         return found
 
     def _changes_by_path(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return a list of changes for each path in a mapping from paths to lists of values.
+        """Return the list of changes of each path in `node`, a mapping from paths to lists of values.
 
-        With `distinct`, equal values of a path are reported.
+        With `distinct`, equal values of a path are reported as problems.
         """
         if not isinstance(node, MappingNode):
             return []
@@ -146,7 +146,7 @@ class AxisBuilder:
         return name
 
     def _sampled_options(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
-        """Return options with drawn values. Report invalid distributions; `node` is their YAML tree."""
+        """Return options with drawn values. Report invalid distributions. `node` is their YAML tree."""
         from simscen.loading.variations.sampling import draw_value, draw_values
 
         assert isinstance(node, MappingNode)
@@ -190,7 +190,7 @@ class AxisBuilder:
             seen.append(item.plain)
 
     def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
-        """Report paths of different axes that lead to the same value, or to a value and a part of this value."""
+        """Report paths of different axes that lead to the same value, or to a value and to a part of it."""
         targets = [
             {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
             for axis in axes
@@ -217,8 +217,8 @@ class AxisBuilder:
     def check_condition_paths(self, conditions: Sequence[Condition], block: Node) -> None:
         """Report paths in the conditions of a block that are neither varied nor written in the scenario.
 
-        Call it after `build_axes`. `conditions` is the result of `read_conditions`; nothing is reported if it reported
-        an invalid condition.
+        Call this after `build_axes`. `conditions` is the result of `read_conditions`. Nothing is reported for a block
+        with an invalid condition.
         """
         node = child(block, "require")
         if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):

@@ -1,7 +1,7 @@
-"""Conditions on varied values, such as `goals[0].pose.x > robot.pose.x + 1`, under the key `require`.
+"""Parsing and evaluation of conditions on varied values, such as `goals[0].pose.x > robot.pose.x + 1`.
 
-Conditions are Python expressions of paths, numbers, and texts. They are parsed with `ast` and never executed. The
-function `value` takes a path as text, because `pass.clearance.min` is not valid Python.
+Conditions are under the key `require`. They have the syntax of Python expressions, but they are parsed with `ast` and
+never executed as Python. The function `value` takes a path as text: `pass.clearance.min` is not valid Python.
 """
 
 import ast
@@ -30,7 +30,7 @@ GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
     "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with keywords of Python"
 )
-"""Hint with the syntax of conditions."""
+"""Hint that describes the syntax of conditions."""
 
 
 class ConditionError(ValueError):
@@ -39,7 +39,7 @@ class ConditionError(ValueError):
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition with its text in the file, its parsed expression, and the paths in it."""
+    """Condition: its text in the file, its parsed expression, and the paths in it."""
 
     text: str
     expression: ast.expr
@@ -99,9 +99,9 @@ def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
 
 
 def _path(node: ast.expr, text: str) -> str:
-    """Return the path that an expression such as `goals[0].pose.x` stands for. Raises ConditionError if it is none.
+    """Return the text of a path such as `goals[0].pose.x`. Raises ConditionError if the expression is not a path.
 
-    `text` is the condition for the message.
+    `text` is the whole condition, for the message.
     """
     match node:
         case ast.Name(id=name):
@@ -116,9 +116,9 @@ def _path(node: ast.expr, text: str) -> str:
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """Return the value of an expression: a number in SI units, a text, or a boolean; `values` are the values by path.
+    """Return the value of an expression: a number in SI units, a text, or a boolean. `values` are values by path.
 
-    Raises TypeError, ZeroDivisionError, or OverflowError if it cannot be evaluated.
+    Raises TypeError, ZeroDivisionError, or OverflowError if the expression cannot be evaluated.
     """
     match node:
         case ast.BoolOp(op=ast.And(), values=parts):
@@ -144,7 +144,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
 
 
 def _evaluate_boolean(node: ast.expr, values: Mapping[str, Any]) -> bool:
-    """Return the boolean value of an expression. Raises the errors of `_evaluate`, also TypeError for other values."""
+    """Return the boolean value of an expression. Raises the errors of `_evaluate`; TypeError also for other values."""
     result = _evaluate(node, values)
     if not isinstance(result, bool):
         raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of true or false")

@@ -23,14 +23,17 @@ VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 MAX_TOTAL_VALUES = 5_000_000
 """Largest number of keys and values in all variations of a scenario together."""
 MAX_REJECTED_DRAWS = 10_000
-"""Number of consecutive random draws that may fail the conditions before an error is raised."""
+"""Number of consecutive random draws that may violate the conditions before an error is raised."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 """Top-level keys that do not affect a run. Their values are not part of the names of variations."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """Scenario `tree` that contains the new values in `changes`. `name` is "" for a file without variations."""
+    """Variation of a scenario: its YAML `tree` contains the new values in `changes`.
+
+    `name` is "" for a file without variations.
+    """
 
     name: str
     tree: MappingNode = field(repr=False)
@@ -45,7 +48,7 @@ class Variation:
 
     @property
     def set_by(self) -> Mapping[Position, str]:
-        """The path of the change that set a value, by the position of the value or of a part of it."""
+        """Path of the change that set a value, by position of the value or of a part of it."""
         return {
             position: change.target.path
             for change in self.changes
@@ -60,9 +63,9 @@ class Variation:
 
 @dataclass(frozen=True)
 class Block:
-    """Block of variations. Each combination of one option of each axis that meets the conditions is a variation.
+    """Block of variations. A variation combines one option of each axis, and meets the conditions.
 
-    With `is_random`, it has a single axis with options that are drawn at random.
+    With `is_random`, the block has a single axis with options that are drawn at random.
     """
 
     axes: Sequence[Sequence[Option]]
@@ -95,13 +98,13 @@ class VariationSpace:
     targets: Mapping[str, Target]
     """Targets of all varied paths, by path."""
     is_random: bool
-    """Whether the variations are independent random draws. There is no largest number then."""
+    """Whether the variations are independent random draws. Their numbers then have no upper limit."""
 
     @property
     def count(self) -> int:
         """Number of variations, including variations that do not meet the conditions.
 
-        With `is_random`, the number of draws in the file.
+        With `is_random`, it is the `count` in the file.
         """
         return sum(block.count for block in self.blocks)
 
@@ -120,8 +123,8 @@ class VariationSpace:
     def numbers(self) -> Iterator[int]:
         """Yield the numbers of the variations that meet the conditions; with `is_random`, only the first `count`.
 
-        Raises ConditionError if a condition cannot be evaluated, or if too many consecutive draws do not meet the
-        conditions.
+        Raises ConditionError if a condition cannot be evaluated, or if MAX_REJECTED_DRAWS consecutive draws do not meet
+        the conditions.
         """
         if not self.is_random:
             yield from (number for number in range(1, self.count + 1) if self._options(number) is not None)
@@ -136,7 +139,7 @@ class VariationSpace:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
 
     def named_variations(self) -> list[Variation]:
-        """Return the variations of `numbers()`, named by the values that differ. Raises ConditionError."""
+        """Return the variations of `numbers()`. Their names state the values that differ. Raises ConditionError."""
         numbers = list(self.numbers())
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
@@ -166,6 +169,7 @@ class VariationSpace:
         raise IndexError(number)
 
     def _build(self, name: str, options: Sequence[Option]) -> Variation:
+        """Return the variation with these options."""
         return Variation.with_changes(name, self.tree, [change for option in options for change in option.changes])
 
 
@@ -256,7 +260,7 @@ def _require_position(tree: MappingNode) -> Position:
 
 
 def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
-    """Return the name of a variation with these options. `keys` are short names by path, only of paths in the name."""
+    """Return the name of a variation with these options. `keys` are the short names of the paths in the name."""
     parts = []
     for option in options:
         shown = [change for change in option.changes if change.target.path in keys]
@@ -268,6 +272,7 @@ def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
 
 
 def _option_size(option: Option) -> int:
+    """Return the number of keys and values in the changes of an option."""
     return sum(_size(change.value) for change in option.changes)
 
 

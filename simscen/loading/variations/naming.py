@@ -1,4 +1,4 @@
-"""Names of variations, such as `speed=0.5,mass=10`. They are unique and valid as folder names."""
+"""Names of variations, such as `speed=0.5,mass=10`: unique, and valid as names of folders."""
 
 import re
 from collections import Counter
@@ -12,14 +12,14 @@ MAX_NAME_CHARS = 100
 """Largest length of a name."""
 _MAX_VALUE_CHARS = 40
 """Largest length of a value in a name."""
-_VALID_NAME = re.compile(r"[^\W][\w.,=+%-]*")
-_NUMBERED_NAME = re.compile(r"variation-([1-9][0-9]{0,8})")
-_UNSAFE_CHARS = re.compile(r"[^\w.+%-]+")
+_VALID_NAME_PATTERN = re.compile(r"[^\W][\w.,=+%-]*")
+_NUMBERED_NAME_PATTERN = re.compile(r"variation-([1-9][0-9]{0,8})")
+_INVALID_CHARS_PATTERN = re.compile(r"[^\w.+%-]+")
 
 
 def name_error(name: str) -> str | None:
     """Return the reason why a name of a variation is invalid; None if it is valid."""
-    if len(name) <= MAX_NAME_CHARS and _VALID_NAME.fullmatch(name):
+    if len(name) <= MAX_NAME_CHARS and _VALID_NAME_PATTERN.fullmatch(name):
         return None
     return f"{quoted(name)} is not a valid name of a variation"
 
@@ -31,7 +31,7 @@ NAME_HINT = (
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:
-    """Return short unique names by path, e.g. `std` or `noise.std` for the path `faults.lidar.noise.std`."""
+    """Return a short unique name for each path, e.g. `std` or `noise.std` for the path `faults.lidar.noise.std`."""
     parts = {target.path: split_path(target.path) for target in targets}
     part_counts = dict.fromkeys(parts, 1)
     while True:
@@ -46,10 +46,10 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], values: dict[str, Node], value_numbers: dict[str, int], number: int) -> str:
-    """Return the name of a variation by its values, such as `speed=0.5,mass=10`.
+    """Return the name of a variation with these values, such as `speed=0.5,mass=10`.
 
-    `keys` are short names, `values` the values, and `value_numbers` the numbers of the values in the list of the path;
-    all by path. The number replaces a value that is too long. A name that is too long becomes `variation-<number>`.
+    The mappings contain, by path: the short name (`keys`), the value, and the number of the value in the list of the
+    path, which replaces a value that is too long. A name that is too long becomes `variation-<number>`.
     """
     texts = {path: _value_text(value) or f"no{value_numbers[path]}" for path, value in values.items()}
     name = ",".join(f"{keys[path]}={text}" for path, text in texts.items())
@@ -64,12 +64,12 @@ def numbered_name(number: int) -> str:
 
 def number_of(name: str) -> int | None:
     """Return the number in a name such as `variation-7`; None for other names."""
-    match = _NUMBERED_NAME.fullmatch(name)
+    match = _NUMBERED_NAME_PATTERN.fullmatch(name)
     return int(match[1]) if match else None
 
 
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
-    """Return the names, made unique ignoring case by the suffixes `+2`, `+3`, …
+    """Add suffixes `+2`, `+3`, … to repeated names, so that all names are unique even if case is ignored.
 
     Names for which `is_fixed` is true are not changed.
     """
@@ -103,5 +103,5 @@ def _value_text(node: Node) -> str:
 
 
 def _sanitize(text: str) -> str:
-    """Return the text without spaces, and with `_` for characters that are invalid in names."""
-    return _UNSAFE_CHARS.sub("_", text.replace(" ", "")).strip("_")
+    """Return the text without spaces, and with `_` instead of characters that are invalid in names."""
+    return _INVALID_CHARS_PATTERN.sub("_", text.replace(" ", "")).strip("_")

@@ -1,4 +1,7 @@
-"""Options of the axes of variations: new values for one or several paths, listed in a file or drawn at random."""
+"""Options of the axes of variations.
+
+An option contains new values for one or several paths. The values are listed in a file or drawn at random.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass(frozen=True)
 class Change:
-    """New value of a target. `number` is the number of the value in the list of values of its path, from 1."""
+    """New value of a target. `number` is the position of the value in the list of values of its path, from 1."""
 
     target: Target
     value: Node
@@ -32,7 +35,7 @@ class RandomOptions(Sequence[Option]):
     """Options with random values, drawn on demand. Indices beyond the length are valid as well."""
 
     def __init__(self, sampled: "Sampled", distributions: MappingNode, targets: Sequence[Target]) -> None:
-        """Draw from the distributions in `sampled`. `distributions` is their YAML tree by path."""
+        """Draw from the distributions in `sampled`. `distributions` is the YAML tree of these distributions by path."""
         self._sampled, self._distributions, self._targets = sampled, distributions, targets
 
     def __len__(self) -> int:
@@ -60,9 +63,10 @@ class RandomOptions(Sequence[Option]):
 
 
 def value_node(distribution: Node, value: object) -> Node:
-    """Return the YAML node of a value that was drawn from a distribution; `distribution` is its YAML tree.
+    """Return the YAML node of a value that was drawn from a distribution. `distribution` is its YAML tree.
 
-    A ChoiceIndex stands for an item of a `choice`. Other values become a new node at the position of the distribution.
+    For a ChoiceIndex, it is the chosen item of the `choice`. For other values, it is a new node at the position of the
+    distribution.
     """
     from simscen.loading.variations.sampling import ChoiceIndex
 
@@ -75,5 +79,5 @@ def value_node(distribution: Node, value: object) -> Node:
 
 
 def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
-    """Return the options of an axis that together change all its targets: the first of random options, else all."""
+    """Return options of an axis that together change all its targets: the first one if they are random, else all."""
     return axis[:1] if isinstance(axis, RandomOptions) else axis

@@ -1,4 +1,4 @@
-"""Paths to values of a scenario that a variation changes, such as `goals[0].pose` or `faults.lidar.noise.std`.
+"""Resolution of the paths of varied values, such as `goals[0].pose` or `faults.lidar.noise.std`.
 
 A path selects an item of a list by its index from 0 (`[0]` or `.0`), or by its name: the value of `name` or `id`, the
 place of a goal, the sensor of a fault, or the kind of a criterion or metric.
@@ -24,18 +24,18 @@ from simscen.loading.yaml.tree import (
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
 """Top-level keys of a scenario that contain lists."""
 KEYS_BY_KIND = frozenset({"pass", "metrics"})
-"""Top-level keys with lists in which the kind of an item is a name of the item."""
+"""Top-level keys with lists in which an item can be selected by its kind."""
 FIXED_KEYS = {
     "simscen": "all variations use one version of the language",
     "extends": "all variations extend the same file; vary the values that differ",
     "variations": "variations cannot be nested",
     "name": "each variation has its own name",
 }
-"""Top-level keys that a variation cannot change, with the reason."""
+"""Top-level keys that a variation cannot change, with the reasons."""
 _PART_PATTERN = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
 """Pattern of one part of a path: a key, or a key or index in brackets. A dot can precede it."""
 _NAME_KEYS = ("name", "id", "sensor", "pose")
-"""Keys of an item of a list whose text is a name of the item."""
+"""Keys of an item of a list that contain a name of the item."""
 
 
 class PathError(ValueError):
@@ -48,7 +48,7 @@ class PathError(ValueError):
 
 @dataclass(frozen=True)
 class Target:
-    """Value that a variation changes: its path, the position of the path in the file, and the keys of the value."""
+    """Value that a variation changes: its path, the position of the path in the file, and the keys to the value."""
 
     path: str
     position: Position
@@ -116,10 +116,10 @@ def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
 
 
 def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
-    """Return the index of the item that `part` of a path selects in the list at `keys`.
+    """Return the index of the item that `part` of a path selects in the list `items` at `keys`.
 
-    If `part` is the kind of a criterion or metric, the kind follows the index, unless the path itself continues with a
-    key of the item. `rest` are the parts after `part`. Raises PathError if no item or several items match.
+    If `part` is the kind of a criterion or metric, the index is followed by the kind, unless the path continues with a
+    key of the item itself. `rest` are the parts after `part`. Raises PathError if no item or several items match.
     """
     holder = dotted_path(keys)
     if part.isascii() and part.isdecimal():
@@ -155,7 +155,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
 
 
 def _names(item: Node) -> list[str]:
-    """Return the names of an item of a list. The name of a text is the text itself."""
+    """Return the names of an item of a list. A text is its own name."""
     if isinstance(item, ScalarNode):
         return [item.value] if isinstance(item.value, str) else []
     if not isinstance(item, MappingNode):
@@ -165,6 +165,7 @@ def _names(item: Node) -> list[str]:
 
 
 def _describe(scalar: ScalarNode) -> str:
+    """Return the value for messages; "empty" for no value."""
     return short_value(scalar) if scalar.value is not None else "empty"
 
 

@@ -1,6 +1,6 @@
 """Sampling of values for variations: draws from distributions, and pairwise combinations (covering arrays).
 
-A drawn value depends only on the seed, the path, and the number of the draw.
+The draws are computed by hashes of the seed, the path, and the number of the draw, without a random generator.
 """
 
 import hashlib
@@ -37,9 +37,9 @@ def draw_value(sampled: Sampled, path: str, index: int) -> Any:
 
 
 def _probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return a cumulative probability between 0 and 1 (both excluded) for each variation.
+    """Return the cumulative probability of the value of a path for each variation, between 0 and 1 (both excluded).
 
-    The sampling method is `random`, Latin hypercube, or Sobol.
+    `sampled.method` determines the method: random, Latin hypercube, or Sobol.
     """
     count = sampled.count
     if sampled.method == "sobol":
@@ -147,7 +147,7 @@ Pair = tuple[int, int, int, int]
 CANDIDATES_PER_ROW = 30
 """Number of candidates for each row of a covering array. The candidate with the most new pairs is used."""
 MAX_CHECKED_ROWS = 200_000
-"""Largest number of rows that are searched for an allowed row with a given pair."""
+"""Largest number of rows among which an allowed row with a given pair is searched."""
 
 
 def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> list[Row]:

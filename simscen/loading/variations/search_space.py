@@ -1,4 +1,4 @@
-"""Space of values that `simscen falsify` searches: one dimension for each path under `sampled` of `variations`."""
+"""Search space of `simscen falsify`: one dimension for each path under `sampled` of `variations`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ class SearchSpace:
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
         """Return the variation at a point; None if it does not meet the conditions.
 
-        The coordinates of the point are cumulative probabilities between 0 and 1 (both excluded); the values are the
-        quantiles of the distributions. Raises ConditionError if a condition cannot be evaluated.
+        The coordinates of the point are cumulative probabilities between 0 and 1 (both excluded). The values are the
+        corresponding quantiles of the distributions. Raises ConditionError if a condition cannot be evaluated.
         """
         changes = []
         for target, probability in zip(self.targets, point, strict=True):

@@ -1,4 +1,4 @@
-"""Problems of the variations of a scenario. A problem of several variations is reported once."""
+"""Merging of the problems of all variations of a scenario. A problem of several variations is reported once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from simscen.loading.yaml.tree import Position
 
 
 class VariationProblems(NamedTuple):
-    """Problems of one variation. `set_by` is the path of each new value, by the position of the value."""
+    """Problems of one variation. `set_by` contains the path of each new value, by position of the value."""
 
     name: str
     set_by: Mapping[Position, str]
@@ -18,9 +18,9 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return each problem once. Its message states the variations that have it, and the path of the varied value.
+    """Return each problem once. Its message states which variations have the problem, and the path of the varied value.
 
-    A problem of all variations that is not at a varied value is unchanged.
+    A problem that all variations have and that is not at a varied value is unchanged.
     """
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
@@ -34,9 +34,9 @@ def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
 
 
 def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
-    """Return a problem with a message that states its varied path and the variations that have it.
+    """Return the problem with a message that states the varied path and the affected variations.
 
-    `affected` are the variations that have it, `variation_count` is the number of all variations.
+    `affected` are the variations with the problem, `variation_count` is the number of all variations.
     """
     path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
     names = [one.name for one in affected if one.name]
