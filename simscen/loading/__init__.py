@@ -1,1 +1,1 @@
-"""Load and check scenarios: YAML files to validated models and built worlds, or problems with positions and hints."""
+"""Loading and checking of scenarios. YAML files become validated specifications, or problems with positions."""

@@ -1,4 +1,4 @@
-"""Building of the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
+"""Functions that build the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    """Return the body with the payload and motor torque of the scenario. Raises InvalidInput if it falls over."""
+    """Return the body with payload and motor torque of the scenario. Raises InvalidInput if the robot falls over."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
@@ -98,7 +98,7 @@ def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBo
 
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
-    """Return the specification and the body of a robot. Its meshes and other files must lie in the folders `roots`.
+    """Return the specification and the body of a robot. All its files, such as meshes, must lie in the folders `roots`.
 
     Raises InvalidInput for unusable files.
     """
@@ -119,7 +119,7 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
 
 
 def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
-    """Return the problem that a robot file sets an undeclared xacro argument. `declared` are the valid arguments."""
+    """Return the problem that a robot file sets an unknown xacro argument. `declared` are the known arguments."""
     assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
     message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
     hint = suggestion(argument, declared) or "it has no <xacro:arg>"
@@ -131,7 +131,7 @@ KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
 SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
 """Keys that lead to the speed mask of the stack in a scenario."""
 MAX_RECTANGLES = 100_000
-"""Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all rectangles."""
+"""Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all these rectangles."""
 AddSourceLine = Callable[[Problem], Problem]
 """Function that returns a copy of a problem with the text of its source line."""
 
@@ -148,7 +148,7 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
 def load_criterion_masks(
     masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSourceLine
 ) -> dict[str, MaskBlocks]:
-    """Load the filter masks of criteria, by file path as written in the scenario.
+    """Load the filter masks of criteria. Return them by path as written in the scenario.
 
     `tree` is the YAML tree of the scenario. Raises InvalidInput at the line of an unusable mask.
     """
@@ -166,12 +166,12 @@ def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_l
 
 
 def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
-    """Return the grid of the stack's mask at `keys` of the scenario; None if `source` is None."""
+    """Return the grid of the mask of the stack at `keys` of the scenario; None if `source` is None."""
     return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 
 def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: AddSourceLine) -> OccupancyGrid:
-    """Return the grid of the mask at `keys` of the scenario. Raises InvalidInput at this position."""
+    """Return the grid of the mask at `keys` of the scenario. Raises InvalidInput with the position of `keys`."""
     try:
         return load_map(source)
     except InvalidInput as error:

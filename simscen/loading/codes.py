@@ -1,7 +1,7 @@
 """Error codes of problems in input files (SC…), and their meanings."""
 
-STACK_CANNOT = "SC062"
-"""Code of problems that concern only the selected stack. With another stack, the scenario may be valid."""
+UNSUPPORTED_BY_STACK = "SC062"
+"""Code of problems of the selected stack. With another stack, the scenario may be valid."""
 
 CODES = {
     "SC001": "The file cannot be read: it is missing, not a regular file, too large, or not permitted.",
@@ -49,7 +49,7 @@ CODES = {
     "SC055": "A setting, an action, or a fault has no effect.",
     "SC060": "An external stack has no command; define it with `--stack NAME='COMMAND'` or in the user configuration.",
     "SC061": "The command of an external stack in the user configuration cannot be run.",
-    STACK_CANNOT: "The stack cannot do what the scenario requires, for example a fault of its localizer.",
+    UNSUPPORTED_BY_STACK: "The stack cannot do what the scenario requires, for example a fault of its localizer.",
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC302": "No route leads to a goal: a room is sealed, or a gap is narrower than the robot.",
     "SC303": "A bound cannot be met: the path to the goals is longer, or takes more time, than it allows.",

@@ -1,4 +1,4 @@
-"""Goals of a scenario: goals listed under `goals`, and goals that events send during the run."""
+"""Goals of a scenario: listed under `goals`, or sent by events during the run."""
 
 import math
 from collections.abc import Callable
@@ -15,8 +15,8 @@ from simscen.model.stack_base import StackBase
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
     """Return the goals listed under `goals`, repeated for each loop of the navigation.
 
-    The names in the second loop end in `#2`, in the third in `#3`, and so on. Missing tolerances are those of the goal
-    checker.
+    The names in the second loop end in `#2`, in the third in `#3`, and so on. Missing tolerances are taken from the
+    goal checker.
     """
     goals = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
     if spec.navigation.mode == "navigate_through_poses":
@@ -33,9 +33,10 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the expected failures, such as "NO_VALID_PATH", by goal name. Goals without one are left out.
+    """Return the expected failures, such as "NO_VALID_PATH", by name of the goals that are expected to fail.
 
-    `goals` are those of `scenario_goals`. With navigate_through_poses, the expectation of the last goal applies to all.
+    `goals` is the result of `scenario_goals`. With navigate_through_poses, the expectation of the last goal applies to
+    all goals.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
@@ -47,14 +48,14 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 
 def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
-    """Return `goal` as a pose to pass at any heading, within `radius` m unless `entry` sets a tolerance."""
+    """Return `goal` as a via pose: to pass at any heading, within `radius` m unless `entry` sets a tolerance."""
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
 def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
-    """Return the goals that events send, by the keys that lead to their `new_goal` actions in the scenario.
+    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
 
-    `includes_robot` selects the actions by the name of their robot, which is None if an action names none.
+    `includes_robot` selects actions: it is called with the robot that an action names, or None.
     """
     checker = spec.stack.goal_checker
     found: dict[Keys, Goal] = {}
@@ -72,7 +73,7 @@ def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]
 
 
 def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
-    """Return a listed goal; missing tolerances are those of the goal checker of the stack."""
+    """Return a listed goal. Missing tolerances are taken from the goal checker of the stack."""
     return Goal(
         name=name,
         pose=entry.pose.pose,

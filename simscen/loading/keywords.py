@@ -1,4 +1,4 @@
-"""Selection of scenarios by keyword expression, as with pytest's -k, and by tag."""
+"""Selection of scenarios by tag, and by keyword expression as with pytest's -k."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -8,7 +8,7 @@ from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.scenario import ScenarioSpec
 
-_TOKEN = re.compile(r"[()]|[^\s()]+")
+_TOKEN_PATTERN = re.compile(r"[()]|[^\s()]+")
 MAX_DEPTH = 50
 """Largest nesting depth of `not` and parentheses."""
 
@@ -17,11 +17,11 @@ Matcher = Callable[[str], bool]
 
 
 class Selectable(Protocol):
-    """Anything with a title and tags, such as a loaded scenario."""
+    """Object with a title and tags, such as a loaded scenario."""
 
     @property
     def title(self) -> str:
-        """The path without suffix, with the name of the variation: `aisle[speed=0.5]`."""
+        """The scenario id with the name of the variation, e.g. `aisle[speed=0.5]`."""
         ...
 
     @property
@@ -50,7 +50,7 @@ def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = (
 
 def keyword_matcher(expression: str) -> Matcher:
     """Return the matcher for an expression such as `aisle and not slow`. Raises UsageError if it is invalid."""
-    parser = _Parser(_TOKEN.findall(expression), expression)
+    parser = _Parser(_TOKEN_PATTERN.findall(expression), expression)
     matcher = parser.parse_or(0)
     if parser.tokens:
         raise parser.error(f"unexpected {quoted(parser.tokens[0])}")
@@ -74,12 +74,14 @@ class _Parser:
         return lambda text: any(option(text) for option in options)
 
     def _parse_and(self, depth: int) -> Matcher:
+        """Parse parts joined by `and`."""
         parts = [self._parse_term(depth)]
         while self._take("and"):
             parts.append(self._parse_term(depth))
         return lambda text: all(part(text) for part in parts)
 
     def _parse_term(self, depth: int) -> Matcher:
+        """Parse a word, `not` with a term, or an expression in parentheses."""
         if depth > MAX_DEPTH:
             raise self.error(f"it is nested deeper than {MAX_DEPTH}")
         if self._take("not"):

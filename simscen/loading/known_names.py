@@ -1,4 +1,4 @@
-"""Names that a scenario can refer to: of places, regions, objects, goals, events, faults, and verdicts."""
+"""Names to which a scenario can refer: places, regions, objects, goals, events, faults, and verdicts."""
 
 from collections.abc import Mapping
 
@@ -20,18 +20,18 @@ KIND_NAMES = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Names for messages of kinds of references. Actions can move a "movable"; a "mover" is a movable or another robot."""
+"""Kinds of named things, as in messages. Actions can move a "movable". A "mover" is a movable or another robot."""
 
 Names = Mapping[str, list[str] | None]
-"""Valid names by kind of reference; None for a kind whose names are not known.
+"""Valid names by kind of named thing; None for a kind if its names are not known.
 
-Names in a world from SDF or a map are not known before it is built. Names of verdicts are not known for one robot of
-several.
+The names in a world from SDF or a map are not known before the world is built. The names of verdicts are not known for
+one of several robots.
 """
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """Return all names that a scenario can refer to. `world` is its built world; None if it is not built yet."""
+    """Return all names to which a scenario can refer. `world` is its built world; None if it is not built yet."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
     disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
@@ -67,7 +67,7 @@ def mark_names(loaded: LoadedScenario) -> list[str]:
 
 
 def _names_in_files(loaded: LoadedScenario) -> Names:
-    """Return the names of places, regions, doors, and objects, without a built world."""
+    """Return the names of places, regions, doors, and objects, as far as they are known without a built world."""
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -83,7 +83,7 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
-    """Return the names of places, regions, doors, and objects, with a built world."""
+    """Return the names of places, regions, doors, and objects in a built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -118,7 +118,7 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
 
 
 def _names_in_actions(loaded: LoadedScenario, kind: str) -> list[str]:
-    """Return the values of `name` in all actions of one kind, such as "spawn", without goals of other robots."""
+    """Return the value of `name` in all actions of one kind, such as "spawn". Goals of other robots are left out."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
     relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]

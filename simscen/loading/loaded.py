@@ -1,4 +1,4 @@
-"""Loaded scenarios, worlds, robots, and maps: validated specifications, and their files."""
+"""Loaded scenarios, worlds, robots, and maps: the validated specifications with their files and YAML trees."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -28,7 +28,7 @@ class LoadedMap:
 
 
 class CriterionMask(NamedTuple):
-    """Filter mask of a criterion. `keys` are those of its first use in the scenario."""
+    """Filter mask of a criterion. `keys` lead to its first use in the scenario."""
 
     keys: Keys
     map: LoadedMap
@@ -36,7 +36,7 @@ class CriterionMask(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadedWorld:
-    """World from a `*.world.yaml`, which may add to a ROS map or SDF file; or from a ROS map or SDF file alone."""
+    """World from a `*.world.yaml` (with or without a ROS map or SDF file), or from a ROS map or SDF file alone."""
 
     name: str
     path: Path
@@ -71,8 +71,8 @@ class LoadedRobot:
 class LoadedScenario:
     """Valid scenario, or valid variation of a scenario. All checks that do not need its built world have passed.
 
-    A scenario of several robots has a view of each robot: a scenario with this robot alone. `spec`, `tree`, and `notes`
-    then cover all robots, and all other fields are those of the first view.
+    A scenario of several robots contains a view of each robot: a scenario with this robot alone. Its `spec`, `tree`,
+    and `notes` cover all robots. Its other fields are the same as in the first view.
     """
 
     id: str
@@ -82,7 +82,7 @@ class LoadedScenario:
     file: Path
     """Absolute path."""
     root: Path
-    """Folder that all files of the scenario must lie in."""
+    """Folder in which all files of the scenario must lie."""
     world_path: tuple[Path, ...]
     """Folders of `--world-path`, in which worlds are searched."""
     text: str
@@ -122,7 +122,7 @@ class LoadedScenario:
     varied_values: Mapping[str, Any] = field(default_factory=dict, repr=False)
     """Values of the variation, by dotted path."""
     set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
-    """Dotted path of each value of the variation, by the position of the value."""
+    """Dotted path of each value of the variation, by position of the value in a file."""
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
     """Views by name of the robot; {} for a scenario of one robot."""
     robot_name: str = ""
@@ -145,7 +145,7 @@ class LoadedScenario:
         return replace(self, choice=choice, spec=self.spec.model_copy(update={"skip": reason}))
 
     def includes_robot(self, robot: str | None) -> bool:
-        """Return whether a part of the scenario that names `robot` applies to this view. None stands for all robots."""
+        """Return whether a part of the scenario that names `robot` applies to this view; True if it names no robot."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
@@ -165,7 +165,7 @@ class LoadedScenario:
 
     @property
     def expectation(self) -> ExpectedFailure | None:
-        """The failure that the scenario expects, or None. Its line is 0 if an extended file contains `expected`."""
+        """The failure that the scenario expects, or None. Its line is 0 if `expected` is in a file that is extended."""
         expected = self.spec.expected
         if expected is None:
             return None

@@ -1,4 +1,4 @@
-"""Scenarios with `robots`: split the YAML tree into one scenario per robot, and report missing keys."""
+"""Scenarios of several robots (`robots`): splitting of the YAML tree into one scenario per robot, and key checks."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ ROBOT_KEYS = ("goals", "faults")
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
     """Return a scenario tree for each robot alone, sorted by name of the robot; {} without `robots`.
 
-    Nodes keep their positions in the file. The trees have no key `expected`, because it applies to all robots together.
+    Nodes keep their positions in the file. The key `expected`, which applies to all robots together, is left out.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
@@ -25,7 +25,7 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
-    """Return whether `robots` of a scenario is a mapping of mappings, as it must be."""
+    """Return whether a scenario has the key `robots` with a mapping of mappings, as it must be."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
         isinstance(entry.value, MappingNode) for entry in robots.entries.values()
@@ -50,9 +50,9 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
 
 
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario tree with the selected stack instead of the stacks of all robots.
+    """Return a scenario tree in which the selected stack replaces the stacks of all robots.
 
-    The tree is unchanged if `choice` is the command of an external stack that one of several robots already uses.
+    The tree is unchanged if one of several robots already uses the external stack that `choice` starts.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
@@ -76,7 +76,7 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
-    """Return the mapping of a robot under `robots` with the `stack` of its single-robot tree `robot_scenario`."""
+    """Return the mapping of a robot under `robots`, with the `stack` of the scenario of this robot alone."""
     assert isinstance(robot, MappingNode)
     return MappingNode(
         robot.position, robot.entries | {key: entry for key, entry in robot_scenario.entries.items() if key == STACK}
@@ -106,12 +106,14 @@ def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
 
 
 def _single_robot_problems(tree: MappingNode) -> Iterator[Problem]:
+    """Yield the problems of missing keys `robot` and `pass`."""
     if ROBOT not in tree.entries:
         yield Problem(*tree.position, "SC010", f"missing key `{ROBOT}`")
     yield from _missing_criteria(tree)
 
 
 def _missing_criteria(tree: MappingNode) -> Iterator[Problem]:
+    """Yield the problem of a missing or empty `pass` at top level."""
     criteria = child(tree, PASS)
     if criteria is None and ROBOTS not in tree.entries:
         yield Problem(*tree.position, "SC010", f"missing key `{PASS}`")
@@ -120,6 +122,7 @@ def _missing_criteria(tree: MappingNode) -> Iterator[Problem]:
 
 
 def _multi_robot_problems(tree: MappingNode) -> Iterator[Problem]:
+    """Yield the problems of top-level keys that exclude `robots`, and of robots without criteria."""
     if ROBOT in tree.entries:
         hint = "use `robot` for one robot; for several, list each under its name in `robots`"
         yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)

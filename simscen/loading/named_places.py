@@ -36,9 +36,9 @@ def resolve_places(spec: Spec, places: Places) -> Spec:
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """Return the YAML data of a scenario with poses and points instead of place names in its criteria.
+    """Return YAML data of a scenario with poses and points instead of place names in its criteria.
 
-    `plain` are these data, `spec` is their specification.
+    `plain` is the YAML data, and `spec` the specification of the same scenario.
     """
     for reference, pose in _poses_of_references(spec, places):
         if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots

@@ -1,4 +1,4 @@
-"""Bounds of worlds with open ground, extended to the starts and goals of all robots."""
+"""Extension of the bounds of a world with open ground to the starts and goals of all robots."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,7 +13,7 @@ from simscen.loading.world_cache import Bounds
 
 
 def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
-    """Return a world with open ground with its bounds extended to the stops of all robots.
+    """Return the world with bounds that contain the stops of all robots.
 
     Stops are start poses, goals without an expected failure, and poses to which events kidnap a robot. A world without
     open ground, or with a map, is returned unchanged.

@@ -1,6 +1,6 @@
-"""Plugins that a scenario uses, and plugins of a log that are not installed.
+"""Plugins that a scenario uses, and plugins that a log needs but that are not installed.
 
-A plugin is a type, such as a criterion, that an installed package adds; a RegisteredType describes it.
+A plugin is a type, such as a criterion, that an installed package adds. A RegisteredType describes it.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -35,12 +35,12 @@ def _plugins_of_specs(*specs: Any) -> tuple[RegisteredType, ...]:
 
 
 def log_header_key(entry: RegisteredType) -> str:
-    """Return the header key of a plugin in a log, e.g. `plugin.criterion.dwell`. Its value is the requirement."""
+    """Return the header key of a plugin in a log, e.g. `plugin.criterion.dwell`. Its value is `requirement_of`."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: RegisteredType) -> str:
-    """Return the pip requirement of the package of a plugin: `package==version`."""
+    """Return the pip requirement for the package of a plugin: `package==version`."""
     return f"{entry.distribution}=={entry.version}"
 
 
@@ -66,11 +66,12 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
 
 
 def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
+    """Return the plugins sorted by group and name."""
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 
 def _plugins_of_part(keys: Keys, part: Any) -> Iterator[RegisteredType]:
-    """Yield the plugin that defines the part of a specification at `keys`; nothing if simscen defines it."""
+    """Yield the plugin that defines `part`, the part of a specification at `keys`; nothing if simscen defines it."""
     if isinstance(part, Choice):
         entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

@@ -1,4 +1,4 @@
-"""Reduction of a scenario for `simscen shrink`: remove parts, round numbers, and list the differences.
+"""Reduction of scenarios for `simscen shrink`: removal of parts, rounding of numbers, and list of the changes.
 
 A part is a value in the YAML tree of a scenario, given by its keys, e.g. ("goals", 0, "pose").
 """
@@ -24,9 +24,9 @@ from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN
 REQUIRED_KEYS = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
 """Top-level keys that are never removed."""
 FIXED_KEYS = frozenset({"simscen", "seed", "pass", "time_limit"})
-"""Top-level keys whose values are never changed. They define the failure and the length of the run."""
+"""Top-level keys with values that are never changed. They define the failure and the length of the run."""
 FIXED_WORLD_PARTS = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
-"""Parts of an inline world that are never changed. A criterion would fail for another reason without them."""
+"""Parts of an inline world that are never changed. Without them, a criterion would fail for another reason."""
 UNNEEDED_KEYS = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
 """Top-level keys that do not affect a run."""
 MAX_DIGITS = 3
@@ -34,7 +34,7 @@ MAX_DIGITS = 3
 
 
 class Rounding(NamedTuple):
-    """Keys of a number in a scenario, and its rounded value. A quantity with a unit is text."""
+    """Keys of a number in a scenario, and the rounded value; text for a quantity with a unit."""
 
     keys: Keys
     value: str | float | int
@@ -58,7 +58,7 @@ def max_depth(tree: MappingNode) -> int:
 
 
 def without_parts(tree: MappingNode, parts: Collection[Keys]) -> MappingNode:
-    """Return the scenario without these parts. Mappings and lists that become empty are removed as well."""
+    """Return the scenario without these parts. Mappings and lists that become empty are also removed."""
     remaining = _remove_parts(tree, frozenset(parts), ())
     return remaining if isinstance(remaining, MappingNode) else replace(tree, entries={})
 

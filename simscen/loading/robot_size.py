@@ -1,4 +1,4 @@
-"""Size of a robot, and the solids of a world that block it."""
+"""Size of a robot, and selection of the solids of a world that block it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -26,9 +26,9 @@ class RobotSize:
     height: float
     """Height of the top of the hull above the floor."""
     underside: float | None = None
-    """Height of the lowest point of the hull above the floor, for an omnidirectional or mecanum base.
+    """Height of the underside of the hull above the floor; None for a robot that can climb low obstacles.
 
-    None for other bases, which can climb low obstacles.
+    Only omnidirectional and mecanum bases cannot climb.
     """
 
     @property
@@ -97,7 +97,7 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
-    """Return the world with only the solids that block the robot of a scenario.
+    """Return the world with only those fixed solids that block the robot of a scenario.
 
     Raises InvalidInput for an unusable robot.
     """

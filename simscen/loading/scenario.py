@@ -8,7 +8,7 @@ from typing import Literal
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading import multirobot
 from simscen.loading.checks.runner import check_robot_names, check_scenario
-from simscen.loading.codes import STACK_CANNOT
+from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedMap, LoadedScenario
@@ -204,7 +204,7 @@ def _ineffective_variation_problems(variation: Variation, tree: MappingNode, cho
         if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "select variations that do not set it with -k or --variation, or choose another stack"
-            yield Problem(*change.target.position, STACK_CANNOT, message, hint)
+            yield Problem(*change.target.position, UNSUPPORTED_BY_STACK, message, hint)
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:

@@ -1,4 +1,4 @@
-"""Scenario text in a log, and criteria read from it; and the list of events and faults of a scenario."""
+"""Parts of a scenario that its logs contain: its text, from which criteria are read, and its events and faults."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -20,7 +20,7 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
 from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
-"""Kinds of plugins that are needed to judge a log."""
+"""Groups of the registry with plugins that are needed to judge a log."""
 _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
 """Top-level keys of a scenario that are needed to judge a log of it."""
 
@@ -28,7 +28,7 @@ _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
 def resolved_text(loaded: LoadedScenario) -> str:
     """Return the scenario, or its variation, as one YAML text without `extends`.
 
-    Poses replace the place names in criteria. The text is that of the file if these changes have no effect.
+    Poses replace the place names in criteria. If nothing is changed, the text of the file is returned.
     """
     own, _ = parse_yaml(loaded.text, loaded.path)
     plain = resolve_criteria_places(loaded.tree.plain, _validated(ScenarioSpec, loaded.tree), places_of(loaded.world))
@@ -47,7 +47,7 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
 
 
 def criteria_and_tree(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
-    """Return the criteria in a scenario text or criteria file, and its YAML tree.
+    """Return the criteria in the text of a scenario or criteria file, and its YAML tree.
 
     `name` is the path of the text in messages. `robot` selects one of several robots. Raises InvalidInput.
     """
@@ -104,6 +104,7 @@ def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
 
 
 def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
+    """Yield the faults of a scenario."""
     for index, entry in enumerate(loaded.spec.faults):
         keys = ("faults", index)
         when = "" if entry.when is None else _one_line_yaml(loaded, *keys, "when")
@@ -119,6 +120,6 @@ def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
 
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """Return the line of the value at `keys`; 0 if it is not in the scenario file itself."""
+    """Return the line of the value at `keys`; 0 if the value is not in the scenario file itself."""
     position = loaded.position_of(*keys)
     return position.line if position.path == loaded.path else 0

@@ -1,4 +1,4 @@
-"""Search of a specification for its parts, its references by name, and its quantities, with their YAML keys."""
+"""Search of a specification for nested specifications, references by name, and quantities, with their YAML keys."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -12,7 +12,7 @@ from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name in a specification that refers to something. `mark` is the annotation of its field, `keys` lead to it."""
+    """Name in a specification that refers to a thing. `mark` is the annotation of its field, `keys` lead to it."""
 
     keys: Keys
     mark: ReferenceTo
@@ -25,13 +25,13 @@ class Reference(NamedTuple):
 
 
 RobotFilter = Callable[[str], bool]
-"""Function that returns whether to search the parts that name this robot."""
+"""Function that returns whether to search the parts that name a robot. Its argument is the name of the robot."""
 
 
 def references(spec: BaseModel, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[Reference]:
     """Yield all references in `spec`. `keys` are the keys of `spec` itself.
 
-    Parts for which `includes_robot` is false are left out; None includes all parts.
+    Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.
     """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
@@ -82,7 +82,7 @@ def _mark(kind: Any) -> ReferenceTo | None:
 def walk(spec: Any, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[tuple[Keys, BaseModel]]:
     """Yield a specification and all specifications in it with their keys. `keys` are the keys of `spec` itself.
 
-    Parts for which `includes_robot` is false are left out; None includes all parts.
+    Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.
     """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):

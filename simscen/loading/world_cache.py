@@ -24,8 +24,8 @@ Bounds = tuple[float, float, float, float]
 class WorldCache:
     """Caches built worlds and path searches.
 
-    A path search finds paths of a disc with a `radius` in m between `solids`. Solids block it if they reach into
-    `z_range`, two heights in m. The cache compares `solids` by identity.
+    A path search finds paths of a disc with a `radius` in m between `solids`. Solids block the disc if they reach into
+    `z_range` (lowest and highest z in m). The cache compares `solids` by identity.
     """
 
     max_worlds: int = 100_000
@@ -42,7 +42,7 @@ class WorldCache:
     """Arguments and results of `shortest_paths`."""
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the built world of a scenario, and call `record_read_file` for its files. Raises InvalidInput."""
+        """Return the built world of a scenario, and record its files by `record_read_file`. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:

@@ -31,6 +31,7 @@ _COSTMAP: Values = {
 _PLANNER: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
 """Parameters of all planners in the profile `nav2`."""
 _USE_CIRCLE: Values = {"consider_footprint": False}
+"""Parameters of MPPI critics in the profile `nav2`: only the inscribed circle is checked."""
 NAV2: Values = {
     "controller_frequency": 20.0,
     "failure_tolerance": 0.3,

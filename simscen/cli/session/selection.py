@@ -12,7 +12,7 @@ from simscen.cli.diagnostics import escaped, relative_to_working_folder
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
-from simscen.loading.codes import STACK_CANNOT
+from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.files.paths import is_folder
 from simscen.loading.keywords import select
@@ -183,7 +183,7 @@ def load_selection(
 def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
     """Return why a stack cannot run a scenario with these problems; "" without such an error, or with other errors."""
     errors = [problem for problem in problems if problem.severity == "error"]
-    if not errors or any(problem.code != STACK_CANNOT for problem in errors):
+    if not errors or any(problem.code != UNSUPPORTED_BY_STACK for problem in errors):
         return ""
     first = errors[0]
     return f"--stack {choice.name} cannot run it: {first.place}: {first.message}"

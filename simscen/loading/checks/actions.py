@@ -1,4 +1,4 @@
-"""Checks that find actions of events that are impossible or have no effect."""
+"""Checks for actions of events that are impossible or have no effect."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +11,7 @@ from simscen.loading.yaml.tree import Keys
 
 @MEANING.check("SC050")
 def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find `stop` actions with a duration for pedestrians, who do not walk on after a stop."""
+    """Find `stop` actions with a duration for pedestrians. A pedestrian does not walk on after a stop."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
@@ -22,7 +22,7 @@ def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
-    """Return the event name, the keys, and the specification of each action that switches a zone on or off."""
+    """Return the event name, the keys, and the specification of each action that enables or disables a zone."""
     return [
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
@@ -33,7 +33,7 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 @MEANING.check("SC050")
 def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that switch on a speed zone without a speed limit."""
+    """Find actions that enable a speed zone without a speed limit."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
@@ -45,7 +45,7 @@ def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions with a speed limit at or above the top speed of the robot."""
+    """Find actions that set a speed limit of at least the top speed of the robot."""
     robot = loaded.robot.spec
     for _, keys, action in _zone_actions(loaded):
         if robot is None or not _limits_speed(keys, action):
@@ -56,7 +56,7 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _limits_speed(keys: Keys, action: Any) -> bool:
-    """Return whether the zone action at `keys` switches on a speed zone."""
+    """Return whether the zone action at `keys` enables a speed zone."""
     return keys[-1] == "speed_zone" and action.enabled and action.region is not None
 
 
@@ -86,7 +86,7 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that open a door that is always open, or close a door that is always closed."""
+    """Find actions that open a door that is never closed, or close a door that is never opened."""
     located_actions = [located for step in loaded.spec.steps for located in step.located_actions()]
     if loaded.world.spec is None or any(action.may_do() for _, action in located_actions):
         return

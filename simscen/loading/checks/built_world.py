@@ -15,13 +15,13 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
-"""Lowest and highest z between which an obstacle blocks most robots."""
+"""Lowest and highest z in m between which an obstacle blocks most robots."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1, 0.35, 0.03
-"""Assumed robot that climbs typical ramps."""
+"""Wheel radius, maximum slope, and maximum step of an assumed robot, which climbs typical ramps."""
 
 
-class BuiltWorld(NamedTuple):
-    """Built world, and the loaded file from which it was built."""
+class BuiltWorldFile(NamedTuple):
+    """World file, and the world that was built from it."""
 
     world: World
     source: LoadedWorld
@@ -32,16 +32,17 @@ class BuiltWorld(NamedTuple):
         return self.source.tree
 
 
-BUILT_WORLD: CheckStage[BuiltWorld] = CheckStage("built world")
+BUILT_WORLD: CheckStage[BuiltWorldFile] = CheckStage("built world")
+"""Checks of a world file in its built world."""
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
-    """Return warnings about a `*.world.yaml`, without source lines; [] for a ROS map or SDF file."""
-    return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorld(world, source))
+    """Return warnings about the world file `source`, without source lines; [] for a ROS map or SDF file."""
+    return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorldFile(world, source))
 
 
 @BUILT_WORLD.check("SC314", severity="warning")
-def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
+def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
     assert built.source.spec is not None
     world = _without_platforms(built.world) if built.source.spec.ramps else built.world
@@ -53,7 +54,7 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 
 @BUILT_WORLD.check("SC304", severity="warning")
-def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
+def motions_into_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find keyframes and waypoints of moving objects inside obstacles."""
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
@@ -64,7 +65,7 @@ def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 
 @BUILT_WORLD.check("SC315", severity="warning")
-def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
+def regions_outside_the_world(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find regions outside the bounds of the world."""
     assert built.source.spec is not None
     left, bottom, right, top = built.world.bounds

@@ -19,10 +19,10 @@ LOOSE_SPEED_RATIO = 1.2
 LOOSE_PATH_RATIO = 10.0
 """Bounds on the path length above this multiple of the shortest path are loose."""
 LOOSE_COLLISION_COUNT = 1000
-"""Bounds on the number of collisions from this number on are loose."""
+"""Bounds on the number of collisions of at least this number are loose."""
 
 LooseBounds = Iterator[tuple[str, str]]
-"""Key and reason of each loose bound of a criterion. Hardly any run can violate a loose bound."""
+"""Key and reason of each loose bound of a criterion. A bound is loose if hardly any run can violate it."""
 
 
 @MEANING.check("SC036")
@@ -38,7 +38,7 @@ def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC036")
 def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find a time limit before the second sample of the ground truth, so that no motion can be judged."""
+    """Find time limits before the second sample of the ground truth, with which no motion can be judged."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
@@ -56,7 +56,7 @@ def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
-    """Return the reason why a criterion of this kind is impossible without a goal; None if it is possible."""
+    """Return a reason if a criterion of this kind needs a goal and the robot gets none; else None."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
 
@@ -159,14 +159,14 @@ def _loose_goals_reached(loaded: LoadedScenario, reached: Any) -> LooseBounds:
 
 
 def _beyond_limit(loaded: LoadedScenario, criterion: Any, key: str) -> LooseBounds:
-    """Yield the bound `key`, a time, if it is not below the time limit of the run."""
+    """Yield the bound `key` of a criterion, a time, if it is not below the time limit of the run."""
     value, limit = getattr(criterion, key), loaded.spec.time_limit
     if value is not None and value >= limit:
         yield key, f"the time limit ends the run after {limit:g} s"
 
 
 def _time_bound(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
-    """Return a function that yields the bound `key`, a time, if it is loose."""
+    """Return a function that yields the bound `key` of a criterion, a time, if it is loose."""
     return lambda loaded, criterion: _beyond_limit(loaded, criterion, key)
 
 

@@ -1,6 +1,6 @@
 """Checks for events and faults with triggers that never fire, or fire less often than specified.
 
-A step is an event, or a later step of the sequence of an event.
+A step is an event, or a step of the sequence (`then`) of an event.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ LATCHING_CONDITIONS = frozenset(
 )
 """Kinds of conditions that stay true after they have become true."""
 MAX_SPEED_RATIO = 1.1
-"""Largest speed of a robot, divided by its top speed. A robot can overshoot its top speed a little."""
+"""Upper bound on the speed of a robot, divided by its top speed, because a robot can overshoot its top speed."""
 MAX_TRUTH_ERROR_M = 0.5
 """Upper bound on the localization error if the stack gets the true pose."""
 
@@ -78,7 +78,7 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
-    """Return the reason why a recovery behavior never runs; None if it can. `behavior` None stands for any behavior."""
+    """Return the reason why a recovery behavior never runs; None if it can run. `behavior` is None for any behavior."""
     if not isinstance(loaded.spec.stack, StackSpec):
         return None
     recovery = loaded.spec.stack.recovery
@@ -90,10 +90,9 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return the events, faults, and marks that can happen in a run of the scenario.
+    """Return the run with all events, faults, and marks that can happen in the scenario.
 
-    This is a fixed-point iteration: start with nothing, and add everything that can happen after what is possible so
-    far, until nothing is added.
+    This is a fixed-point iteration: it starts with nothing, and repeatedly adds what the possible events enable.
     """
     run = PossibleRun(loaded, frozenset())
     while (possible := run.next_possible) != run.possible:
@@ -138,7 +137,7 @@ class PossibleRun:
 
     @property
     def next_possible(self) -> frozenset[str]:
-        """The names of the events, faults, and marks that can happen after those in `possible`."""
+        """Names of the events, faults, and marks that can happen if the ones in `possible` can happen."""
         triggers = [
             *((step.when, step.name) for step in self.steps if self.is_reached(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
@@ -161,38 +160,38 @@ class PossibleRun:
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
         return self._why_never_true(trigger, keys)
 
-    def _why_never_true(self, test: AnyCondition, keys: Keys) -> Reason | None:
+    def _why_never_true(self, condition: AnyCondition, keys: Keys) -> Reason | None:
         """Return the reason why the condition at `keys` is never true; None if it can be true."""
-        if not self.loaded.includes_robot(test.robot):
+        if not self.loaded.includes_robot(condition.robot):
             return None
         limit = self.loaded.spec.time_limit
-        if test.for_ is not None and test.for_ >= limit:
-            return (*keys, "for"), f"{test.for_:g} s is not less than the time limit of {limit:g} s"
-        if test.all is not None:
-            reasons = self._why_parts_never_true(test.all, (*keys, "all"))
+        if condition.for_ is not None and condition.for_ >= limit:
+            return (*keys, "for"), f"{condition.for_:g} s is not less than the time limit of {limit:g} s"
+        if condition.all is not None:
+            reasons = self._why_parts_never_true(condition.all, (*keys, "all"))
             return next((reason for reason in reasons if reason), None)
-        if test.any is not None:
-            reasons = self._why_parts_never_true(test.any, (*keys, "any"))
+        if condition.any is not None:
+            reasons = self._why_parts_never_true(condition.any, (*keys, "any"))
             return reasons[0] if all(reasons) else None
-        if test.not_ is not None:
-            always = test.not_.time is not None and _earliest_true_s(test.not_) == 0
+        if condition.not_ is not None:
+            always = condition.not_.time is not None and _earliest_true_s(condition.not_) == 0
             return ((*keys, "not"), "the condition under `not` is always true") if always else None
-        check = _CONDITIONS.get(test.kind)
-        reason = check(self, test.chosen) if check else None
-        return ((*keys, test.kind), reason) if reason else None
+        check = _CONDITIONS.get(condition.kind)
+        reason = check(self, condition.chosen) if check else None
+        return ((*keys, condition.kind), reason) if reason else None
 
-    def _why_parts_never_true(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
-        """Return the reason why each condition in the list at `keys` is never true; None for each that can be true."""
-        return [self._why_never_true(test, (*keys, k)) for k, test in enumerate(tests)]
+    def _why_parts_never_true(self, conditions: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
+        """Return the reason for each condition in the list at `keys` why it is never true; None if it can be true."""
+        return [self._why_never_true(condition, (*keys, k)) for k, condition in enumerate(conditions)]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether an action of a possible step can have the effect of one of these kinds of actions."""
+        """Return whether an action of a possible step can have the effect of an action of one of these kinds."""
         return any(
             action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
         )
 
     def goal_count(self, goal: str | None) -> int:
-        """Return how many goals with this name the robot can get; None stands for any name."""
+        """Return how many goals with this name the robot can get. `goal` is None for any name."""
         listed = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
         sent = sum(
             1 if step.when is None else step.when.times
@@ -311,21 +310,21 @@ _CONDITIONS = {
 """Methods that return the reason why a condition can never be true, or None, by kind of the condition."""
 
 
-def _stays_true(test: AnyCondition) -> bool:
+def _stays_true(condition: AnyCondition) -> bool:
     """Return whether a condition stays true after it has become true."""
-    parts = test.all or test.any
-    return all(map(_stays_true, parts)) if parts else test.kind in LATCHING_CONDITIONS
+    parts = condition.all or condition.any
+    return all(map(_stays_true, parts)) if parts else condition.kind in LATCHING_CONDITIONS
 
 
-def _earliest_true_s(test: AnyCondition) -> float:
-    """Return a lower bound on the time in s at which a condition has been true for its duration `for`."""
-    return (test.for_ or 0.0) + _earliest_condition_s(test)
+def _earliest_true_s(condition: AnyCondition) -> float:
+    """Return the earliest time in s at which a condition can have been true for its duration `for`."""
+    return (condition.for_ or 0.0) + _earliest_condition_s(condition)
 
 
-def _earliest_condition_s(test: AnyCondition) -> float:
-    """Return a lower bound on the time in s at which a condition becomes true."""
-    if test.all is not None:
-        return max(map(_earliest_true_s, test.all))
-    if test.any is not None:
-        return min(map(_earliest_true_s, test.any))
-    return float(test.chosen.root) if test.time is not None else 0.0  # type: ignore[attr-defined]
+def _earliest_condition_s(condition: AnyCondition) -> float:
+    """Return the earliest time in s at which a condition can become true."""
+    if condition.all is not None:
+        return max(map(_earliest_true_s, condition.all))
+    if condition.any is not None:
+        return min(map(_earliest_true_s, condition.any))
+    return float(condition.chosen.root) if condition.time is not None else 0.0  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Checks of faults: whether they can affect their sensor, can happen, and have an effect."""
+"""Checks for faults that cannot affect their sensor, cannot happen, or have no effect."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
 from simscen.faults.base import FaultTarget
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
-from simscen.loading.codes import STACK_CANNOT
+from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.disturbances import FaultEntry
@@ -16,13 +16,13 @@ from simscen.model.stack import StackSpec
 from simscen.triggers.base import Trigger
 
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
-"""Descriptions of fault targets that are no sensors for messages, by kind of the target."""
+"""Descriptions for messages of fault targets other than sensors, by kind of the target."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Faults that measure again, which is only possible at the time of the measurement."""
+"""Kinds of faults that repeat the measurement, which is only possible at the time of the measurement."""
 
 
 class ListedFault(NamedTuple):
-    """Fault with its number in `faults`, from 0, and its target; None if the robot does not have the target."""
+    """Fault with its index in `faults` and its target. The target is None if the robot does not have it."""
 
     number: int
     entry: FaultEntry
@@ -65,7 +65,7 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC032")
 def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that cannot affect their kind of sensor, and faults with values that do not fit the sensor."""
+    """Find faults that cannot affect their target, and faults with values that do not fit the target."""
     loaded = scope.loaded
     for index, entry, target in _listed_faults(loaded):
         if target is None:
@@ -101,9 +101,9 @@ def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
                 yield CheckProblem(("faults", index, key), message, at_key=True)
 
 
-@NAMES.check(STACK_CANNOT)
+@NAMES.check(UNSUPPORTED_BY_STACK)
 def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find localizer faults for stacks that do not come with simscen."""
+    """Find faults of the localizer for stacks that simscen does not ship."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
     for index, _, target in _suitable_faults(scope.loaded):
@@ -122,7 +122,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 @NAMES.check("SC032")
 def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that measure again, but are listed after a fault that delays the messages."""
+    """Find faults that repeat the measurement, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, target in _listed_faults(loaded):
@@ -174,4 +174,5 @@ def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _with_article(noun: str) -> str:
+    """Return the noun with "a" or "an"."""
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"

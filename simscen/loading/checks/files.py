@@ -1,4 +1,4 @@
-"""Kinds of files (scenario, world, robot, …), and checks of a file of any kind."""
+"""Recognition of the kind of a file (scenario, world, robot, …), and check of a file of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
-"""Numbers of the variations of a study that are checked."""
+"""Numbers of the variations of a study that are checked, from 1."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
 _ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})

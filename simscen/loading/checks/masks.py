@@ -24,12 +24,12 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 
 ZoneTest = Callable[[Pose2, float], bool]
-"""Function of a pose and a distance in m. Returns whether a zone contains all positions within the distance."""
+"""Function that returns whether a zone contains all positions within a distance in m of a pose."""
 
 MIN_DEPTH_M = 0.1
-"""Depth inside a zone at which a goal is certainly forbidden, although a costmap rounds the zone to cells."""
+"""Depth inside a zone at which a goal is certainly forbidden, although costmaps round zones to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate. A start is only reported this deep inside a zone."""
+"""Possible error of the initial estimate. A start is only reported if it is this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
 """Reason for messages why a speed mask has no effect."""
 
@@ -46,7 +46,7 @@ def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
 
 @WORLD.check("SC302")
 def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals in keepout zones of the stack, and starts in keepout zones (a warning)."""
+    """Find goals and starts in keepout zones of the stack. A start is only a warning."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, ZoneTest]] = [
         (("stack", "keepout", index), f"in `{region}`", _region_test(regions[region]))
@@ -73,7 +73,7 @@ def _region_test(corners: Polygon) -> ZoneTest:
 
 
 def _mask_test(mask: OccupancyGrid) -> ZoneTest:
-    """Return the test for the area that a keepout mask forbids. The test samples positions in the spacing of cells."""
+    """Return the test for the area that a keepout mask forbids. It samples positions at the spacing of the cells."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)

@@ -1,4 +1,4 @@
-"""Checks of names: whether they exist, are unique, and are allowed in their place."""
+"""Checks for names that do not exist, are not unique, or are not allowed in their place."""
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
@@ -15,6 +15,7 @@ from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition, Condition
 
 RENAME_HINT = "rename one of them"
+"""Hint for two things with the same name."""
 
 
 @NAMES.check("SC030")
@@ -49,7 +50,7 @@ def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
-    """Return whether a reference to a movable object names an existing object or robot that is not allowed."""
+    """Return whether a reference to a movable object names a fixed object, or a robot that is not allowed."""
     if reference.target not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
@@ -170,7 +171,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find triggers and actions of one robot that do not name which of several robots."""
+    """Find triggers and actions for one robot that do not name one of several robots."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -187,28 +188,30 @@ def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
             yield CheckProblem((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
 
 
-def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
-    """Yield the keys and the kind of each condition on one robot or on its fault that names no robot.
+def _conditions_without_robot(
+    condition: AnyCondition, keys: Keys, faults: Container[str]
+) -> Iterator[tuple[Keys, str]]:
+    """Yield the keys and the kind of each condition that must name a robot, but names none.
 
-    `faults` are the names of the faults of all robots.
+    These are conditions on the state of a robot, or on a fault. `faults` are the names of the faults of all robots.
     """
-    if test.robot is not None:
+    if condition.robot is not None:
         return
-    for key, inner in (("all", test.all), ("any", test.any)):
+    for key, inner in (("all", condition.all), ("any", condition.any)):
         for number, part in enumerate(inner or ()):
             yield from _conditions_without_robot(part, (*keys, key, number), faults)
-    if test.not_ is not None:
-        yield from _conditions_without_robot(test.not_, (*keys, "not"), faults)
-    elif not test.inner:
-        condition = test.chosen
-        assert isinstance(condition, Condition)
-        if condition.is_robot_specific or (test.kind == "event" and getattr(condition, "name", "") in faults):
-            yield keys, test.kind
+    if condition.not_ is not None:
+        yield from _conditions_without_robot(condition.not_, (*keys, "not"), faults)
+    elif not condition.inner:
+        chosen = condition.chosen
+        assert isinstance(chosen, Condition)
+        if chosen.is_robot_specific or (condition.kind == "event" and getattr(chosen, "name", "") in faults):
+            yield keys, condition.kind
 
 
 @ROBOT_NAMES.check("SC030")
 def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find names under `expected.criteria` of several robots that no verdict has."""
+    """Find names under `expected.criteria` of a scenario of several robots that no verdict has."""
     spec = scenario.spec
     if not spec.robots:
         return

@@ -33,17 +33,18 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon,
 from simscen.worlds.geometry.prisms import upright_prism
 
 FREE_SPACE_HINT = "move it to free space"
+"""Hint for a pose inside an obstacle."""
 MAX_PLATFORM_HEIGHT_M = 0.3
-"""Largest height of an obstacle in a Gazebo world that could be the floor."""
+"""Largest height up to which an obstacle in a Gazebo world could be the floor."""
 TOLERANCE_FRACTIONS = (-0.9, 0.0, 0.9)
-"""Offsets from the pose of a goal that are tried, as fractions of its tolerances."""
+"""Offsets from the pose of a blocked goal that are tried, as fractions of its tolerances."""
 
 MotionStop = tuple[Keys, str, tuple[float, float]]
 """Keyframe or waypoint of a motion: its keys in the motion, a description for messages, and (x, y) in m."""
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
-    """Return the problems of blocked starts, goals, and kidnap poses, by the keys of the pose."""
+    """Return the problems of blocked starts, goals, and kidnap poses, by keys of the pose."""
     found = [*_blocked_start(scene), *_blocked_goals(scene), *_blocked_kidnap_poses(scene)]
     return {problem.keys: problem for problem in found}
 
@@ -62,7 +63,7 @@ def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield an error for each goal blocked by fixed solids, and a warning for each goal inside an unmoved body."""
+    """Yield an error for each goal that fixed solids block, and a warning for each goal inside an unmoved body."""
     for keys, goal in scene.expected_goals:
         code = "GOAL_OUTSIDE_MAP" if scene.area.why_outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
@@ -78,7 +79,7 @@ def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     """Return whether a pose within the tolerances of a blocked goal is free.
 
-    False for a round footprint, and if an obstacle overlaps the inscribed circle of the footprint at the goal.
+    Poses are only tried for a footprint that is not round, and if its inscribed circle is free at the goal.
     """
     outside = scene.area.why_outside(goal.pose)
     if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
@@ -105,7 +106,7 @@ def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[CheckProblem]:
-    """Yield a problem if `solids` or the limits of the area block a pose. `what` describes the pose in the message."""
+    """Yield a problem if a pose overlaps `solids`, or is outside the area. `what` describes the pose in the message."""
     conflict = scene.area.why_outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
@@ -151,9 +152,9 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if this depends on the run.
+    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if it depends on the run.
 
-    It is known for an object that appears relative to the robot or at t = 0. `when` is the trigger, or None.
+    It is known for objects that appear relative to the robot, or at t = 0. `when` is the trigger, or None.
     """
     if spawn.z >= scene.size.height:
         return None
@@ -167,7 +168,7 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
 
 
 def _outline(spawn: Spawn) -> Polygon:
-    """Return the outline of an object on the floor, in the frame of the object."""
+    """Return the outline of a spawned object on the floor, in the frame of the object."""
     solid = spawn.solid(spawn.name)
     prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
@@ -175,7 +176,7 @@ def _outline(spawn: Spawn) -> Polygon:
 
 @WORLD.check("SC304")
 def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
-    """Find pedestrians with a start or goal that is closer to an obstacle than their radius."""
+    """Find pedestrians with a start or goal that is closer to an obstacle than the radius of the pedestrian."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
         if not isinstance(action, Pedestrian):
@@ -219,7 +220,7 @@ def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
     """Yield the keys, their YAML tree, the name of the body, the path, and the solids of each scripted motion.
 
-    The tree is None for the scenario. Motions that depend on the run are left out.
+    The tree is None for the tree of the scenario. Motions that depend on the run are left out.
     """
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
@@ -249,7 +250,7 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
     return [(("through", k), f"waypoint {k + 1}", (x, y)) for k, (x, y) in enumerate(motion.through or [])]
 
 
-def check_robots_apart(scenes: Sequence[Scene]) -> Iterator[Problem]:
+def overlapping_start_problems(scenes: Sequence[Scene]) -> Iterator[Problem]:
     """Yield a problem for each pair of robots with overlapping footprints at their starts.
 
     `scenes` are the scenes of all robots of a scenario.

@@ -1,4 +1,4 @@
-"""Checks for unreachable trigger areas, keepout regions with a goal, goals reached at once, and loose bounds."""
+"""Checks for unreachable trigger areas, keepout regions on goals, goals reached at once, and loose bounds."""
 
 import math
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
 
 
 def _start_is_blocked(scene: Scene) -> bool:
+    """Return whether the start of the robot is inside an obstacle or outside the map."""
     return START in scene.cached(blocked_poses)
 
 
@@ -59,7 +60,7 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC055", severity="warning")
 def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals within whose tolerances the robot already is when the goal is sent."""
+    """Find goals that are already reached when they are sent."""
     if _start_is_blocked(scene):
         return
     own = [(keys, goal) for keys, goal in scene.expected_goals if keys[0] == "goals"]

@@ -1,4 +1,4 @@
-"""Semantic checks, and the stages in which they run.
+"""Registry of semantic checks, and the stages in which they run.
 
 A check is a generator function that yields problems. It is registered for a stage with its error code:
 
@@ -31,7 +31,7 @@ from simscen.model.scenario import ScenarioSpec
 
 
 class CheckProblem(NamedTuple):
-    """Problem that a check found. It has the keys of a value instead of a position in a file."""
+    """Problem that a check has found, at the keys of a value instead of at a position in a file."""
 
     keys: Keys
     """Keys that lead to the value that the message marks, e.g. ("goals", 0, "pose")."""
@@ -42,7 +42,7 @@ class CheckProblem(NamedTuple):
     at_key: bool = False
     """Whether the message marks the last key instead of its value."""
     warning: bool = False
-    """Whether this is a warning, although the check reports errors."""
+    """Whether this problem is a warning, although the check reports errors."""
     tree: MappingNode | None = None
     """YAML tree that contains `keys`, such as the robot file; None for the tree of the subject."""
 
@@ -62,30 +62,30 @@ class Subject(Protocol):
         ...
 
 
-S = TypeVar("S", bound=Subject)
-Check = Callable[[S], Iterable[CheckProblem]]
+AnySubject = TypeVar("AnySubject", bound=Subject)
+Check = Callable[[AnySubject], Iterable[CheckProblem]]
 """Function that yields the problems of a subject."""
-C = TypeVar("C", bound=Callable[..., Any])
+CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Any])
 
 
 @dataclass
-class CheckStage(Generic[S]):
+class CheckStage(Generic[AnySubject]):
     """Checks that run together, in the order of their registration."""
 
     name: str
-    checks: list[tuple[str, str, Check[S]]] = field(default_factory=list)
+    checks: list[tuple[str, str, Check[AnySubject]]] = field(default_factory=list)
     """Error code, severity, and function of each check."""
 
-    def check(self, code: str, severity: str = "error") -> Callable[[C], C]:
+    def check(self, code: str, severity: str = "error") -> Callable[[CheckFunction], CheckFunction]:
         """Register the decorated function as a check that reports problems with this code."""
 
-        def register(function: C) -> C:
+        def register(function: CheckFunction) -> CheckFunction:
             self.checks.append((code, severity, function))
             return function
 
         return register
 
-    def problems(self, subject: S) -> list[Problem]:
+    def problems(self, subject: AnySubject) -> list[Problem]:
         """Return the problems of a subject, without source lines; [] for a subject without a tree."""
         tree = subject.tree
         if tree is None:
@@ -105,7 +105,7 @@ class WrittenScenario(NamedTuple):
 
 
 class NameScope(NamedTuple):
-    """View of a scenario, and its built world, in which names are searched. `world` is None before it is built."""
+    """View of a scenario with the built world in which names are searched; None before the world is built."""
 
     loaded: LoadedScenario
     world: World | None = None
@@ -120,3 +120,4 @@ ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage("robot names")
 WORLD_FILE: CheckStage[LoadedWorld] = CheckStage("world file")
 NAMES: CheckStage[NameScope] = CheckStage("names")
 MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
+"""Stages of the table above. The module `runner` runs them."""

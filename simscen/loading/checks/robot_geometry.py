@@ -1,4 +1,4 @@
-"""Checks of a robot: whether its file agrees with its URDF, and whether its wheels are on the ground."""
+"""Checks for robots with a file that contradicts the URDF, or with wheels that are not on the ground."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -31,8 +31,8 @@ MAX_ROUTE_SILL_M = 0.03
 class RobotRoutes:
     """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
 
-    `stops` are starts, goals, and corners of trigger areas. Methods without the parameter `solids` (obstacles) use the
-    fixed solids of the world.
+    `stops` are starts, goals, and corners of trigger areas. The obstacles are `solids`, or the fixed solids of the
+    world in methods without this parameter.
     """
 
     scene: Scene
@@ -64,7 +64,7 @@ class RobotRoutes:
         return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
 
     def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
-        """Return an upper bound on the length of the shortest route in m; inf if the fast search finds no route."""
+        """Return an upper bound on the length of the shortest route in m, or inf if the fast search finds no route."""
         approximate = self._paths_around_fixed
         return float("inf") if approximate is None else approximate.length(start[:2], goal[:2])
 
@@ -116,26 +116,31 @@ class TriggerArea(NamedTuple):
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
     """Return the areas that the triggers of events and faults wait for."""
     spec = scene.loaded.spec
-    tests: list[tuple[Keys, str, AnyCondition | None]] = [
+    conditions: list[tuple[Keys, str, AnyCondition | None]] = [
         ((*step.keys, "when"), step.name, step.when) for step in spec.steps
     ]
-    tests += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
-    return [area for keys, name, test in tests if test is not None for area in _required_areas(scene, test, keys, name)]
+    conditions += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
+    return [
+        area
+        for keys, name, condition in conditions
+        if condition is not None
+        for area in _required_areas(scene, condition, keys, name)
+    ]
 
 
-def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
-    """Yield the areas that the robot must enter before the condition `test` at `keys` can be true.
+def _required_areas(scene: Scene, condition: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
+    """Yield the areas that the robot must enter before a condition at `keys` can be true.
 
     `name` is the name of the event or fault.
     """
-    if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
+    if not scene.loaded.includes_robot(condition.robot) or condition.any is not None or condition.not_ is not None:
         return
-    if test.all is not None:
-        for k, part in enumerate(test.all):
+    if condition.all is not None:
+        for k, part in enumerate(condition.all):
             yield from _required_areas(scene, part, (*keys, "all", k), name)
         return
-    keys = (*keys, test.kind)
-    match test.chosen if test.kind in ("robot_in", "robot_within") else None:
+    keys = (*keys, condition.kind)
+    match condition.chosen if condition.kind in ("robot_in", "robot_within") else None:
         case RobotIn(region=region):
             corners = scene.world.regions[region]
             yield TriggerArea(keys, name, f"region `{region}`", corners, _distance_to_region(corners, 0.0))
@@ -151,7 +156,7 @@ def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> 
 
 
 def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
-    """Return the function `distance` of the area of all positions within `max_distance` m of a region."""
+    """Return the function `TriggerArea.distance` for the area within `max_distance` m of a region."""
     return lambda pose: distance_to_polygon(pose, corners) - max_distance
 
 

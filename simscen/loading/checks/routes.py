@@ -20,20 +20,20 @@ from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 GAP_EDGE_M = 0.03
-"""Distance from the edge of a gap within which the solid at the edge is searched."""
+"""Distance from a side of a gap within which the solid at this side is searched."""
 
 
 class Gap(NamedTuple):
-    """Narrowest place of the widest way to a goal: its description for messages, and its position (x, y) in m."""
+    """Narrowest place on the widest way to a goal: its description for messages, and its position (x, y) in m."""
 
     description: str
     position: tuple[float, float]
 
 
 def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
-    """Return a problem for each goal without a route, with the gap that is too narrow.
+    """Return a problem for each goal without a route, and the gap that is too narrow.
 
-    The problem is a warning if the goal could be reachable after all, for example over a ramp.
+    The problem is only a warning if a route could exist after all, for example over a ramp.
     """
     blocked = scene.cached(blocked_poses)
     if START in blocked:
@@ -67,7 +67,7 @@ def goals_without_route(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _ramp_hint(scene: Scene) -> str:
-    """Return the hint that a tilted solid on the way could be a ramp that the robot can climb."""
+    """Return the hint that a tilted solid on the way could be a ramp, and which slopes the robot can climb."""
     from simscen.loading.builders import load_robot
     from simscen.sim.body.robot_body import compute_climb_limits
 
@@ -95,11 +95,11 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
 
 
 MIN_PATH_RATIO = 0.97
-"""Lower bound on the length of a drive, divided by the computed shortest path, which is not exact."""
+"""Lower bound on the length of a drive, divided by the length of the computed shortest path, which is not exact."""
 MAX_AVERAGE_SPEED_RATIO = 1.02
 """Upper bound on the average speed of a drive, divided by the top speed of the robot."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
-"""Actions that can let the robot arrive earlier than by driving to its goals."""
+"""Kinds of actions with which the robot can arrive earlier than by driving to its goals."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
 
 
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
-    """Yield the key and the reason of each bound of a criterion that the drive violates."""
+    """Yield the key of each bound of a criterion that the drive violates, and the reason for messages."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
     times, lengths = drive.min_leg_times, drive.min_leg_lengths
     bound = getattr(criterion, "max", None)

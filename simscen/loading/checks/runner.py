@@ -1,4 +1,4 @@
-"""Checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
+"""Runner of the checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
 
 from collections.abc import Iterable
 
@@ -19,8 +19,8 @@ def check_scenario(
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario of one robot, or of the view of one of several robots.
 
-    `world` is the built world, which is only needed to check names in a world from a ROS map or SDF file. The result
-    includes the problems `unknown_places`, which were found while the scenario was loaded.
+    `world` is the built world; it is only needed to check names in a world from a ROS map or SDF file. The result
+    includes `unknown_places`, the problems that were found while the scenario was loaded.
     """
     problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
     if all(problem.severity == "warning" for problem in problems):

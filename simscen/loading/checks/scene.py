@@ -30,7 +30,7 @@ from simscen.worlds.geometry.prisms import upright_prism
 SILL_M = 0.02
 """Height below which an obstacle does not block the start or a goal of a robot on wheels."""
 MIN_HULL_OVERLAP_M = 0.002
-"""Height by which an obstacle must exceed the underside of a hull to count as touching it."""
+"""Height by which an obstacle must exceed the underside of a hull to count as touching the hull."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
@@ -43,7 +43,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class DrivableArea:
-    """Area in which the robot can be: the map `grid`, or else the rectangle `bounds`, or else unlimited.
+    """Area in which the robot can be: the map `grid`, the rectangle `bounds`, or unlimited if both are None.
 
     `bounds` is (min x, min y, max x, max y) in m.
     """
@@ -90,7 +90,7 @@ class Scene:
     _results: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def cached(self, compute: "Callable[[Scene], T]") -> T:
-        """Return `compute(self)`. The result is computed once and kept for later calls."""
+        """Return `compute(self)`. The result is kept for later calls."""
         if compute not in self._results:
             self._results[compute] = compute(self)
         result: T = self._results[compute]
@@ -167,7 +167,7 @@ class Scene:
 
     @cached_property
     def expected_goals(self) -> list[tuple[Keys, Goal]]:
-        """Keys of the pose, and the goal, of each goal without an expected failure, including goals of events."""
+        """Goals without an expected failure, including goals of events, with the keys of their poses."""
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
@@ -182,9 +182,9 @@ class Scene:
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether an action of an event can have the effect of one of these kinds of actions.
+        """Return whether an action of an event can have the effect of an action of one of these kinds.
 
-        An action of an installed package can have any effect. Without kinds, return whether there is such an action.
+        Actions of installed packages can have any effect. Without kinds, return whether there is such an action.
         """
         return any(action.may_do(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
@@ -217,11 +217,12 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
 
 
 WORLD: CheckStage[Scene] = CheckStage("world")
+"""Checks of a scenario in its built world, except of time bounds."""
 TIMING: CheckStage[Scene] = CheckStage("timing")
-"""Checks of time bounds. They run only if the other checks find no errors."""
+"""Checks of time bounds. They run only if WORLD finds no errors."""
 
 START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
-"""Error codes of Nav2 for failures because of the start pose."""
+"""Error codes of Nav2 for a failure because of the start pose."""
 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
@@ -239,14 +240,14 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
 
 
 def expected_failure_hint(keys: Keys, code: str) -> str:
-    """Return the hint how to expect that the goal at `keys` fails with the error code `code`."""
+    """Return a hint on how to declare that the goal at `keys` fails with the error code `code`."""
     if keys[0] == "goals":
         return f"expect the failure with `expect: {{error_code: {code}}}` at the goal"
     return required_failure_hint(code)
 
 
 def required_failure_hint(code: str) -> str:
-    """Return the hint how to require that the whole navigation fails with the error code `code`."""
+    """Return a hint on how to require that the whole navigation fails with the error code `code`."""
     return f"replace `goals_reached` in `pass` by `result: {{status: FAILED, error_code: {code}}}`"
 
 
@@ -256,7 +257,7 @@ def expects_start_failure(spec: ScenarioSpec) -> bool:
 
 
 def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Yield the error codes that criteria require, with the name of the goal; None for the whole navigation."""
+    """Yield the error codes that criteria require, with the name of the goal, or None for the whole navigation."""
     for entry in spec.pass_:
         if entry.severity != "fail":
             continue

@@ -1,4 +1,4 @@
-"""Checks that need the built world: stages BUILT_WORLD, WORLD, and TIMING. They need no physics engine."""
+"""Runner of the checks that need the built world, but no physics engine: stages BUILT_WORLD, WORLD, and TIMING."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -42,7 +42,9 @@ def check_in_world(
     problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
         views = [_with_robot_spec(view) for view in loaded.robots.values()]
-        problems += placement.check_robots_apart([Scene(view, world, robot_size(view), cache) for view in views])
+        problems += placement.overlapping_start_problems(
+            [Scene(view, world, robot_size(view), cache) for view in views]
+        )
     return problems
 
 
@@ -59,7 +61,7 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
 
 
 def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
-    """Return the problems that the stages WORLD and TIMING find. Their hints contain the path of the picture."""
+    """Return the problems that the stages WORLD and TIMING find. Their hints contain the path of a picture."""
     problems = WORLD.problems(scene)
     if not _has_errors(problems):
         problems += TIMING.problems(scene)
@@ -72,9 +74,9 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
 
 
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
-    """Draw the world, the robot at its start and its goals, and gaps that are too narrow.
+    """Write a picture to `folder`, and return its path.
 
-    `gaps` are the positions (x, y) of the gaps in m. Write an image file to `folder`, and return its path. Raises
+    It shows the world, the robot at its start and its goals, and `gaps`, which are positions (x, y) in m. Raises
     UsageError if it cannot be written.
     """
     from simscen.worlds.built_world import build_world_and_map
@@ -106,9 +108,9 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Return the problems of a scenario with a world from a ROS map or SDF file, or a robot from a URDF alone.
+    """Check names again that are only known after the world and the robot have been built, and return the problems.
 
-    Only the built world and robot have all names. Return [] for other scenarios, which have been checked before.
+    This applies to a world from a ROS map or SDF file, and to a robot from a URDF alone. Return [] in other cases.
     """
     is_urdf = loaded.robot.path == loaded.robot.urdf
     if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
@@ -139,4 +141,5 @@ def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
 
 
 def _has_errors(problems: Iterable[Problem]) -> bool:
+    """Return whether a problem is an error."""
     return any(problem.severity == "error" for problem in problems)

@@ -1,4 +1,4 @@
-"""Checks of single settings: rates, numbers of goals, duplicates, angles in degrees, and values without effect."""
+"""Checks of single settings: rates, number of goals, duplicates, angles in degrees, and values without effect."""
 
 import math
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 
 TICK_RATE_KEYS = ("physics", "tick_rate")
+"""Keys of the tick rate in a scenario."""
 
 
 @NAMES.check("SC034")
@@ -54,7 +55,7 @@ def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: s
 
 @NAMES.check("SC016")
 def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find too many goals, and keys that only the last goal of navigate_through_poses can have."""
+    """Find too many goals, and goals with keys that only the last goal of navigate_through_poses can have."""
     spec = scope.loaded.spec
     if len(spec.goals) * spec.navigation.loops > MAX_GOALS:
         message = f"{len(spec.goals)} goals in {spec.navigation.loops} loops exceed the limit of {MAX_GOALS} goals"
@@ -88,7 +89,7 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find angles without a unit above one turn in the scenario, its world, and its robot file."""
+    """Find angles without a unit that are larger than one turn in the scenario, its world, and its robot file."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),

@@ -1,4 +1,4 @@
-"""Checks of world files: duplicate names and shapes, things of zero size, and unknown regions."""
+"""Checks for world files with duplicate names and shapes, things of zero size, or unknown regions."""
 
 from collections.abc import Iterator
 
@@ -10,6 +10,7 @@ from simscen.model.world import WorldObject, WorldSpec
 
 
 def _spec(world: LoadedWorld) -> WorldSpec:
+    """Return the specification of a world file, which is not None in this stage."""
     assert world.spec is not None, "only *.world.yaml files and inline worlds are checked"
     return world.spec
 
