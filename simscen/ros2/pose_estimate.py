@@ -45,7 +45,7 @@ class PoseEstimate:
             self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
 
     def process_received(self, message: ReceivedMessage) -> bool:
-        """Process a message from the nodes. Return whether simscen needs it: not a message on /tf without map -> odom.
+        """Process a message from the nodes. Return False for one that simscen does not need: /tf without map -> odom.
 
         Raises AdapterError for a pose or plan in another frame than `map`.
         """

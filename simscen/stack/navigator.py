@@ -1,8 +1,8 @@
 """Navigation to one goal: the replanning and recovery logic of Nav2's default behavior trees, as a state machine.
 
 After a planning failure, the global costmap is cleared and planning is retried once. After a control failure, the local
-costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs, and both can be
-retried again. After `number_of_retries` behaviors, the goal fails with the code of the last failure.
+costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs. Then planning
+and control can each be retried again. After `number_of_retries` behaviors, the goal fails with the last error code.
 
 A goal inside a mapped wall fails after the first retry, because no recovery can help.
 """
@@ -88,6 +88,7 @@ class Navigator:
         self._reset()
 
     def _reset(self) -> None:
+        """Discard the plan, the current recovery behavior, and the record of failures."""
         self.plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
@@ -191,7 +192,7 @@ class Navigator:
         return tolerance < 0.0 or self._clock - self._failing_since < tolerance
 
     def _with_patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
-        """Return the failure; PATIENCE_EXCEEDED instead of NO_VALID_CONTROL if `failure_tolerance` is positive."""
+        """Return the failure. If `failure_tolerance` is positive, replace NO_VALID_CONTROL by PATIENCE_EXCEEDED."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")

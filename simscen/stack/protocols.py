@@ -125,7 +125,7 @@ LETHAL = 254
 
 @fast_dataclass(eq=False)
 class CostmapView:
-    """A costmap at one time. Planners get the global costmap, controllers and behaviors get the local costmap.
+    """State of a costmap. Planners get the global costmap, controllers and behaviors get the local costmap.
 
     The global costmap is in the map frame, the local one in the odom frame. Poses, paths, and goals in the same call
     are in the frame of the costmap. The arrays are valid until the next update of the costmap.
@@ -160,8 +160,8 @@ class Planner(Protocol):
 
     *Given* a start or goal outside the map or in an obstacle *then* it fails at once, for example with GOAL_OCCUPIED.
     *Given* that no path exists *then* it fails with NO_VALID_PATH after a bounded number of iterations.
-    *Given* success *then* the path starts at `start` and ends within `tolerance` of `goal`. At each pose of the path,
-    the footprint is free of lethal cells.
+    *Given* success *then* the path starts at `start` and ends within the planner's tolerance of `goal`. At each pose of
+    the path, the footprint is free of lethal cells.
     """
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:

@@ -139,7 +139,7 @@ class Task:
         return self._waiting[0] if self._waiting else None
 
     def _event(self, tick: int, kind: EventKind, **data: Value) -> Event:
-        """Create an event of the current goal, which is the one accepted last."""
+        """Return an event of the current goal, which is the goal accepted last."""
         assert self.goal is not None
         return Event(tick, kind, self.goal.name, {"index": self._accepted - 1, **data})
 

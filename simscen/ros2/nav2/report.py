@@ -67,7 +67,7 @@ class Nav2Report:
             self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._add_log_line)
 
     def errors(self) -> list[str]:
-        """Return the last distinct errors among the lines since the last `take_lines`."""
+        """Return the last MAX_LISTED_ERRORS different errors since the last `take_lines`."""
         errors = dict.fromkeys(f"{line.name}: {line.text}" for line in self._lines if line.level >= ERROR)
         return list(errors)[-MAX_LISTED_ERRORS:]
 

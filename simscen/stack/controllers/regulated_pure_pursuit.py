@@ -22,7 +22,7 @@ CAR_LOOKAHEAD_RATIO = 0.4
 MIN_ROTATION_RAD = 0.1
 """Angle to the carrot below which a rotation in place does not help."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
-"""Factors on the lookahead distance that are tried in this order until an arc is free, as nav2_graceful_controller."""
+"""Factors on the lookahead distance, tried in this order until an arc is free (as in nav2_graceful_controller)."""
 
 
 class Carrot(NamedTuple):
@@ -43,7 +43,7 @@ class Carrot(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A command, the time in s for which it is free of collisions, and the time `horizon` in s for which it must be."""
+    """A command, and two times in s: for how long it is free of collisions, and how long it must be (`horizon`)."""
 
     command: Twist
     free_time: float
@@ -188,6 +188,7 @@ class RegulatedPurePursuit(PathFollower):
         return Twist(speed, 0.0, speed * curvature)
 
     def _regulated_speed(self, tracker: PathTracker, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
+        """Return the speed in m/s, regulated by curvature, obstacles, the path ahead, and the end of the segment."""
         speed, regulation, spec = self._speed, self._speed_regulation, self._spec
         regulated = regulation.for_curvature(speed, curvature)
         if spec.use_cost_regulated_linear_velocity_scaling:
@@ -227,6 +228,7 @@ def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) ->
 
 
 def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
+    """Return a point in the base frame of the robot at `pose`."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     return Carrot(cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x))
 
