@@ -169,7 +169,7 @@ class _RateLimit(_MessageLoss):
         self._period_ticks, self._now = setting.clock.rate / rate, setting.now
         self._first_tick: int | None = None
         self._periods = 0
-        """Number of periods of which the first message has arrived or was skipped."""
+        """Number of periods, since the first message, in which no further message may arrive."""
 
     def is_lost(self) -> bool:
         now = self._now()

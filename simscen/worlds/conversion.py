@@ -172,7 +172,7 @@ class Conversion:
     changes: list[str] = field(default_factory=list)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
-        """Return a copy of `spec` with these obstacles and objects before those of `spec`, and without `sdf`.
+        """Return a copy of `spec` with these obstacles and objects in front of its own, and without `sdf`.
 
         Raises pydantic.ValidationError if there are more obstacles or objects than a world file may have.
         """

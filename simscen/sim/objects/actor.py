@@ -29,7 +29,7 @@ from simscen.sim.body.outline import radius_and_height
 from simscen.sim.bullet import engine, pybullet
 
 FRICTION = 0.6
-"""Friction coefficient of movable objects on the ground, about that of wood on concrete."""
+"""Friction coefficient of movable objects on the ground, about as for wood on concrete."""
 SPEED_HORIZON_S = 0.1
 """Time in the future for which upper bounds of speeds are valid."""
 FALL_SPEED_M_S = SPEED_HORIZON_S * GRAVITY_M_S2

@@ -78,7 +78,7 @@ class EmbreeScene:
     """Thin wrapper of an `RTCScene` of triangles, in the frame of the vertices."""
 
     def __init__(self, vertices: Array, mesh: TriangleMesh | Mesh) -> None:
-        """Build the scene from the faces of `mesh`, with `vertices` (n, 3) instead of those of `mesh`.
+        """Build the scene from the faces of `mesh`, with `vertices` (n, 3) instead of the mesh's own vertices.
 
         Raises MemoryError, or RuntimeError if Embree refuses the triangles.
         """

@@ -141,7 +141,7 @@ class ShortestPaths:
 
     @cached_property
     def _strict_graph(self) -> GridGraph:
-        """Graph of the cells at whose center the disc has room. Gaps hardly wider than the disc may be missed."""
+        """Graph of the cells with room for the disc at their center. Gaps hardly wider than the disc may be missed."""
         return GridGraph(self._field.free_cells(self._radius))
 
     def _search(self, graph: GridGraph, ends: Array) -> Array | None:

@@ -47,7 +47,7 @@ class SimplePaths:
                 self._near.setdefault(bucket, []).append(prism)
 
     def length(self, start: Point, goal: Point) -> float:
-        """Return the length in m of a path from start to goal, maybe not the shortest one; inf if none was found."""
+        """Return the length in m of a path, not necessarily the shortest one, to the goal; inf if none was found."""
         if (start, goal) not in self._lengths:
             self._lengths[start, goal] = self._find_length(start, goal)
         return self._lengths[start, goal]

@@ -41,7 +41,7 @@ from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader
 
 DEFAULT_FRICTION = 1.0
-"""Coefficient of friction without `<mu>`: that of rubber wheels on dry concrete."""
+"""Coefficient of friction without `<mu>`, as for rubber wheels on dry concrete."""
 DEFAULT_DENSITY_KG_M3 = 1000.0
 """SDF's default density for `<inertial auto="true">`."""
 DEFAULT_MASS_KG = 1.0

@@ -20,7 +20,7 @@ MAX_FLOOR_HEIGHT_M = 0.3
 MAX_COVERING_HEIGHT_M = 0.05
 """Maximum height of the top of a floor covering: a thin slab that is a floor even if it lies on a ground plane."""
 MIN_FLOOR_HEIGHT_M = 0.001
-"""A floor whose top is not higher counts as being at z = 0."""
+"""A floor up to this height counts as being at z = 0."""
 MIN_FLOOR_WIDTH_M = 1.0
 """Minimum width of a floor that carries other geometry. Narrower slabs are steps or curbs."""
 MIN_COVERING_WIDTH_M = 4.0
@@ -39,7 +39,7 @@ FaceMask = npt.NDArray[np.bool_]
 def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
     """Return the height in m of the floor on which everything in `bounds` stands; 0 if it is at z = 0.
 
-    placed:        solids in the world frame: `static_count` static ones first, then those of movable bodies
+    placed:        solids in the world frame: first `static_count` static solids, then the solids of movable bodies
     static_count:  number of static solids
     bounds:        bounds of the world
     has_ground:    whether the world has a ground plane at z = 0

@@ -113,9 +113,9 @@ def _read_scale(element: Element) -> Scale:
 def place_links(
     model: ModelNode, pose: Pose3, report: ImportReport, state: ModelState | None = None
 ) -> Iterator[PlacedLink]:
-    """Yield all links of a model at `pose` in the world, also those of nested models.
+    """Yield all links of a model at `pose` in the world, including the links of nested models.
 
-    Poses in `state` override those in the model. Links without a valid pose are added to the report and left out.
+    Poses in `state` override the poses in the model. Links without a valid pose are added to the report and left out.
     """
     yield from _place_links_below(model, pose, model.name, report, state or ModelState())
 

@@ -1,8 +1,8 @@
 """Read the tree of models in a world, and compute the poses of their frames.
 
-An `<include>` is replaced by the model that it refers to. A model is a scope for names of frames. Its own frame is
-`__model__`, and that of the world is `world`. Names with `::` refer to frames of nested models. Source: SDF proposals
-"Pose Frame Semantics" (1.7, 1.8) and sdformat's FrameSemantics.cc.
+An `<include>` is replaced by the model that it refers to. The world and each model are scopes for names of frames. The
+scope's own frame is called `world` or `__model__`. Names with `::` refer to frames of nested models. Source: SDF
+proposals "Pose Frame Semantics" (1.7, 1.8) and sdformat's FrameSemantics.cc.
 """
 
 from collections.abc import Iterator
@@ -198,7 +198,7 @@ class TreeReader:
     def read_model(self, element: Element, is_parent_static: bool, include: Element | None = None) -> ModelNode:
         """Return the node of a `<model>`. Raises UnusableElement.
 
-        The children name, pose, static and placement_frame of an `include` override those of the model.
+        The children name, pose, static and placement_frame of an `include` override the same children of the model.
         """
         self._model_count += 1
         if self._model_count > MAX_MODELS:
@@ -262,7 +262,7 @@ class TreeReader:
                 report_unknown(child, kind, self._report)
 
     def _read_actor(self, element: Element, include: Element | None = None) -> ModelNode:
-        """Return the node of an `<actor>`. Name and pose of an `include` override those of the actor."""
+        """Return the node of an `<actor>`. Name and pose of an `include` override the actor's own name and pose."""
         name = _checked_name(element, include.child("name") if include else None)
         pose = (include.child("pose") if include else None) or element.child("pose")
         scope = FrameScope(MODEL_FRAME)
