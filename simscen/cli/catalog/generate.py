@@ -1,4 +1,4 @@
-"""Generator of the JSON Schemas and of the reference pages in docs/reference, which are made from docstrings.
+"""Generator of the JSON Schemas and of the pages in docs/reference, from models, commands, and their docstrings.
 
 Usage: `python -m simscen.cli.catalog.generate [--check]`.
 """

@@ -121,7 +121,7 @@ def _edited_file(
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
-    """Return a new scenario file for a map, and its text. Raises UsageError if the file cannot be created."""
+    """Return a new scenario file for a map, and its text. Raises UsageError and InvalidInput."""
     from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 

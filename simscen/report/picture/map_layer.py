@@ -38,7 +38,7 @@ def map_scale(bounds: Bounds) -> float:
 
 
 def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
-    """Set the image of the canvas to the map."""
+    """Draw the map as the image of the canvas, below everything else."""
     image, resolution = _color_image(grid, 1 / (canvas.scale * SUPERSAMPLING))
     per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
     x0, _, _, y1 = canvas.bounds

@@ -1,6 +1,6 @@
 """Colors of pictures and pages.
 
-The hues are those of Okabe and Ito (2008), which are distinguishable with color blindness: bluish green for good,
+The hues are from Okabe and Ito (2008), and are distinguishable with color blindness: bluish green for good,
 vermilion for bad, amber for warnings. They are darkened for a text contrast of 4.5 to 1 on white. Pictures and pages
 always combine colors with symbols.
 """

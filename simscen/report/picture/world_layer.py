@@ -53,7 +53,7 @@ def _draw_chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> N
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw floors whose friction differs from that of dry concrete. Labels show the times of changes during the run."""
+    """Draw floors with another friction than dry concrete. Labels show the times of changes during the run."""
     for floor in scene.scenery.floors:
         yield from _draw_floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):

@@ -43,6 +43,7 @@ _INTERVAL_KINDS = {
 }
 """Kinds of events that end an interval, by the kind of event that starts it."""
 _FAILURE_KINDS = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
+"""Kinds of events that are failures."""
 _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
 """Keys of event data that are not shown as text."""
 
