@@ -49,7 +49,7 @@ def test_backup_drives_back_by_its_distance_at_its_speed() -> None:
     assert seconds == pytest.approx(2.0, abs=0.1)
 
 
-def test_wait_stands_still_for_its_time() -> None:
+def test_wait_stops_the_robot_for_its_duration() -> None:
     pose, seconds, commands = run(Wait(model.Wait(wait_duration=1.0), setting(ROUND)), view_of(ROUND))
     assert pose == Pose2(0, 0)
     assert seconds == pytest.approx(1.0)
@@ -57,7 +57,7 @@ def test_wait_stands_still_for_its_time() -> None:
 
 
 @pytest.mark.parametrize(("entirely", "cleared"), [(False, "around the robot"), (True, "everywhere")])
-def test_clear_costmap_clears_once_around_the_robot_or_everywhere_and_is_done(entirely: bool, cleared: str) -> None:
+def test_clear_costmap_clears_once_around_the_robot_or_everywhere(entirely: bool, cleared: str) -> None:
     calls: list[str] = []
     installed = replace(
         setting(ROUND),
@@ -69,7 +69,7 @@ def test_clear_costmap_clears_once_around_the_robot_or_everywhere_and_is_done(en
     assert calls == [cleared]
 
 
-def test_backup_fails_where_there_is_something_behind() -> None:
+def test_backup_fails_with_an_obstacle_behind() -> None:
     with pytest.raises(NavigationFailure) as failed:
         run(BackUp(model.BackUp(backup_partial=True), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
@@ -90,12 +90,12 @@ def test_robot_without_reverse_refuses_to_back_up() -> None:
     assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
 
 
-def test_backup_uses_what_room_there_is() -> None:
+def test_backup_uses_the_available_space() -> None:
     pose, _, _ = run(BackUp(model.BackUp(backup_partial=True), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert -0.2 < pose.x < -0.05
 
 
-def test_nav2s_backup_wants_all_the_room_it_may_need() -> None:
+def test_nav2_backup_requires_space_for_its_whole_distance() -> None:
     with pytest.raises(NavigationFailure) as failed:
         run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD

@@ -29,7 +29,7 @@ def test_cusps_are_where_forward_becomes_backward() -> None:
     assert cusps(np.zeros((1, 3))).size == 0
 
 
-def test_a_plan_is_missed_beside_it_and_at_its_end() -> None:
+def test_distance_to_a_plan_is_lateral_and_beyond_its_end() -> None:
     plan = FollowedPlan(Path(line(0, 1, 0.0)), 0.2, OPEN)
     for pose, missed in ((Pose2(0.2, 0.1), False), (Pose2(0.4, 0.3), True), (Pose2(0.9, 0.0), False)):
         plan.locate(pose)

@@ -49,24 +49,24 @@ def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
         (Pose2(0.75, 0.0, 0.0), STOP, False),
     ],
 )
-def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside(
+def test_goal_is_reached_well_inside_the_tolerance_or_stopped_inside_it(
     pose: Pose2, twist: Twist, reached: bool
 ) -> None:
     checker = checker_that(stateful=True)
     assert [checker.reached(GOAL, pose, twist) for _ in range(STANDSTILL_CHECKS)][-1] == reached
 
 
-def test_nav2s_goal_checker_takes_the_edge_of_the_tolerance_for_there_while_the_robot_moves() -> None:
+def test_nav2_goal_checker_accepts_the_edge_of_the_tolerance_while_moving() -> None:
     checker = SimpleGoalChecker(CheckerSpec(well_inside=1.0), setting(round_robot()))
     assert checker.reached(GOAL, Pose2(0.81, 0.0, 0.19), DRIVING)
     assert not checker.reached(GOAL, Pose2(0.81, 0.0, 0.21), DRIVING)
 
 
-def test_a_robot_that_stands_for_a_moment_between_driving_and_turning_is_not_there_yet() -> None:
+def test_short_stop_before_turning_does_not_reach_the_goal() -> None:
     assert not checker_that(stateful=True).reached(GOAL, Pose2(0.95, 0.0, 0.15), STOP)
 
 
-def test_a_stateful_goal_checker_lets_the_robot_turn_without_losing_its_place() -> None:
+def test_stateful_goal_checker_ignores_position_while_turning() -> None:
     stateful, forgetful = checker_that(stateful=True), checker_that(stateful=False)
     for checker in (stateful, forgetful):
         checker.reached(GOAL, Pose2(0.95, 0.0, 1.0), DRIVING)
@@ -90,7 +90,7 @@ def test_turning_is_progress_only_if_an_angle_is_given() -> None:
         assert checker.is_stuck(Pose2(0, 0, 0.6), 11.0) == stuck
 
 
-def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> None:
+def test_recoveries_alternate_until_the_retries_are_used_up() -> None:
     class Named(Wait):
         def __init__(self, name: str) -> None:
             self.name = name
@@ -128,7 +128,7 @@ def test_recoveries_follow_the_listed_and_unknown_codes(code: int, advanced: boo
     assert BehaviorSequence([], StackSpec(profile="advanced").recovery).can_help(failure) == advanced
 
 
-def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:
+def test_plan_is_blocked_only_by_obstacles_ahead() -> None:
     robot = round_robot()
     line = np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80)))
     plan = FollowedPlan(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
@@ -146,7 +146,7 @@ def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> No
     assert plan.is_longer_than(length) == better
 
 
-def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_any() -> None:
+def test_plan_is_tight_only_where_clearance_was_lost_nearby() -> None:
     robot = round_robot()
     line = Path(np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80))))
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
@@ -156,7 +156,7 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
         assert plan.has_lost_clearance() == tighter
 
 
-def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
+def test_lowest_speed_limit_of_overlapping_zones_applies() -> None:
     zones = ((((0, 0), (2, 0), (2, 2), (0, 2)), 0.3), (((1, 0), (3, 0), (3, 2), (1, 2)), 0.2))
     mask = SpeedLimits(OccupancyGrid(np.full((2, 1), 50, np.int8), 1.0), True, 0.0, 1.0)
     found = SpeedFilter(
@@ -168,7 +168,7 @@ def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
     assert found.limit(Pose2(5, 1), 0.5) is None
 
 
-def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:
+def test_ended_task_has_the_code_of_the_last_failure() -> None:
     task = Task(False)
     task.start((Goal("a", Pose2(0, 0)), Goal("b", Pose2(1, 0))))
     failed = *task.accept_next(1), *task.record_failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")

@@ -29,7 +29,7 @@ def monitor(robot: RobotModel | None = None, **options: float) -> CollisionMonit
 
 
 @pytest.mark.parametrize(("x", "scale"), [(2.0, 1.0), (0.22 + 0.02 + 0.125, 0.5), (0.23, 0.0)])
-def test_the_monitor_keeps_the_time_before_collision(x: float, scale: float) -> None:
+def test_monitor_limits_the_speed_by_the_time_before_collision(x: float, scale: float) -> None:
     guard = monitor()
     guard.on_scan(scan((x, 0.0)), Pose2(0, 0))
     allowed = guard.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
@@ -37,14 +37,14 @@ def test_the_monitor_keeps_the_time_before_collision(x: float, scale: float) -> 
     assert allowed.vx <= 0.5 * scale + 1e-9 or scale == 1.0
 
 
-def test_the_monitor_lets_the_robot_drive_away_from_what_it_nearly_touches() -> None:
+def test_monitor_allows_driving_away_from_a_near_obstacle() -> None:
     guard = monitor()
     guard.on_scan(scan((0.23, 0.0)), Pose2(0, 0))
     assert guard.limit_command(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
     assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
 
 
-def test_the_monitor_counts_what_the_robot_has_driven_since_the_scan() -> None:
+def test_monitor_includes_the_motion_since_the_scan() -> None:
     guard = monitor()
     guard.on_scan(scan((0.6, 0.0)), Pose2(5, 5, 1.0))
     assert guard.limit_command(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
@@ -52,14 +52,14 @@ def test_the_monitor_counts_what_the_robot_has_driven_since_the_scan() -> None:
     assert guard.limit_command(Twist(0.2), moved) == STOP
 
 
-def test_the_monitor_sees_the_corner_of_a_long_hull_swing() -> None:
+def test_monitor_checks_the_swinging_corners_of_a_long_hull() -> None:
     guard = monitor(box_robot())
     guard.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
     assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
     assert guard.limit_command(Twist(0.3), Pose2(0, 0)).vx == 0.3
 
 
-def test_the_monitor_may_want_more_points_than_one() -> None:
+def test_monitor_can_require_several_points() -> None:
     guard = monitor(min_points=3)
     guard.on_scan(scan((0.3, 0.0), (0.3, 0.01)), Pose2(0, 0))
     assert guard.limit_command(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
@@ -67,7 +67,7 @@ def test_the_monitor_may_want_more_points_than_one() -> None:
     assert guard.limit_command(Twist(0.5), Pose2(0, 0)).vx < 0.5
 
 
-def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
+def test_source_times_out_without_scans_or_with_blind_scans() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(0)
     guard.on_scan(scan((2.0, 0.0)), Pose2(0, 0))
@@ -104,7 +104,7 @@ def test_silent_lidar_has_a_reason() -> None:
 
 
 @pytest.mark.parametrize("robot", [round_robot(), box_robot(1.0, 0.3)])
-def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_would(
+def test_quick_check_brakes_for_moving_obstacles_like_the_full_check(
     robot: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), TICK_RATE_HZ) for _ in range(2))

@@ -50,7 +50,7 @@ def docstring(statement: ast.stmt | None) -> str:
 CONSTANTS = list(constants())
 
 
-def test_the_constants_are_found() -> None:
+def test_numeric_constants_are_found() -> None:
     assert len(CONSTANTS) > 100
 
 

@@ -29,7 +29,7 @@ def test_limited_distances_match_scipy_for_each_block_size(shape, reach, block_s
     assert np.array_equal(squared_distances_within(marked, reach), np.where(whole <= reach**2, whole, reach**2 + 1))
 
 
-def test_without_marked_cells_everything_is_beyond_the_reach():
+def test_distances_without_marked_cells_are_at_the_limit():
     assert (
         squared_distances_within(np.zeros((70, 5), dtype=bool), distance_transform.MAX_REACH_CELLS)
         == distance_transform.MAX_REACH_CELLS**2 + 1

@@ -342,7 +342,7 @@ def test_another_value_changes_a_decision(other: Other) -> None:
     assert any(counts(other, value) for value in other.values)
 
 
-def test_the_same_values_change_none() -> None:
+def test_unchanged_values_change_no_decision() -> None:
     """Otherwise a change shows nothing."""
     scene = scenes.seen_by_one
     assert [*scene(StackSpec.model_validate(amcl()))] == [*scene(StackSpec.model_validate(amcl()))]

@@ -101,7 +101,7 @@ def test_a_mistake_is_reported_at_its_position(odd, tmp_path: Path, stack: str, 
         ("elsewhere", "broken-component", "from (1.50, 1.50) instead of the start (1.00, 1.00)"),
     ],
 )
-def test_a_planner_that_breaks_ends_the_run_with_its_name(odd, does: str, kind: str, told: str) -> None:
+def test_exception_in_a_planner_is_an_error_with_its_name(odd, does: str, kind: str, told: str) -> None:
     with pytest.raises(RunError) as broken:
         driven(planner={"type": "straight", "does": does}).run(1)
     assert broken.value.kind == kind
@@ -123,7 +123,7 @@ def test_a_path_through_a_wall_ends_the_run(odd) -> None:
         ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) returned 'perhaps'"),
     ],
 )
-def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> None:
+def test_error_names_the_role_of_the_component(odd, stack: dict, told: str) -> None:
     with pytest.raises(RunError) as broken:
         driven(**stack).run(1)
     assert broken.value.kind == "broken-component"
@@ -137,7 +137,7 @@ def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> Non
         (lambda *asked: 1 / 0, "crashed", "ZeroDivisionError: division by zero (navigator.py:"),
     ],
 )
-def test_shipped_components_are_validated_by_the_decision(monkeypatch, command, kind: str, told: str) -> None:
+def test_decision_of_shipped_components_is_validated(monkeypatch, command, kind: str, told: str) -> None:
     monkeypatch.setattr(RegulatedPurePursuit, "command", command)
     with pytest.raises(RunError) as broken:
         driven().run(1)
@@ -146,11 +146,11 @@ def test_shipped_components_are_validated_by_the_decision(monkeypatch, command, 
     assert told in str(broken.value)
 
 
-def test_a_failure_to_navigate_is_no_error_of_the_run(odd) -> None:
+def test_navigation_failure_is_not_an_error_of_the_run(odd) -> None:
     assert driven(Pose2(40.0, 0.0)).run(5).result == "FAILED"
 
 
-def test_a_behavior_is_named_or_written_out_and_takes_what_it_does_not_say_from_recovery(odd) -> None:
+def test_behavior_inherits_unset_parameters_from_recovery(odd) -> None:
     words = ["nod", {"type": "nod", "wait_duration": 1.0}, {"type": "spin", "spin_dist": 3.0}, "spin"]
     recovery = StackSpec.model_validate(
         {"recovery": {"behaviors": words, "wait_duration": 2.0, "spin_dist": 1.0}}
@@ -192,7 +192,7 @@ def test_components_have_independent_random_streams(odd) -> None:
     assert own.run(20).commands == others.run(20).commands
 
 
-def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> None:
+def test_stack_of_a_package_is_checked_at_each_tick(odd, tmp_path: Path) -> None:
     spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
     assert type(pickle.loads(pickle.dumps(spec))) is type(spec)
     stack = build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ))
@@ -215,7 +215,7 @@ def driven_setting():
     return Surroundings(round_robot(), None, TICK_RATE_HZ)
 
 
-def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
+def test_failure_without_a_nav2_code_is_a_contract_violation(odd) -> None:
     from simscen.model.planners import OmplPlanner
     from simscen.stack.checked_components import CheckedPlanner
     from simscen.testing.flatland import setting

@@ -37,7 +37,7 @@ def decided(*costmaps: Any) -> Decision:
     return CheckedStack(Shows(), setting).decide(0, ())
 
 
-def test_costmaps_go_through_as_they_are() -> None:
+def test_costmaps_are_passed_unchanged() -> None:
     both = (CostGrid("global", "map", GRID), CostGrid("local", "odom", GRID))
     assert decided(*both).costmaps == both
 

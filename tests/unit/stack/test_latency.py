@@ -56,7 +56,7 @@ def test_zero_latency_is_bit_identical_to_unset_latency(seed: int, zero: dict[st
     assert len(said.events_of_kind("plan.made")) > 1
 
 
-def test_a_plan_is_there_when_its_planner_is_done_and_the_robot_stands_until_then() -> None:
+def test_robot_waits_until_the_plan_is_computed() -> None:
     d = start(planner=0.2).run(1.0)
     made = d.events_of_kind("plan.made")[0].tick
     assert made - d.events_of_kind("goal.accepted")[0].tick == 0.2 * TICK_RATE_HZ
@@ -78,14 +78,14 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
 
 @pytest.mark.parametrize(("latency", "late"), [({"controller": 0.025}, 6), ({"collision_monitor": 0.05}, 12),
                                                ({"controller": 0.025, "collision_monitor": 0.025}, 12)])  # fmt: skip
-def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[str, float], late: int) -> None:
+def test_command_latency_is_the_sum_of_controller_and_monitor(latency: dict[str, float], late: int) -> None:
     soon, later = start().run(3.0), start(**latency).run(3.0)
     first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY_PERIOD_TICKS for d in (soon, later)]
     assert first[1] - first[0] == late
     assert later.run(30).result == "SUCCEEDED"
 
 
-def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_speeds_up_as_fast() -> None:
+def test_controller_slower_than_its_period_runs_less_often_with_equal_acceleration() -> None:
     d = start(controller=0.12).run(2.5)
     changes = [k for k, (a, b) in enumerate(pairwise(d.commands)) if a is not b]
     assert min(b - a for a, b in pairwise(changes)) * ODOMETRY_PERIOD_TICKS >= 2 * CONTROL_PERIOD_TICKS
@@ -93,7 +93,7 @@ def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_
     assert d.run(40).result == "SUCCEEDED"
 
 
-def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
+def test_delayed_costmap_marks_obstacles_where_they_were_seen() -> None:
     """The robot has moved on by half a meter when they are done."""
     maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, TICK_RATE_HZ), 0.5, latency=36)
     odometry, ranges = OdometryHistory(TICK_RATE_HZ), np.full(360, np.inf)
@@ -109,7 +109,7 @@ def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
             assert cells[:, 1] * view.resolution + view.origin[0] == pytest.approx([1.0] * shown, abs=0.051)
 
 
-def test_a_localizer_is_handed_scans_when_it_would_be_done_with_them_with_the_tick_they_were_taken_at() -> None:
+def test_delayed_localizer_receives_scans_with_their_original_tick() -> None:
     d = start(localizer=0.05)
     heard: list[tuple[int, int]] = []
     localizer = d.stack.inner._localizer
@@ -131,7 +131,7 @@ def test_delayed_results_arrive_in_order_after_their_latency() -> None:
     assert not underway.is_busy(8)
 
 
-def test_readings_of_motion_that_wait_for_the_next_step_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_deferred_odometry_and_imu_readings_do_not_change_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
     def driven() -> Drive:
         return start(Flatland(discs=[(4.0, 1.0, 0.3)])).run(8.0)
 

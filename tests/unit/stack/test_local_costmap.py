@@ -57,7 +57,7 @@ def lethal(view: CostmapView) -> np.ndarray:
 
 
 @pytest.mark.parametrize("jump", [Pose2(0.0, 0.3), Pose2(0.0, -0.3), Pose2(0.3, 0.0), Pose2(0.0, 0.0, 0.05)])
-def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jerk_in_the_command(jump: Pose2) -> None:
+def test_localizer_jump_changes_neither_local_costmap_nor_command(jump: Pose2) -> None:
     d = jumped(jump, 4.5)
     ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
     assert len(ghosts) > 50
@@ -69,7 +69,7 @@ def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jer
         assert abs(now.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
 
 
-def test_after_a_jump_the_robot_follows_its_plan_where_it_now_believes_that_to_be() -> None:
+def test_robot_follows_its_plan_at_the_corrected_pose_after_a_jump() -> None:
     """Told that it is 0.1 m left of where it thought, it drives as far to the right."""
     d = jumped(Pose2(0.0, 0.1), 12.0)
     assert d.track[-1].y == pytest.approx(0.7, abs=0.03)
@@ -97,7 +97,7 @@ def test_local_costmap_has_the_values_of_nav2_or_the_given_ones() -> None:
     assert shape(width=4.0, resolution=0.1) == ((30, 40), 0.1)
 
 
-def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
+def test_local_costmap_of_a_fast_robot_covers_its_lookahead() -> None:
     spec = StackSpec(localizer=TRUTH, controller={"type": "dwb", "max_vel_x": 3.0})
     fast = drive(CORRIDOR, START, GOAL, grid=None, robot=round_robot(speed=3.0), spec=spec)
     view = costmaps(fast).local_costmap.view
@@ -112,7 +112,7 @@ def test_local_costmap_inherits_unset_parameters() -> None:
     assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
 
 
-def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_to_be() -> None:
+def test_local_costmap_has_keepout_zones_at_their_estimated_position() -> None:
     d = drive(CORRIDOR, START, GOAL, grid=CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)))
     zone = ((3.0, 0.0), (3.4, 0.0), (3.4, 0.4), (3.0, 0.4))
     d.stack.inner.set_zones(0, Zones(keepout=(zone,)))
@@ -125,7 +125,7 @@ def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_
         assert inside[:, 0].max() == pytest.approx(3.4 - shift, abs=0.06)
 
 
-def test_a_robot_that_backs_out_does_not_forget_what_stands_behind_it_where_its_lidar_does_not_look() -> None:
+def test_obstacles_behind_the_robot_outside_the_field_of_view_are_kept() -> None:
     """A post that it has passed is a meter behind the hull, in the blind quarter of a lidar of 270 degrees."""
     world = Flatland(discs=[(2.0, 0.45, 0.05)])
     grid = Flatland().grid((-0.5, -2.0, 9.5, 2.0))

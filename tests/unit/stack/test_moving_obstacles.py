@@ -22,7 +22,7 @@ def test_minimum_distance_bound_holds_for_every_path() -> None:
     assert MovingObstacle(0j, -1 + 0j, 0.3, 0.0, 0.0, 0.0).min_distance(0j, 0.0, 3.0) == pytest.approx(-0.3)
 
 
-def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
+def test_arrays_are_unchanged_and_rotate_with_the_frame() -> None:
     spread = np.kron([[[0.1, 0.02], [0.02, 0.4]]], np.eye(2))
     one = MovingObstacles(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
     assert one.covariances == pytest.approx(spread)
@@ -38,7 +38,7 @@ def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     )
 
 
-def test_quick_check_agrees_with_each_moment() -> None:
+def test_quick_check_agrees_with_a_check_of_each_prediction() -> None:
     """Robots that brake, speed up and drive backward, beside a bent path, among things on all sides."""
     rng, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
     along = np.linspace(0.0, 5.0, 101)

@@ -60,7 +60,7 @@ def test_navigator_visits_goals_in_order() -> None:
     assert len(d.events_of_kind("navigation.ended")) == 1
 
 
-def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_opens() -> None:
+def test_robot_waits_at_a_closed_door_with_recoveries_and_passes_when_it_opens() -> None:
     world = rooms()
     d = start(world).run(2.0)
     world.boxes.append(DOOR)
@@ -72,7 +72,7 @@ def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_op
     assert d.min_clearance > 0.02
 
 
-def test_recoveries_come_in_turn_and_end_after_the_retries() -> None:
+def test_recoveries_alternate_and_end_after_the_retries() -> None:
     d = start(rooms(DOOR), grid=rooms()).run(90)
     assert [e.name for e in d.events_of_kind("recovery.started")] == [
         "clear_costmap", "spin", "wait", "backup", "clear_costmap", "spin",
@@ -91,7 +91,7 @@ def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() ->
     assert d.min_clearance > 0.02
 
 
-def test_a_way_that_opens_is_taken_when_it_is_clearly_shorter() -> None:
+def test_opened_path_is_taken_if_clearly_shorter() -> None:
     mapped = Flatland().room(10, 6)
     mapped.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 5.0)]  # a door, and a long way round by the top
     world = Flatland([*mapped.boxes, DOOR])
@@ -116,7 +116,7 @@ def test_a_goal_that_can_never_be_reached_fails_at_once(goal: Pose2, code: str) 
 
 
 @pytest.mark.slow
-def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails() -> None:
+def test_goal_occupied_by_an_unmapped_object_fails() -> None:
     world = rooms()
     world.discs.append((9.0, 1.0, 0.1))
     d = start(world, grid=rooms()).run(90)
@@ -142,7 +142,7 @@ def test_a_goal_takes_no_longer_than_its_timeout() -> None:
     assert d.tick / 240 == pytest.approx(5.0, abs=0.1)
 
 
-def test_a_robot_that_does_not_move_is_found_out() -> None:
+def test_robot_without_progress_fails() -> None:
     spec = StackSpec(
         localizer=TRUTH, progress_checker=ProgressChecker(movement_time_allowance=1.0),
         recovery=Recovery(number_of_retries=2, wait_duration=0.5),
@@ -225,7 +225,7 @@ def test_on_goal_failure_stops_or_continues() -> None:
     assert went_on.result == "FAILED"
 
 
-def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when_it_speaks() -> None:
+def test_robot_stops_within_half_a_second_without_scans_and_continues_with_them() -> None:
     d = start(rooms()).run(5.0)
     d.is_blind = True
     d.run(0.5)
@@ -297,7 +297,7 @@ def test_navigator_reaches_a_goal_beyond_the_rolling_window_without_a_map() -> N
     assert d.result == "SUCCEEDED"
 
 
-def test_a_long_robot_drives_through_a_gap_a_hand_wider_than_itself() -> None:
+def test_long_robot_drives_through_a_gap_ten_centimeters_wider() -> None:
     world = Flatland().room(6, 3)
     world.boxes += [(3.0, 0.0, 3.1, 1.24), (3.0, 1.76, 3.1, 3.0)]
     grid = world.grid((-0.5, -0.5, 6.5, 3.5))
@@ -312,7 +312,7 @@ def test_the_same_seed_gives_the_same_drive_and_another_seed_may_not() -> None:
     assert one.log == other.log
 
 
-def test_commands_stay_within_the_robots_limits_and_ramp() -> None:
+def test_commands_respect_velocity_and_acceleration_limits() -> None:
     robot = round_robot(linear_acceleration=1.0, linear_deceleration=2.0)
     d = start(rooms(), robot=robot).run(20)
     steps = [b.vx - a.vx for a, b in zip(d.commands, d.commands[1:], strict=False)]
@@ -348,7 +348,7 @@ def test_obstacle_seen_only_by_the_collision_monitor_fails_soon() -> None:
     assert d.min_clearance > 0.0
 
 
-def test_a_lidar_that_is_late_marks_obstacles_where_they_are() -> None:
+def test_late_scans_mark_obstacles_at_their_true_position() -> None:
     world = Flatland(discs=[(3.0, 0.0, 0.3)])
     d = drive(world, Pose2(0, 0), Goal("g", Pose2(2.5, 0.0)), grid=None, robot=round_robot(speed=0.5))
     late: list = []
@@ -364,7 +364,7 @@ def test_a_lidar_that_is_late_marks_obstacles_where_they_are() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.4, 0.8])
-def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its_sight(seconds: float) -> None:
+def test_seen_dead_end_is_kept_after_a_control_failure_out_of_sight(seconds: float) -> None:
     """Control fails for so long that it is tried again after clearing; then that a recovery clears, too."""
     mapped = Flatland().room(8, 8)
     mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 7.0)]  # a door, and a long way round by the top
@@ -391,7 +391,7 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
 
 
 @pytest.mark.parametrize("off", [0.04, -0.04])
-def test_navigator_passes_a_wall_that_is_off_the_map_by_centimeters(off: float) -> None:
+def test_navigator_passes_a_wall_displaced_by_centimeters(off: float) -> None:
     """As for a robot whose estimate is wrong by as much; it is configured for the shortest path, not for clearance."""
     mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
     spec = StackSpec(

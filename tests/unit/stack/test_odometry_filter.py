@@ -124,24 +124,24 @@ def imu(tick: int, rate: float, variance: float = 4e-6) -> Imu:
 
 
 @pytest.mark.parametrize("imu_rate", [0, 40, 60, 240])
-def test_without_noise_the_pose_is_that_of_the_wheels(imu_rate: int) -> None:
+def test_pose_without_noise_equals_wheel_odometry(imu_rate: int) -> None:
     steps = drive(1, 20, EXACT_WHEELS, EXACT_IMU, imu_rate=imu_rate)
     assert max(np.abs(error(step, step.filtered)).max() for step in steps) < 3e-3
     assert max(np.abs(error(step, step.wheels)).max() for step in steps) < 3e-3
 
 
-def test_without_an_imu_the_filter_changes_next_to_nothing() -> None:
+def test_filter_without_an_imu_hardly_changes_odometry() -> None:
     for step in drive(2, 20, imu_rate=0):
         assert step.filtered.pose == pytest.approx(step.wheels.pose, abs=5e-3)
 
 
-def test_the_odom_frame_is_that_of_the_wheels() -> None:
+def test_filtered_odometry_keeps_the_odom_frame_of_the_wheels() -> None:
     first = odometry(6, Pose2(1.0, 2.0, 3.0))
     assert OdometryFilter(Spec(), RATE).fuse(first) is first
 
 
 @pytest.mark.slow
-def test_the_heading_is_several_times_as_good_as_that_of_the_wheels() -> None:
+def test_filtered_heading_is_several_times_as_accurate_as_wheel_odometry() -> None:
     ends = [drive(seed, 20)[-1] for seed in range(7000, 7020)]
     fused, wheels = (np.std([error(end, getattr(end, name))[2] for end in ends]) for name in ("filtered", "wheels"))
     assert fused < wheels / 3
@@ -170,7 +170,7 @@ def test_the_covariance_agrees_with_the_error(case: str) -> None:
         assert low < np.mean(found) < high
 
 
-def test_pose_and_covariance_are_those_of_an_independent_filter() -> None:
+def test_pose_and_covariance_equal_those_of_an_independent_filter() -> None:
     """Oracle: the information form of the update, and a covariance from finite differences of the whole chain.
 
     Every error of the drive, of the first bias, of each process noise and of each measurement, is changed by a little,
@@ -259,7 +259,7 @@ def test_each_parameter_counts(spec: Spec) -> None:
     assert other_end(spec) != other_end(Spec())
 
 
-def test_a_gyroscope_that_falls_silent_leaves_the_wheels() -> None:
+def test_filter_uses_only_the_wheels_after_the_gyroscope_stops() -> None:
     steps = drive(5, 10, change=lambda reading: reading if reading.tick < 4 * RATE else None)
     silent = [step for step in steps if step.wheels.tick > 5 * RATE]
     assert len(silent) > 90
@@ -311,7 +311,7 @@ def test_an_update_has_the_variance_of_all_readings_since_the_last_one() -> None
     assert filtered.twist_variance[0] == pytest.approx(4e-4 / 4, rel=1e-3)
 
 
-def test_nothing_is_lost_with_lost_odometry() -> None:
+def test_motion_is_complete_after_lost_odometry_messages() -> None:
     """The next reading covers the gap, with the error of all its increments."""
     all_of_it, some = OdometryFilter(Spec(frequency=40), RATE), OdometryFilter(Spec(frequency=40), RATE)
     for k in range(21):
@@ -354,7 +354,7 @@ def test_the_stack_localizes_by_the_filtered_odometry_and_publishes_it() -> None
     (StackSpec.model_validate({"odometry": {"type": "wheel"}}), True),
     (StackSpec.model_validate({"localizer": {"type": "ekf"}}), True),
 ])  # fmt: skip
-def test_nothing_is_filtered_without_an_imu_or_where_another_part_does(spec: StackSpec, has_imu: bool) -> None:
+def test_odometry_is_not_filtered_without_an_imu_or_by_other_fusing_localizers(spec: StackSpec, has_imu: bool) -> None:
     made = decisions(spec, has_imu)
     assert not any(decision.odometry for decision in made)
     if spec.localizer.type != "ekf":

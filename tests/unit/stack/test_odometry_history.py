@@ -18,21 +18,21 @@ def straight(*ticks: int) -> OdometryHistory:
     return history(*((tick, Pose2(0.1 * tick, 0.0, 0.0)) for tick in ticks))
 
 
-def test_the_held_pose_at_a_tick_is_the_newest_up_to_then() -> None:
+def test_held_pose_at_a_tick_is_the_newest_before_it() -> None:
     kept = straight(0, 6, 12)
     assert [kept.latest_until(tick).x for tick in (-5, 0, 5, 6, 11, 12, 99)] == pytest.approx(
         [0, 0, 0, 0.6, 0.6, 1.2, 1.2]
     )
 
 
-def test_between_two_readings_it_is_interpolated_across_the_cut_of_the_circle() -> None:
+def test_pose_between_readings_is_interpolated_across_pi() -> None:
     both = history((10, Pose2(1, 1, 3.0)), (20, Pose2(2, 1, -3.0)))
     assert both.at(10) == Pose2(1, 1, 3.0)
     assert both.at(20) == Pose2(2, 1, -3.0)
     assert both.at(15) == pytest.approx((1.5, 1, 3.14159265))
 
 
-def test_outside_of_the_readings_there_is_nothing_to_interpolate() -> None:
+def test_no_interpolation_outside_the_readings() -> None:
     both = straight(10, 20)
     assert both.at(9) is None
     assert both.at(21) is None
@@ -45,7 +45,7 @@ def test_past_poses_are_in_the_current_frame() -> None:
     assert before == pytest.approx((5.0, 4.4, 1.5707963267948966))
 
 
-def test_before_any_reading_it_is_at_the_origin() -> None:
+def test_pose_before_any_reading_is_the_origin() -> None:
     nothing = history()
     assert not nothing.has_pose
     assert nothing.latest_until(5) == nothing.now == Pose2(0.0, 0.0)

@@ -26,7 +26,7 @@ def test_a_reason_is_reported_once_after_a_second_and_its_end_as_well() -> None:
     assert standstill.report_release(500) == ()
 
 
-def test_another_reason_ends_the_one_before() -> None:
+def test_new_reason_ends_the_previous_one() -> None:
     standstill = StandstillReporter(240)
     standstill.report_hold(0, "planner", lambda: "why")
     standstill.report_hold(240, "planner", lambda: "why")
@@ -35,7 +35,7 @@ def test_another_reason_ends_the_one_before() -> None:
 
 
 @pytest.mark.parametrize("part", ["planner", "controller"])
-def test_a_robot_that_waits_for_its_planner_or_its_controller_says_so(part: str) -> None:
+def test_waiting_for_planner_or_controller_is_reported(part: str) -> None:
     world = Flatland().room(8, 6)
     spec = StackSpec(latency=Latency(**{part: 2.0}))
     d = drive(world, Pose2(1, 3), Goal("g", Pose2(6, 3)), spec=spec, grid=world.grid((-0.5, -0.5, 8.5, 6.5))).run(6.0)

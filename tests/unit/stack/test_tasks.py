@@ -40,7 +40,7 @@ def told(journal: list[Event]) -> list[tuple[int, str, str]]:
     return [(event.tick, event.kind.value, event.name) for event in journal]
 
 
-def test_poses_are_passed_on_the_way_to_one_that_is_reached():
+def test_via_poses_are_passed_before_the_goal_is_reached():
     drive, journal = task(A, B, C)
     assert drive.accept_next(1) is A
     assert drive.remaining_in_action == (B, C)
@@ -58,7 +58,7 @@ def test_poses_are_passed_on_the_way_to_one_that_is_reached():
     assert [event.data["index"] for event in journal[:-1]] == [0, 0, 1, 1, 2, 2]
 
 
-def test_a_drive_fails_as_a_whole_and_the_next_one_follows():
+def test_failed_drive_fails_all_its_poses_and_the_next_drive_starts():
     drive, journal = task(A, B, C, D, stop=False)
     drive.accept_next(1)
     drive.record_passed(2)
@@ -93,7 +93,7 @@ def test_end_of_a_drive_ends_all_its_goals(how):
         assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
 
 
-def test_the_robot_stays_as_long_as_the_goal_says_before_the_next_one_or_the_end():
+def test_robot_waits_for_the_duration_at_each_goal():
     waits = Goal("a", Pose2(0, 0), wait=0.5), Goal("b", Pose2(1, 0), wait=0.2)
     tour, journal = task(*waits)
     tour.accept_next(1)
@@ -135,7 +135,7 @@ def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
         ("navigate_to_pose", True, ErrorCode.NO_VALID_PATH),
     ],
 )
-def test_a_follower_that_stops_says_that_a_waypoint_was_missed(mode, stop, code):
+def test_stopped_waypoint_follower_reports_the_missed_waypoint(mode, stop, code):
     tour, journal = task(C, stop=stop, mode=mode)
     tour.accept_next(1)
     tour.record_failed(2, ErrorCode.NO_VALID_PATH, "no way")
@@ -154,7 +154,7 @@ def test_a_goal_has_its_name_in_every_loop():
     assert not matches_goal_name("bookshelf#2", "shelf")
 
 
-def test_codes_of_several_poses_have_the_names_of_those_of_one():
+def test_error_codes_through_poses_have_the_names_of_those_to_one_pose():
     assert error_code(306) is ErrorCode.GOAL_OCCUPIED  # nav2_msgs/action/ComputePathThroughPoses
     assert error_code(9103) is ErrorCode.NAVIGATE_TIMEOUT  # nav2_msgs/action/NavigateThroughPoses
     assert error_code(309) is ErrorCode.NO_VIAPOINTS_GIVEN
@@ -162,7 +162,7 @@ def test_codes_of_several_poses_have_the_names_of_those_of_one():
     assert error_code(4711) == 4711
 
 
-def test_a_goal_in_another_frame_is_the_same_but_for_its_pose() -> None:
+def test_goal_in_another_frame_differs_only_in_its_pose() -> None:
     goal = Goal("there", Pose2(1, 2, 3), 0.1, 0.2, 30.0, True, 4.0)
     assert goal.at(Pose2(5, 6, 7)) == replace(goal, pose=Pose2(5, 6, 7))
 

@@ -10,7 +10,7 @@ from simscen.stack.commands import VelocitySmoother
 from simscen.testing.flatland import round_robot
 
 
-def test_the_smoother_speeds_up_gently_and_brakes_with_all_the_base_has() -> None:
+def test_smoother_limits_acceleration_and_brakes_at_full_deceleration() -> None:
     robot = round_robot(linear_acceleration=1.0, linear_deceleration=4.0)
     smoother = VelocitySmoother(SmootherSpec(), robot, 0.1)
     assert [round(smoother.smooth(Twist(0.25)).vx, 6) for _ in range(4)] == [0.1, 0.2, 0.25, 0.25]
@@ -25,7 +25,7 @@ def test_the_smoother_passes_zero_before_it_reverses() -> None:
     assert smoother.smooth(Twist(-0.5)).vx == pytest.approx(-0.125)
 
 
-def test_the_smoother_keeps_to_the_limits_that_it_is_given() -> None:
+def test_smoother_respects_its_limits() -> None:
     spec = SmootherSpec(max_decel=2.0, max_velocity=0.3, max_angular_velocity=0.5)
     smoother = VelocitySmoother(spec, round_robot(linear_deceleration=4.0), 0.1)
     smoother.reset(Twist(0.5))
@@ -34,7 +34,7 @@ def test_the_smoother_keeps_to_the_limits_that_it_is_given() -> None:
     assert smoother.smooth(Twist()).vx == pytest.approx(0.1)
 
 
-def test_a_car_keeps_to_its_curve_when_the_smoother_slows_it_down() -> None:
+def test_slowed_car_keeps_its_curvature() -> None:
     robot = replace(round_robot(), turning_radius=0.5)
     smoother = VelocitySmoother(SmootherSpec(max_velocity=0.2), robot, 0.1)
     smoother.reset(Twist(0.2, 0.0, 0.1))

@@ -35,14 +35,14 @@ def test_arcs_are_those_of_a_fine_integration() -> None:
     assert straight == pytest.approx((1 + 2 * math.cos(0.4), 2 + 2 * math.sin(0.4), 0.4))
 
 
-def test_time_free_is_the_way_to_the_obstacle_over_the_speed() -> None:
+def test_time_to_collision_is_distance_divided_by_speed() -> None:
     robot = round_robot()
     view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
     free = time_to_collision(Footprint(robot, 0.05), view, Pose2(0, 0), Twist(0.5), 10.0)
     assert free == pytest.approx((2.0 - 0.22) / 0.5, abs=0.06 / 0.5)
 
 
-def test_a_robot_in_collision_may_move_out_but_not_further_in() -> None:
+def test_colliding_robot_may_move_out_but_not_further_in() -> None:
     robot = round_robot()
     view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
     footprint = Footprint(robot, 0.05)
@@ -68,7 +68,7 @@ def test_robot_in_contact_cannot_drive_into_another_obstacle(robot: RobotModel) 
     )
 
 
-def test_a_footprint_collides_where_its_edge_or_its_inside_is_on_something() -> None:
+def test_footprint_collides_if_its_edge_or_interior_is_occupied() -> None:
     robot = box_robot(1.0, 0.4)
     view = view_of(Flatland(discs=[(2.0, 0.0, 0.05)]), robot)
     footprint = Footprint(robot, 0.05)
@@ -85,13 +85,13 @@ def with_a_post(x: float, y: float) -> CostmapView:
 
 
 @pytest.mark.parametrize(("x", "y", "deep"), [(0.475, 0.125, 0.025), (0.375, -0.075, 0.125), (-0.325, 0.125, 0.075)])
-def test_the_clearance_of_a_long_hull_in_collision_is_how_deep_it_is_in_it(x: float, y: float, deep: float) -> None:
+def test_clearance_of_a_long_hull_in_collision_is_the_penetration_depth(x: float, y: float, deep: float) -> None:
     footprint = Footprint(box_robot(1.0, 0.4), 0.05)
     clearance = footprint.clearance(with_a_post(x, y), np.array([[0.0, 0.0, 0.0]]))
     assert clearance == pytest.approx([-deep], abs=0.036)
 
 
-def test_a_long_robot_that_touches_something_may_turn_out_of_it_but_not_further_in() -> None:
+def test_long_robot_in_contact_may_turn_out_but_not_further_in() -> None:
     footprint, view = Footprint(box_robot(1.0, 0.4), 0.05), with_a_post(0.425, 0.19)
     assert not footprint.free(view, np.array([[0.0, 0.0, 0.0]]))[0]
     assert time_to_collision(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, -0.5), 1.0) == 1.0
@@ -108,7 +108,7 @@ def test_discs_cover_the_hull() -> None:
     assert discs.radius < 0.25
 
 
-def test_commands_are_slowed_to_the_minimum_speed_and_no_further() -> None:
+def test_commands_are_not_slowed_below_the_minimum_speed() -> None:
     footprint, command = Footprint(round_robot(), 0.05), Twist(0.5, 0.0, 0.2)
     assert CollisionChecker(footprint, 0.1).slow_down(command, 0.2, 1.0, 1.0) == pytest.approx(Twist(0.1, 0.0, 0.04))
     assert CollisionChecker(footprint, 0.04).slow_down(command, 0.1, 1.0, 1.0).vx == pytest.approx(0.05)

@@ -33,7 +33,7 @@ def test_a_base_comes_to_rest_at_the_heading_that_it_turns_to(angle: float, late
     assert abs(left[-1]) < 0.01
 
 
-def test_braking_starts_no_earlier() -> None:
+def test_braking_does_not_start_earlier_than_needed() -> None:
     left, _ = turned(2.0, 4.0, 0)
     assert next(step for step, angle in enumerate(left) if angle < 0.125) * PERIOD < 1.75
 

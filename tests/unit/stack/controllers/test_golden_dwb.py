@@ -38,19 +38,19 @@ def kinematics(acceleration: float = AT_ONCE, deceleration: float = -AT_ONCE, **
 
 
 @of("samples")
-def test_the_velocities_that_are_tried(case: dict[str, Any]) -> None:
+def test_sampled_velocities_equal_those_of_dwb(case: dict[str, Any]) -> None:
     assert velocity_samples(**case["given"]) == pytest.approx(case["expect"], abs=1e-9)
 
 
 @of("window")
-def test_the_combinations_that_are_tried(case: dict[str, Any]) -> None:
+def test_sampled_combinations_equal_those_of_dwb(case: dict[str, Any]) -> None:
     given = dict(case["given"])
     found = velocity_window(kinematics(**given), Twist(), 1.7, given["counts"])
     assert found == pytest.approx(np.array(case["expect"]), abs=1e-9)
 
 
 @of("trajectory")
-def test_where_a_velocity_leads(case: dict[str, Any]) -> None:
+def test_trajectory_of_a_velocity(case: dict[str, Any]) -> None:
     given = case["given"]
     base = kinematics(given.get("acceleration", AT_ONCE), given.get("deceleration", -AT_ONCE))
     pose, now = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("now", (0, 0, 0)))
@@ -60,7 +60,7 @@ def test_where_a_velocity_leads(case: dict[str, Any]) -> None:
 
 
 @of("critics")
-def test_what_the_critics_say(case: dict[str, Any]) -> None:
+def test_scores_of_the_critics(case: dict[str, Any]) -> None:
     given, expect = case["given"], dict(case["expect"])
     costs = np.zeros((10, 10), np.uint8)
     if "cost" in given:
@@ -81,7 +81,7 @@ def test_what_the_critics_say(case: dict[str, Any]) -> None:
 
 
 @of("rotate")
-def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> None:
+def test_rotate_to_goal_critic_scores_stopping_and_turning(case: dict[str, Any]) -> None:
     given, expect = case["given"], case["expect"]
     critic = RotateToGoalCritic(stopped_velocity=0.25, slowing_factor=5.0)
     found, legal = critic.scores(
@@ -92,7 +92,7 @@ def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> Non
 
 
 @of("oscillation")
-def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
+def test_oscillation_critic_forbids_reversals(case: dict[str, Any]) -> None:
     critic = OscillationCritic(0.05, 0.2, 0.05)
     for command, moved in zip(case["given"]["commands"], case["given"]["moved"], strict=True):
         critic.record(Pose2(moved, 0.0), Twist(*command))
@@ -101,7 +101,7 @@ def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
     assert {name: legal[name] for name in case["expect"]} == case["expect"]
 
 
-def test_once_it_turns_at_the_goal_it_goes_on_turning_though_it_is_pushed() -> None:
+def test_turn_at_the_goal_continues_after_a_push() -> None:
     critic = RotateToGoalCritic(0.25, 5.0)
     turn, drive = np.array([[0.0, 0.0, 0.5]]), np.array([[0.3, 0.0, 0.0]])
     critic.scores(Twist(0.1), 0.0, turn, np.zeros(1))

@@ -47,7 +47,7 @@ def scene(given: dict[str, Any], sampled: np.ndarray, limits: VelocityLimits) ->
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
-def test_rollouts_critics_weights_and_the_sequence_that_comes_out_are_those_of_the_loops(case: dict[str, Any]) -> None:
+def test_vectorized_mppi_equals_a_version_with_loops(case: dict[str, Any]) -> None:
     given, axes = case["given"], case["given"]["axes"]
     limits = VelocityLimits((-0.2, -0.3, -1.5), (0.5, 0.3, 1.5), (1.2, 0.9, 2.0), (-1.8, -0.9, -2.0), given["radius"])
     sampled = controls(axes)

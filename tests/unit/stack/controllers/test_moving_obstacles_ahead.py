@@ -67,7 +67,7 @@ def driven(controller: Controller, view: CostmapView, times: int = 20) -> Twist:
 
 
 @pytest.mark.parametrize("number", range(3), ids=["regulated pure pursuit", "mppi", "dwb"])
-def test_a_controller_does_not_stop_for_what_will_be_gone_and_does_for_what_will_be_there(number: int) -> None:
+def test_controller_stops_only_for_predicted_obstacles_that_will_be_in_its_path(number: int) -> None:
     free = driven(controllers()[number], OPEN)
     assert met(STANDS, 0.5) and met(COMES, 0.5) and not met(GONE, 0.5)
     gone, comes = (driven(controllers()[number], among(disc)) for disc in (GONE, COMES))
@@ -75,13 +75,13 @@ def test_a_controller_does_not_stop_for_what_will_be_gone_and_does_for_what_will
     assert comes.vx < 0.8 * free.vx or abs(comes.wz) > 0.2
 
 
-def test_pure_pursuit_drives_at_the_greatest_part_of_its_speed_that_lets_pass() -> None:
+def test_pure_pursuit_uses_the_highest_speed_that_lets_the_obstacle_pass() -> None:
     expected = max(part for part in (1.0, 0.75, 0.5, 0.25, 0.0) if not met(COMES, part * 0.5))
     assert 0.0 < expected < 1.0
     assert driven(controllers()[0], among(COMES)).vx == pytest.approx(expected * 0.5)
 
 
-def test_pure_pursuit_stands_before_what_goes_no_further_and_does_not_fail() -> None:
+def test_pure_pursuit_waits_for_a_stopped_moving_obstacle_without_failing() -> None:
     assert driven(controllers()[0], among((1.45, 0.0, 0.0, 0.05))) == STOP
 
 
@@ -96,7 +96,7 @@ def test_uncertain_obstacle_gets_more_clearance() -> None:
     assert driven(controllers()[0], among(beside, deviation=0.3)).vx < 0.5
 
 
-def test_mppi_scores_the_pose_of_each_step_against_the_places_of_that_step() -> None:
+def test_mppi_compares_each_step_with_predictions_for_that_step() -> None:
     """One rollout stands, one goes at 0.5 m/s; where nothing else costs, this is the whole of it."""
     times = 0.1 * np.arange(1, 11, dtype=np.float32)
     x = np.column_stack((0.0 * times, 0.5 * times))
@@ -117,7 +117,7 @@ def test_mppi_scores_the_pose_of_each_step_against_the_places_of_that_step() -> 
         assert not stuck.any()  # who meets all has still somewhere to go
 
 
-def test_a_hull_that_is_not_round_is_as_long_as_it_is_and_turns_with_the_robot() -> None:
+def test_predicted_collision_uses_the_rotated_hull() -> None:
     footprint = Footprint(box_robot(length=1.0, width=0.4), 0.05)
     moving = among((2.0, 0.0, -1.0, 0.0)).moving
     poses = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, math.pi / 2]])
@@ -128,7 +128,7 @@ def test_a_hull_that_is_not_round_is_as_long_as_it_is_and_turns_with_the_robot()
 
 
 @pytest.mark.parametrize("horizon", [0.0, 0.01, 0.04, 0.06])
-def test_a_way_of_less_than_the_time_between_two_moments_is_looked_at_from_end_to_end(horizon: float) -> None:
+def test_motion_shorter_than_the_prediction_step_is_checked_completely(horizon: float) -> None:
     """Of a carrot that is all but reached."""
     free = CollisionChecker(Footprint(ROBOT, 0.05), 0.1)
     assert free.slow_down_for_moving(SPEED, among(GONE), HERE, horizon) == SPEED

@@ -56,7 +56,7 @@ def driven(robot: RobotModel, length: float, seconds: float, **options: Any) -> 
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
-def test_on_an_empty_straight_it_reaches_the_speed_that_it_is_asked_for(speed: float) -> None:
+def test_mppi_reaches_its_desired_speed_on_a_free_straight(speed: float) -> None:
     commands = driven(round_robot(speed=2.5), 6.0 * speed + 4.0, 3.0, vx_max=speed)
     assert max(each.vx for each in commands) <= speed + 1e-6
     assert min(each.vx for each in commands[-20:]) > 0.9 * speed
@@ -73,14 +73,14 @@ def test_commands_respect_the_accelerations_of_the_base() -> None:
     assert np.diff(speeds).max() <= 0.8 * PERIOD + 1e-6
 
 
-def test_velocities_follow_the_control_of_the_step_before_as_fast_as_accelerations_allow() -> None:
+def test_velocities_follow_controls_within_the_acceleration_limits() -> None:
     controls = np.array([[1.0, 1.0, -1.0, 0.0], [0.1, -5.0, 0.0, 0.0]], np.float32)[:, :, None]
     velocities = predict_velocities(np.array([0.0, 0.0], np.float32), controls, LIMITS, 0.1)[:, :, 0]
     assert velocities[0] == pytest.approx([0.0, 0.3, 0.6, 0.3], abs=1e-6)
     assert velocities[1] == pytest.approx([0.0, 0.1, -0.25, 0.0], abs=1e-6)
 
 
-def test_braking_is_bounded_by_the_deceleration_whichever_way_it_goes() -> None:
+def test_braking_is_limited_by_the_deceleration_in_both_directions() -> None:
     limits = VelocityLimits((-2.0, 0.0, -1.0), (2.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-3.0, -3.0, -1.0), 0.0)
     for sign in (1.0, -1.0):
         controls = np.zeros((2, 3, 1), np.float32)
@@ -88,7 +88,7 @@ def test_braking_is_bounded_by_the_deceleration_whichever_way_it_goes() -> None:
         assert sign * velocities[0, :, 0] == pytest.approx([1.0, 0.7, 0.4], abs=1e-6)
 
 
-def test_a_step_keeps_the_heading_that_it_begins_with() -> None:
+def test_each_step_uses_the_heading_at_its_start() -> None:
     velocities = np.array([[1.0, 1.0], [math.pi, 0.0], [0.0, 0.5]], np.float32)[:, :, None]
     rolled = integrate_velocities(velocities, 0.0, 0.5)
     assert rolled.yaw[:, 0] == pytest.approx([math.pi / 2, math.pi / 2], abs=1e-6)
@@ -103,7 +103,7 @@ def test_pending_commands_precede_the_sampled_ones() -> None:
     assert velocities[1, :, 0].tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
 
 
-def test_the_filter_keeps_parabolas_and_flattens_noise() -> None:
+def test_savitzky_golay_filter_keeps_parabolas_and_reduces_noise() -> None:
     steps = np.arange(-4.0, 30.0)
     parabola = (0.01 * steps**2).astype(np.float32)
     kept = smooth_sequence(parabola[None, 4:], parabola[None, :4], 2)
@@ -115,7 +115,7 @@ def test_the_filter_keeps_parabolas_and_flattens_noise() -> None:
     assert smooth_sequence(spike, past, 1)[0, 6:15] == pytest.approx(np.full(9, 1 / 9))
 
 
-def test_a_sequence_too_short_to_smooth_stays_as_it_is() -> None:
+def test_sequence_too_short_to_smooth_is_unchanged() -> None:
     spike = np.eye(1, 20, dtype=np.float32)
     assert smooth_sequence(spike, np.zeros((1, 4), np.float32), 2) is spike
 
@@ -127,7 +127,7 @@ def test_a_car_never_turns_tighter_than_its_radius() -> None:
     assert (np.abs(kept[1]) <= np.abs(kept[0]) / 2.0 + 1e-6).all()
 
 
-def test_a_sequence_moves_on_by_parts_of_a_step() -> None:
+def test_control_sequence_is_shifted_by_fractions_of_a_step() -> None:
     sequence = np.array([[0.0, 1.0, 3.0]], np.float32)
     assert shift_sequence(sequence, 1.0)[0].tolist() == [1.0, 3.0, 3.0]
     assert shift_sequence(sequence, 0.5)[0].tolist() == [0.5, 2.0, 3.0]
@@ -148,12 +148,12 @@ def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
     return np.stack((vx, np.full_like(vx, turn)))
 
 
-def test_constraint_critic_counts_meters_per_second_too_many_over_time() -> None:
+def test_constraint_critic_penalizes_excess_speed() -> None:
     said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
     assert said == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
 
 
-def test_constraint_critic_counts_how_much_too_tightly_a_car_turns() -> None:
+def test_constraint_critic_penalizes_turns_tighter_than_the_turning_radius() -> None:
     car = replace(LIMITS, turning_radius=1.0)
     said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
     assert said == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
@@ -170,7 +170,7 @@ def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million()
     assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
 
 
-def test_cost_critic_near_the_goal_counts_what_is_all_but_a_collision_and_no_more() -> None:
+def test_cost_critic_near_the_goal_penalizes_only_near_collisions() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
     said, _ = critics.cost_critic(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
     assert said == pytest.approx([0.0])
@@ -178,7 +178,7 @@ def test_cost_critic_near_the_goal_counts_what_is_all_but_a_collision_and_no_mor
     assert said[0] > 1.0
 
 
-def test_obstacles_critic_counts_nearness_within_its_margin() -> None:
+def test_obstacles_critic_penalizes_distances_below_its_margin() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
     seen = scene(along(0.7), view)
     cells = seen.lookup(seen.rollouts.x, seen.rollouts.y)
@@ -188,13 +188,13 @@ def test_obstacles_critic_counts_nearness_within_its_margin() -> None:
     assert said[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
 
 
-def test_a_robot_in_collision_may_go_out_of_it_and_not_further_in() -> None:
+def test_robot_in_collision_may_leave_but_not_penetrate_further() -> None:
     view = view_of((0.15, -3.0, 1.0, 3.0))
     _, hit = critics.cost_critic(model.MppiCostCritic(), scene(along(0.4, -0.4), view))
     assert hit.tolist() == [True, False]
 
 
-def test_a_robot_that_stands_so_near_that_its_discs_touch_may_drive_along() -> None:
+def test_robot_whose_discs_touch_an_obstacle_may_drive_along_it() -> None:
     robot = box_robot()
     everywhere = np.full((60, 60), 0.16, np.float32)
     view = CostmapView(np.zeros((60, 60), np.uint8), everywhere, 0.05, (-1.5, -1.5))
@@ -210,18 +210,18 @@ def test_goal_critic_is_the_mean_distance_to_the_end_of_the_plan() -> None:
     assert said == pytest.approx([5.0 * np.mean(1.0 - 0.05 * np.arange(1, 11))], rel=1e-5)
 
 
-def test_goal_angle_critic_is_the_mean_angle_and_knows_symmetric_robots() -> None:
+def test_goal_angle_critic_is_the_mean_angle_also_for_symmetric_robots() -> None:
     turning = scene(along(0.0), length=0.3, goal_yaw=math.pi - 0.2)
     assert critics.goal_angle_critic(model.MppiGoalAngleCritic(), turning) == pytest.approx([3.0 * (math.pi - 0.2)])
     either = model.MppiGoalAngleCritic(symmetric_yaw_tolerance=True)
     assert critics.goal_angle_critic(either, turning) == pytest.approx([3.0 * 0.2], rel=1e-4)
 
 
-def test_the_furthest_point_of_the_plan_is_the_nearest_to_the_end_of_a_rollout() -> None:
+def test_furthest_reached_point_is_the_nearest_to_the_end_of_a_rollout() -> None:
     assert scene(along(0.2, 0.5)).furthest_point == 10 - 1
 
 
-def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None:
+def test_path_align_critic_compares_at_equal_driven_distance() -> None:
     beside = along(1.0, steps=17, turn=0.0)
     seen = scene(beside)
     offset = CriticData(
@@ -235,7 +235,7 @@ def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None
     assert said == pytest.approx([14.0 * mean], rel=1e-3)
 
 
-def test_path_align_critic_is_silent_before_the_robot_has_got_going_and_where_the_plan_is_blocked() -> None:
+def test_path_align_critic_is_inactive_at_the_start_and_where_the_plan_is_blocked() -> None:
     assert critics.path_align_critic(model.MppiPathAlignCritic(), scene(along(0.1))) is None
     blocked = scene(along(1.5), view_of((0.9, -0.1, 1.1, 0.1)))
     assert critics.path_align_critic(model.MppiPathAlignCritic(), blocked) is None
@@ -247,7 +247,7 @@ def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest(
 
 
 @pytest.mark.parametrize(("mode", "weighed"), [(0, math.pi), (1, None), (2, math.pi)])
-def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, weighed: float | None) -> None:
+def test_path_angle_critic_allows_reversing_robots_to_face_backward(mode: int, weighed: float | None) -> None:
     turned = scene(along(0.0), pose=Pose2(0.0, 0.0, math.pi))
     back = integrate_velocities(along(0.0).astype(np.float32), math.pi, 0.1)
     turned = replace(turned, rollouts=back)
@@ -255,12 +255,12 @@ def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, we
     assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
 
 
-def test_prefer_forward_critic_counts_meters_driven_backward() -> None:
+def test_prefer_forward_critic_penalizes_distance_driven_backward() -> None:
     said = critics.prefer_forward_critic(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
     assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
 
 
-def test_velocity_deadband_critic_counts_what_velocities_fall_short_of_those_that_move_the_base() -> None:
+def test_velocity_deadband_critic_penalizes_velocities_below_the_deadband() -> None:
     spec = model.MppiVelocityDeadbandCritic(deadband_velocities=(0.2, 0.3, 0.4))
     said = critics.velocity_deadband_critic(spec, scene(along(0.05, -0.25, turn=-0.1)))
     assert said == pytest.approx([35.0 * (0.15 + 0.3), 35.0 * 0.3], rel=1e-5)

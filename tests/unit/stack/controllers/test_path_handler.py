@@ -27,7 +27,7 @@ def test_the_carrot_is_on_the_circle_around_the_robot_and_on_the_path() -> None:
     assert (x, y) == pytest.approx((1.013 + math.sqrt(0.25 - 0.04), 0.0), abs=1e-9)
 
 
-def test_at_the_end_the_carrot_is_the_end_or_beyond_it_if_asked() -> None:
+def test_carrot_at_the_end_is_the_end_or_interpolated_beyond_it() -> None:
     track = PathTracker(straight())
     pose = Pose2(3.8, 0.0, 0.0)
     track.locate(Pose2(1.4, 0.0))
@@ -37,7 +37,7 @@ def test_at_the_end_the_carrot_is_the_end_or_beyond_it_if_asked() -> None:
     assert track.carrot(pose, 0.5, beyond=True) == pytest.approx((4.3, 0.0))
 
 
-def test_the_place_never_moves_back() -> None:
+def test_position_on_the_path_never_moves_back() -> None:
     track = PathTracker(straight())
     track.locate(Pose2(1.0, 0.0))
     track.locate(Pose2(0.2, 0.0))
@@ -52,7 +52,7 @@ def test_a_path_that_crosses_itself_is_followed_in_its_order() -> None:
     assert track.remaining() == pytest.approx(2 * math.pi, abs=0.01)
 
 
-def test_nothing_beyond_a_cusp_is_looked_at_before_the_robot_is_there() -> None:
+def test_path_beyond_a_cusp_is_ignored_until_the_robot_reaches_it() -> None:
     track = PathTracker(there_and_back())
     track.locate(Pose2(0.8, 0.0))
     assert track.is_forward

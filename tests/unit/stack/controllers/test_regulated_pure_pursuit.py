@@ -39,17 +39,17 @@ def test_the_curvature_is_twice_the_offset_over_the_square_of_the_distance() -> 
     assert command.wz / command.vx == pytest.approx(2 * 0.2 / 0.6**2)
 
 
-def test_in_the_open_it_drives_at_the_desired_speed() -> None:
+def test_robot_in_free_space_drives_at_the_desired_speed() -> None:
     assert rpp(line(), desired_linear_vel=0.7).command(Pose2(1, 0, 0), Twist(), view_of(), FAR) == Twist(0.7)
 
 
-def test_a_bend_tighter_than_the_regulated_radius_is_driven_slower_in_proportion() -> None:
+def test_speed_is_proportional_to_curvature_radius_below_the_regulated_radius() -> None:
     command = rpp(line(y=0.3)).command(Pose2(1, 0, 0), Twist(), view_of(), FAR)
     radius = 0.6**2 / (2 * 0.3)
     assert command.vx == pytest.approx(0.5 * radius / 0.9)
 
 
-def test_near_a_wall_it_is_slower_in_proportion_but_not_below_the_minimum() -> None:
+def test_speed_near_a_wall_is_scaled_down_to_the_minimum() -> None:
     wall = view_of((-3.0, 0.42, 9.0, 0.6))
     row = round(0 / 0.05 + 4.0 / 0.05)
     near = float(wall.distance[row, 80])
@@ -66,7 +66,7 @@ def test_robot_slows_down_toward_the_end_of_the_path() -> None:
     assert command.vx == pytest.approx(0.5 * 0.3 / 0.6, rel=0.02)
 
 
-def test_a_path_that_begins_behind_is_turned_to_first_with_bounded_acceleration() -> None:
+def test_robot_first_turns_to_a_path_behind_it_with_bounded_acceleration() -> None:
     controller = rpp(line())
     command = controller.command(Pose2(1, 0, math.pi), Twist(), view_of(), FAR)
     assert command.vx == 0.0
@@ -84,7 +84,7 @@ def test_the_lookahead_grows_with_speed_between_its_bounds() -> None:
         assert command.wz / command.vx == pytest.approx(2 * 0.1 / reach**2)
 
 
-def test_before_an_obstacle_it_slows_down_and_then_fails() -> None:
+def test_robot_slows_down_before_an_obstacle_and_then_fails() -> None:
     wall = view_of((3.0, -4.0, 3.2, 4.0))
     controller = rpp(line(), use_cost_regulated_linear_velocity_scaling=False)
     speeds = []
@@ -98,14 +98,14 @@ def test_before_an_obstacle_it_slows_down_and_then_fails() -> None:
     assert 1.0 + 0.05 * len(speeds) < 3.0 - 0.22
 
 
-def test_at_the_goal_it_turns_to_the_goals_heading_and_stops_turning_there() -> None:
+def test_robot_at_the_goal_turns_to_its_heading_and_stops() -> None:
     goal = Goal("g", Pose2(2.0, 0.0, 1.0))
     controller = rpp(line(2.0))
     assert controller.command(Pose2(1.95, 0, 0), Twist(), view_of(), goal).wz > 0.0
     assert controller.command(Pose2(1.95, 0, 1.0), Twist(), view_of(), goal) == STOP
 
 
-def test_where_the_arc_to_the_carrot_would_cut_a_corner_a_nearer_carrot_keeps_to_the_path() -> None:
+def test_carrot_moves_nearer_if_the_arc_would_cut_a_corner() -> None:
     """The path goes ahead and then left around a pillar; the arc to a far carrot leads through it."""
     up = np.arange(0.05, 3.0, 0.05)
     corner = np.vstack((line(1.0), np.column_stack((np.full_like(up, 1.0), up, np.full_like(up, np.pi / 2)))))
@@ -119,7 +119,7 @@ def test_where_the_arc_to_the_carrot_would_cut_a_corner_a_nearer_carrot_keeps_to
     assert keeping.wz / keeping.vx < 0.4
 
 
-def test_a_robot_that_has_been_pushed_off_the_end_of_its_path_drives_back_as_it_came_and_does_not_creep() -> None:
+def test_robot_pushed_past_the_end_of_its_path_reverses_at_normal_speed() -> None:
     """A robot that moved out of the way at its goal has to drive 0.5 m again."""
     goal, controller = Goal("g", Pose2(2.0, 0.0)), rpp(line(2.0))
     controller.command(Pose2(1.95, 0.0, 0.0), Twist(0.1), view_of(), goal)

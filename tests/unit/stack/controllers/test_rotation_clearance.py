@@ -28,7 +28,7 @@ def room_of(robot: RobotModel) -> RotationClearance:
 
 
 @pytest.mark.parametrize(("gap", "room"), [(0.02, False), (0.20, True)])
-def test_a_turn_needs_room_for_the_corners_all_the_way_round(gap: float, room: bool) -> None:
+def test_turn_needs_space_for_the_corners_at_all_headings(gap: float, room: bool) -> None:
     corner = math.hypot(0.4, 0.2)
     beside = seen(Flatland(discs=[(0.0, corner + gap + 0.1, 0.1)]), LONG)
     assert room_of(LONG).has_room(0.5 * math.pi, HERE, beside) == room
@@ -46,7 +46,7 @@ def test_a_robot_that_touches_something_turns_away_from_it_and_not_into_it() -> 
     assert room_of(LONG).has_room(-0.3, HERE, at_the_front_left)
 
 
-def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
+def test_long_robot_in_a_slot_backs_out() -> None:
     turning, view = room_of(LONG), seen(SLOT, LONG)
     assert not turning.has_room(0.5 * math.pi, HERE, view)
     back = turning.backup_command(HERE, view)
@@ -57,14 +57,14 @@ def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_robot_that_is_blocked_behind_on_one_side_backs_out_in_a_bend_round_it(side: int) -> None:
+def test_robot_backs_out_along_an_arc_around_an_obstacle_behind_it(side: int) -> None:
     back = room_of(LONG).backup_command(HERE, seen(Flatland(discs=[(-0.5, side * 0.2, 0.05)]), LONG))
     assert back is not None
     assert back.vx < 0.0
     assert side * back.wz > 0.0
 
 
-def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
+def test_robot_with_a_wall_behind_it_does_not_back_out() -> None:
     closed = Flatland([*SLOT.boxes, (-0.6, -0.5, -0.5, 0.5)])
     assert room_of(LONG).backup_command(HERE, seen(closed, LONG)) is None
 

@@ -52,7 +52,7 @@ def speeds(view: CostmapView, path: np.ndarray, end: float, **options: object) -
 
 
 @pytest.mark.parametrize("half", [0.27, 0.32])
-def test_a_gap_is_entered_no_faster_than_the_room_beside_the_hull_asks_for(half: float) -> None:
+def test_speed_in_a_gap_is_limited_by_the_lateral_clearance(half: float) -> None:
     view = view_of((2.0, half, 2.4, 3.0), (2.0, -3.0, 2.4, -half))
     near = distance_at(view, 2.2, 0.0)
     slow = min(2.0 * near / 0.6, 0.25 + 10.0 * (near - 0.21))
@@ -64,7 +64,7 @@ def test_a_gap_is_entered_no_faster_than_the_room_beside_the_hull_asks_for(half:
     assert all(speed == 2.0 for x, speed in speeds(view, line, 1.0) if x < 0.8)
 
 
-def test_before_a_bend_it_is_as_slow_as_in_it() -> None:
+def test_speed_is_reduced_before_a_curve() -> None:
     path, open_ground = bent(0.6), view_of()
     options: dict[str, object] = {"regulated_linear_scaling_min_radius": 1.2}
     assert speeds(open_ground, path, 3.0, **options)[-1][1] == pytest.approx(1.0, abs=0.2)
@@ -72,7 +72,7 @@ def test_before_a_bend_it_is_as_slow_as_in_it() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.5, 0.8, 2.0])
-def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
+def test_curvature_of_a_circle_is_one_over_its_radius(radius: float) -> None:
     track = PathTracker(Path(bent(radius)))
     track.locate(Pose2(0.0, 0.0, 0.0))
     track.index = int(np.searchsorted(track.along, 3.2))
@@ -82,7 +82,7 @@ def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
     assert [abs(place - complex(3.0, radius)) for place in places] == pytest.approx([radius] * len(places))
 
 
-def test_on_a_straight_way_there_is_no_bend_and_beyond_a_piece_nothing() -> None:
+def test_straight_path_has_no_curvature_and_the_rest_is_ignored() -> None:
     x = np.concatenate((np.arange(0.0, 1.001, 0.05), np.arange(0.95, 0.19, -0.05)))
     track = PathTracker(Path(np.column_stack((x, np.zeros((len(x), 2))))))
     stations = list(track.samples_ahead(0.1, 5.0))

@@ -29,13 +29,13 @@ def strafed(driven: Drive) -> float:
 
 
 @pytest.mark.parametrize("controller", [DWB, MPPI], ids=["dwb", "mppi"])
-def test_an_omnidirectional_base_strafes_no_faster_than_it_can(controller: dict[str, Any]) -> None:
+def test_strafing_speed_of_an_omnidirectional_base_is_limited(controller: dict[str, Any]) -> None:
     driven = sideways(0.3, **controller)
     assert driven.result == "SUCCEEDED"
     assert 0.2 < strafed(driven) <= 0.3 + 1e-6
 
 
-def test_under_mppi_it_hardly_turns_on_the_way() -> None:
+def test_omnidirectional_base_hardly_turns_with_mppi() -> None:
     driven = sideways(0.5, **MPPI)
     assert max(abs(pose.yaw) for pose in driven.track) < 0.8
 

@@ -52,7 +52,7 @@ def test_distances_of_the_map_are_those_between_cell_centers() -> None:
     assert np.allclose(view.distance, full(lethal), atol=1e-6)
 
 
-def test_costmaps_of_one_map_tell_each_their_own_distances() -> None:
+def test_costmaps_of_one_map_have_independent_distances() -> None:
     grid = Flatland().room(8, 6).grid(BOUNDS)
     for radius in (0.1, 0.3, 0.1):
         robot, zone = round_robot(radius), ((4.0, 3.0), (4.5, 3.0), (4.5, 3.5))
@@ -99,7 +99,7 @@ def test_a_hit_is_marked_up_to_the_obstacle_range_and_not_beyond() -> None:
     assert at(map_, 6.92, 3.0)[0] == 0
 
 
-def test_an_obstacle_that_went_away_is_cleared_and_the_map_is_as_before() -> None:
+def test_removed_obstacle_is_cleared_and_the_map_restored() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
     before = map_.view.costs.copy(), map_.view.distance.copy()
@@ -131,7 +131,7 @@ def test_walls_of_the_map_are_never_cleared() -> None:
         (4.0, False, True),
     ],
 )
-def test_only_beams_that_say_something_clear(ranges: float, inf_is_valid: bool, cleared: bool) -> None:
+def test_only_valid_beams_clear_cells(ranges: float, inf_is_valid: bool, cleared: bool) -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world, Spec(inf_is_valid=inf_is_valid))
     world.discs.append((4.0, 3.0, 0.1))
@@ -152,7 +152,7 @@ def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
     assert at(map_, 3.92, 3.0)[0] == 254
 
 
-def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once() -> None:
+def test_incrementally_updated_distances_equal_a_full_computation() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
     walls, rng = np.count_nonzero(map_.view.costs == 254), np.random.default_rng(5)
@@ -165,7 +165,7 @@ def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once()
 
 
 @pytest.mark.parametrize("group", [1, 3])
-def test_where_nothing_has_changed_near_distances_are_those_of_before(group: int) -> None:
+def test_distances_far_from_changes_are_unchanged(group: int) -> None:
     world, spec = Flatland().room(8, 6), Spec(denoise_layer={"enabled": group > 1, "minimal_group_size": group})
     map_, told, rng = costmap(world, spec), [], np.random.default_rng(5)
     places = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
@@ -183,7 +183,7 @@ def test_where_nothing_has_changed_near_distances_are_those_of_before(group: int
     assert not map_.changed_near(map_.revision, places, 0.4)
 
 
-def test_whatever_changes_all_of_it_has_changed_it_near_every_place() -> None:
+def test_change_of_the_whole_costmap_is_a_change_near_every_point() -> None:
     map_, place = costmap(Flatland().room(8, 6)), np.array([4.0 + 3.0j])
     for change in (map_.clear, lambda: map_.set_zones(Zones((((1, 1), (2, 1), (2, 2)),)))):
         revision = map_.revision
@@ -192,7 +192,7 @@ def test_whatever_changes_all_of_it_has_changed_it_near_every_place() -> None:
         assert not map_.changed_near(map_.revision, place, 0.1)
 
 
-def test_a_rolling_window_follows_the_robot_and_keeps_what_it_saw() -> None:
+def test_rolling_window_follows_the_robot_and_keeps_its_obstacles() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     world = Flatland(discs=[(2.0, 0.5, 0.1)])
     map_.update(Pose2(0.0, 0.0), scan_of(world, Pose2(0.0, 0.0)))
@@ -216,7 +216,7 @@ def test_keepout_zones_are_walls() -> None:
     assert at(map_, 2.87, 3.0)[0] == 253
 
 
-def test_clearing_forgets_what_is_not_seen_any_more_and_keeps_what_is() -> None:
+def test_clearing_removes_unseen_obstacles_and_keeps_visible_ones() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
     world.discs.append((4.0, 3.0, 0.1))
@@ -229,7 +229,7 @@ def test_clearing_forgets_what_is_not_seen_any_more_and_keeps_what_is() -> None:
 
 
 @pytest.mark.parametrize("within", [math.inf, 3.0])
-def test_clearing_keeps_what_stands_close_behind_the_robot_where_no_lidar_looks(within: float) -> None:
+def test_clearing_keeps_near_obstacles_outside_the_field_of_view(within: float) -> None:
     world = Flatland([], [(3.3, 3.0, 0.1), (1.4, 3.0, 0.1), (3.0, 3.6, 0.1)]).room(8, 6)
     map_ = costmap(Flatland().room(8, 6))
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
@@ -255,7 +255,7 @@ def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
     assert at(map_, 1.48, 3.0)[0] == 254
 
 
-def test_clearing_around_the_robot_keeps_what_was_seen_farther_off() -> None:
+def test_clearing_around_the_robot_keeps_distant_obstacles() -> None:
     world = Flatland([], [(4.0, 3.0, 0.1), (2.0, 4.2, 0.1)]).room(8, 6)
     map_ = costmap(Flatland().room(8, 6))
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
@@ -276,7 +276,7 @@ def test_cells_under_the_robot_are_free() -> None:
     assert at(map_, 2.2, 3.0)[0] != 254
 
 
-def test_the_revision_grows_when_something_changed() -> None:
+def test_revision_increases_with_each_change() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
     before = map_.view.revision
@@ -290,7 +290,7 @@ def test_the_revision_grows_when_something_changed() -> None:
 ZONES = (((3.0, 2.0), (5.0, 2.0), (5.0, 4.0), (3.0, 4.0)),)
 
 
-def test_zones_that_are_switched_on_make_the_costmap_that_has_them_from_the_start_and_off_again_the_old_one() -> None:
+def test_switched_zones_give_the_costmaps_with_and_without_them() -> None:
     world = Flatland().room(8, 6)
     plain, zoned, switched = costmap(world), costmap(world, keepout=ZONES), costmap(world)
     world.discs = [(2.0, 3.0, 0.2)]
@@ -308,7 +308,7 @@ def test_zones_that_are_switched_on_make_the_costmap_that_has_them_from_the_star
     assert switched.obstacle_cell_count == cells
 
 
-def test_zones_are_switched_in_a_window_that_rolls() -> None:
+def test_zones_can_be_switched_in_a_rolling_window() -> None:
     map_ = costmap(None, Spec(rolling_size=6.0, track_unknown_space=False))
     map_.set_zones(Zones(keepout=(((1.0, 0.5), (2.0, 0.5), (2.0, 1.5), (1.0, 1.5)),)))
     assert at(map_, 1.5, 1.0)[0] == 254
@@ -327,7 +327,7 @@ def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
 
 
 @pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # the second is as far as distances are told
-def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has(inflation_radius: float) -> None:
+def test_beam_through_unknown_space_makes_it_known(inflation_radius: float) -> None:
     world = Flatland().room(8, 6)
     spec = Spec(inflation_radius=inflation_radius)
     known = costmap(world, spec)
@@ -342,7 +342,7 @@ def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has(
     assert at(map_, 4.0, 5.0)[0] == 255  # out of reach
 
 
-def test_a_window_that_rolls_goes_on_knowing_what_it_knew() -> None:
+def test_rolling_window_keeps_known_cells() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     map_.update(Pose2(0.0, 0.0), scan_of(Flatland(), Pose2(0.0, 0.0)))
     map_.update(Pose2(1.5, 0.0), scan_of(Flatland(), Pose2(1.5, 0.0)))

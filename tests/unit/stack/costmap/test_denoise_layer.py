@@ -44,7 +44,7 @@ def test_groups_of_fewer_cells_are_left_out(size: int, connectivity: int, left: 
     assert not (kept & ~MARKED).any()
 
 
-def test_a_cell_beside_a_wall_is_part_of_it() -> None:
+def test_cell_next_to_a_wall_belongs_to_its_group() -> None:
     walls = NO_WALLS.copy()
     walls[3, :] = True
     kept = remove_small_groups(MARKED, walls, DenoiseLayer(enabled=True, minimal_group_size=8))

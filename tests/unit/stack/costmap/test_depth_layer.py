@@ -62,7 +62,7 @@ def test_obstacles_below_and_above_the_scan_plane_are_marked(thing: Slab) -> Non
     assert points[:, 1].max() == pytest.approx(0.3, abs=0.08)
 
 
-def test_the_ground_is_no_obstacle_nor_is_what_hangs_higher_than_the_robot() -> None:
+def test_ground_and_objects_above_the_robot_are_not_obstacles() -> None:
     map_ = costmap(max_obstacle_height=0.4)
     map_.update(Pose2(0.0, 0.0), image(LAMP))
     assert not len(lethal(map_))
@@ -80,7 +80,7 @@ def test_camera_clears_free_space() -> None:
     assert not len(lethal(_seen(map_)))
 
 
-def test_looking_over_a_low_box_at_a_wall_behind_it_does_not_clear_the_box() -> None:
+def test_camera_rays_above_a_low_box_do_not_clear_it() -> None:
     wall = (2.2, -1.0, 1.0, 0.0, 2.0)
     map_ = _seen(costmap(), LOW_BOX)
     before = {tuple(p) for p in np.round(lethal(map_), 3)}
@@ -89,7 +89,7 @@ def test_looking_over_a_low_box_at_a_wall_behind_it_does_not_clear_the_box() -> 
     assert any(x > 2.1 for x, _ in after)
 
 
-def test_a_lidar_that_sees_nothing_there_does_not_clear_what_a_camera_saw_below_it() -> None:
+def test_lidar_does_not_clear_obstacles_that_a_camera_saw_below_it() -> None:
     map_ = _seen(costmap(), LOW_BOX)
     before = lethal(map_)
     nothing = np.full(360, np.inf)

@@ -61,7 +61,7 @@ def test_a_ramp_ahead_is_ground(mount: Pose3, degrees: float, start: float) -> N
 
 
 @pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
-def test_the_ground_that_rises_where_a_slope_ends_is_ground(mount: Pose3) -> None:
+def test_rising_ground_at_the_end_of_a_slope_is_ground(mount: Pose3) -> None:
     """A robot that drives down sees the level ground rise ahead of it; one that drives up sees it fall away."""
     assert not len(marked(((-1.0, 0.0), (0.8, 0.0), (9.0, 8.2 * math.tan(0.14))), mount))
     assert not len(marked(((-1.0, 0.0), (0.8, 0.0), (9.0, -8.2 * math.tan(0.14))), mount))
@@ -86,7 +86,7 @@ def test_pitch_of_the_robot_counts_as_slope(mount: Pose3) -> None:
 @pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
 @pytest.mark.parametrize("away", [0.8, 1.3])
 @pytest.mark.parametrize("height", [0.1, 0.15])
-def test_a_kerb_is_an_obstacle_with_level_ground_behind_it(mount: Pose3, away: float, height: float) -> None:
+def test_curb_is_an_obstacle_with_level_ground_behind_it(mount: Pose3, away: float, height: float) -> None:
     seen = marked(((-1.0, 0.0), (away, 0.0), (away, height), (9.0, height)), mount)
     assert away - 0.06 < seen.min() < away + 0.15  # the level camera sees no ground nearer than 1.1 m
 
@@ -99,11 +99,11 @@ def test_object_on_a_ramp_or_steep_surface_is_an_obstacle() -> None:
     assert len(marked(ramp(20, 0.8), LEVEL))
 
 
-def test_without_a_slope_that_is_ground_all_that_is_higher_is_marked_as_in_nav2() -> None:
+def test_without_slope_parameter_all_higher_points_are_marked_as_in_nav2() -> None:
     assert len(marked(ramp(5, 1.0), LEVEL, max_ground_slope=0.0))
 
 
-def test_a_short_ramp_that_was_seen_from_afar_stays_ground_when_all_of_it_is_too_near_to_be_seen() -> None:
+def test_short_ramp_seen_from_afar_remains_ground_below_the_minimum_range() -> None:
     """And a step as high, which nobody saw before, is an obstacle."""
     map_ = LayeredCostmap(
         Spec(rolling_size=8.0, track_unknown_space=False), Surroundings(round_robot(), None, TICK_RATE_HZ)
@@ -114,7 +114,7 @@ def test_a_short_ramp_that_was_seen_from_afar_stays_ground_when_all_of_it_is_too
     assert len(marked(ramp(8, 0.3, 0.08), LEVEL))
 
 
-def test_a_box_whose_foot_is_below_the_picture_is_an_obstacle() -> None:
+def test_box_whose_base_is_below_the_image_is_an_obstacle() -> None:
     box = ((-1.0, 0.0), (0.95, 0.0), (0.95, 0.13), (1.05, 0.13), (1.05, 0.0), (9.0, 0.0))
     seen = marked(box, LEVEL)
     assert seen.min() == pytest.approx(0.95, abs=0.06)

@@ -25,7 +25,7 @@ def walked(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("beams", [36, 720])
-def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int) -> None:
+def test_crossed_cells_equal_those_of_fine_steps_along_the_beams(beams: int) -> None:
     spec, base = Spec(), Pose2(0.31, -0.22, 0.7)
     step = 2 * math.pi / beams
     scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))

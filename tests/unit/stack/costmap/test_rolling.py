@@ -12,13 +12,13 @@ def test_windows_around_different_points_share_their_cells() -> None:
     assert one.shape == (160, 160)
 
 
-def test_the_window_follows_a_robot_that_is_an_eighth_of_its_size_off_the_middle() -> None:
+def test_window_moves_when_the_robot_is_an_eighth_of_its_size_off_center() -> None:
     frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
     assert not should_roll(frame, Pose2(0.9, -0.9))
     assert should_roll(frame, Pose2(0.0, 1.1))
 
 
-def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
+def test_marks_keep_their_position_and_are_lost_outside_the_window() -> None:
     before, now = window_around(Pose2(0, 0), (8.0, 8.0), 0.05), window_around(Pose2(3, 0), (8.0, 8.0), 0.05)
     marks = np.zeros(before.shape, dtype=bool)
     cells = before.cells(np.array([[2.0, 1.0], [-3.0, 0.0]]))
@@ -28,7 +28,7 @@ def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
 
 
 @pytest.mark.parametrize("to", [Pose2(9, 0), Pose2(-9, 0), Pose2(0, 20), Pose2(-8, -8)])
-def test_of_a_window_that_shares_nothing_with_the_next_nothing_is_kept(to: Pose2) -> None:
+def test_disjoint_window_starts_empty(to: Pose2) -> None:
     before, now = window_around(Pose2(0, 0), (8.0, 8.0), 0.05), window_around(to, (8.0, 8.0), 0.05)
     assert np.isnan(shift_layer(np.ones(before.shape), before, now, np.nan)).all()
 
@@ -37,6 +37,6 @@ def test_of_a_window_that_shares_nothing_with_the_next_nothing_is_kept(to: Pose2
     ("goal", "aim"),
     [((1.0, 1.0), (1.0, 1.0)), ((10.0, 0.0), (3.4, 0.0)), ((8.0, 8.0), (3.4, 3.4)), ((0.0, -9.0), (0.0, -3.4))],
 )
-def test_a_goal_beyond_the_window_is_aimed_at_from_inside(goal: tuple[float, float], aim: tuple[float, float]) -> None:
+def test_goal_beyond_the_window_is_projected_into_it(goal: tuple[float, float], aim: tuple[float, float]) -> None:
     frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
     assert clip_goal(frame, Pose2(0, 0), Pose2(*goal))[:2] == pytest.approx(aim)

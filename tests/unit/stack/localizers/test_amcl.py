@@ -45,7 +45,7 @@ def moved(subject: Localizer, tick: int, step: Pose2, **changes: object) -> Beli
     return subject.belief
 
 
-def test_the_first_scan_corrects_although_nothing_has_moved() -> None:
+def test_first_scan_updates_without_motion() -> None:
     error = START.between(started().belief.pose)
     assert np.hypot(error.x, error.y) < 0.1
     assert abs(error.yaw) < 0.06
@@ -55,12 +55,12 @@ def test_the_first_scan_corrects_although_nothing_has_moved() -> None:
     ("step", "corrects"),
     [(Pose2(0.24, 0, 0.19), False), (Pose2(0.26, 0, 0), True), (Pose2(-0.2, 0.2, 0), True), (Pose2(0, 0, -0.21), True)],
 )
-def test_a_scan_corrects_only_after_enough_motion(step: Pose2, corrects: bool) -> None:
+def test_scan_updates_only_after_enough_motion(step: Pose2, corrects: bool) -> None:
     belief = moved(started(), 24, step)
     assert belief.updated == (24 if corrects else 0)
 
 
-def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:
+def test_pose_follows_odometry_with_growing_uncertainty_between_updates() -> None:
     subject = started()
     before = subject.belief
     subject.on_odometry(odometry(6, Pose2(0.1, 0.02, 0.05)))
@@ -71,7 +71,7 @@ def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -
     assert np.trace(after.covariance) > np.trace(before.covariance)
 
 
-def test_each_lidar_corrects_once_after_enough_motion() -> None:
+def test_each_lidar_updates_once_after_enough_motion() -> None:
     """As nav2_amcl, which keeps a flag for each laser."""
     subject, step = started(), Pose2(0.26, 0, 0)
     subject.on_scan(replace(seen(START, 0), sensor="rear"))
@@ -95,7 +95,7 @@ def test_a_scan_waits_for_the_odometry_of_its_tick() -> None:
     assert np.array_equal(late.belief.particles, expected.particles)
 
 
-def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> None:
+def test_late_scan_updates_the_pose_of_its_measurement() -> None:
     punctual, delayed = started(), started()
     steps = [(24, Pose2(0.3, 0, 0)), (48, Pose2(0.6, 0, 0.3))]
     for tick, step in steps:
@@ -107,14 +107,14 @@ def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> N
     assert delayed.belief.pose == pytest.approx(punctual.belief.pose)
 
 
-def test_scans_older_than_any_odometry_are_left_alone() -> None:
+def test_scans_older_than_all_odometry_are_ignored() -> None:
     subject = build_localizer(Amcl(), GUESS, 1)
     subject.on_odometry(odometry(100, Pose2(0, 0, 0)))
     subject.on_scan(seen(START, 50))
     assert subject.belief.updated == 0
 
 
-def test_the_particles_start_at_the_most_and_shrink_to_the_least_as_the_place_becomes_certain() -> None:
+def test_number_of_particles_decreases_from_maximum_to_minimum() -> None:
     spec = Amcl(min_particles=100, max_particles=3000, laser_model_type="likelihood_field_prob")
     subject = build_localizer(spec, GUESS, 1)
     assert len(subject.belief.particles) == 3000
@@ -132,11 +132,11 @@ def weights_after(spec: Amcl, updates: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("updates", "equal"), [(1, False), (2, False), (3, True), (4, False)])
-def test_resampling_happens_on_every_interval_only(updates: int, equal: bool) -> None:
+def test_resampling_happens_at_the_resample_interval(updates: int, equal: bool) -> None:
     assert (np.ptp(weights_after(Amcl(resample_interval=3), updates)) == 0) == equal
 
 
-def test_selective_resampling_waits_until_half_of_the_particles_carry_no_weight() -> None:
+def test_selective_resampling_waits_for_half_the_effective_particles() -> None:
     patient = weights_after(Amcl(selective_resampling=True, laser_model_type="likelihood_field"), 1)
     assert np.ptp(patient) > 0
     assert 1 / (patient @ patient) > len(patient) / 2
@@ -145,7 +145,7 @@ def test_selective_resampling_waits_until_half_of_the_particles_carry_no_weight(
 
 
 @pytest.mark.parametrize("ranges", [np.full(BEAMS, np.nan), np.full(BEAMS, np.inf), np.full(BEAMS, -3.0), np.empty(0)])
-def test_a_blind_lidar_moves_nothing_and_the_particles_spread_as_odometry_drifts(ranges: np.ndarray) -> None:
+def test_particles_spread_with_odometry_while_the_lidar_is_blind(ranges: np.ndarray) -> None:
     subject = started()
     for k in range(1, 20):
         subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0, 0)))
@@ -156,7 +156,7 @@ def test_a_blind_lidar_moves_nothing_and_the_particles_spread_as_odometry_drifts
     assert np.trace(blind.covariance) > 5 * np.trace(sighted.covariance)
 
 
-def test_a_scan_that_no_particle_can_explain_leaves_them_equally_likely() -> None:
+def test_scan_that_fits_no_particle_gives_equal_weights() -> None:
     """With z_rand = 0 and a narrow hit every particle off the walls has probability zero."""
     spec = Amcl(laser_model_type="likelihood_field_prob", z_rand=0.0, sigma_hit=0.01, recovery_alpha_slow=0.001,
                 recovery_alpha_fast=0.1)  # fmt: skip
@@ -168,7 +168,7 @@ def test_a_scan_that_no_particle_can_explain_leaves_them_equally_likely() -> Non
     assert np.ptp(belief.particles[:, 3]) == 0
 
 
-def test_weights_that_vanish_between_two_draws_are_made_equal_again() -> None:
+def test_vanishing_weights_become_equal() -> None:
     """Sixty sure beams and a hundred scans between two draws leave less than the smallest number."""
     spec = Amcl(laser_model_type="likelihood_field_prob", z_rand=1e-6, sigma_hit=0.02, resample_interval=100)
     subject = started(spec)
@@ -188,13 +188,13 @@ def test_a_reset_starts_over_at_the_next_odometry() -> None:
     assert subject.belief.pose == pytest.approx((1, 1, 1))
 
 
-def test_without_an_estimate_the_particles_lie_all_over_the_free_space() -> None:
+def test_particles_cover_the_free_space_without_an_estimate() -> None:
     belief = build_localizer(Amcl(), Estimate(None), 1).belief
     assert (grid().values_at(belief.particles[:, :2]) == 0).all()
     assert np.sqrt(np.diag(belief.covariance)).min() > 1
 
 
-def test_a_map_that_is_turned_changes_nothing() -> None:
+def test_rotated_map_gives_the_same_result() -> None:
     """Cell borders fall differently, so a little differs; the place does not."""
     straight, turn = surroundings().map, Pose2(3.0, -2.0, 0.7)
     assert straight is not None
@@ -209,7 +209,7 @@ def test_a_map_that_is_turned_changes_nothing() -> None:
 
 @pytest.mark.parametrize("kind", ["likelihood_field", "likelihood_field_prob", "beam"])
 @pytest.mark.parametrize("farthest", [-1.0, 0.0])
-def test_no_greatest_range_is_the_lidars_own(kind: str, farthest: float) -> None:
+def test_unset_maximum_range_is_that_of_the_lidar(kind: str, farthest: float) -> None:
     """As in nav2_amcl, where only what is above zero cuts ranges."""
     usual, subject = (
         started(Amcl.model_validate({"laser_model_type": kind, "max_particles": 100, "min_particles": 20, **said}))
@@ -219,7 +219,7 @@ def test_no_greatest_range_is_the_lidars_own(kind: str, farthest: float) -> None
     assert moved(subject, 24, Pose2(0.3, 0, 0)).pose == moved(usual, 24, Pose2(0.3, 0, 0)).pose
 
 
-def test_a_standard_deviation_of_nothing_is_not_accepted() -> None:
+def test_zero_standard_deviation_is_refused() -> None:
     """Its square would be zero, which is a singular covariance."""
     with pytest.raises(ValidationError, match="sigma_hit"):
         Amcl(sigma_hit=1e-30)

@@ -23,9 +23,7 @@ def test_a_drive_around_the_room_is_tracked_to_five_centimeters(spec: Amcl) -> N
     ("world", "circumstance", "seed"),
     [("warehouse", "short", 3), ("office", "crowded", 1), ("house coarse", "crowded", 3)],
 )
-def test_a_robot_that_knows_its_start_is_not_believed_a_meter_off_where_the_best_particle_was(
-    world: str, circumstance: str, seed: int
-) -> None:
+def test_estimate_with_known_start_does_not_jump_to_the_best_particle(world: str, circumstance: str, seed: int) -> None:
     """1.45, 1.51 and 2.32 m with the mean of the particles near the best one, for a beat or two each time."""
     wrong = position_errors(case(world, circumstance, "likelihood_field", seed))
     assert wrong.max() < 0.6
@@ -43,12 +41,12 @@ def test_robot_without_initial_pose_localizes() -> None:
     assert measure.global_start(measure.MANY, SEEDS[:3]).found.all()
 
 
-def test_recovery_leaves_a_robot_alone_that_knows_where_it_is() -> None:
+def test_recovery_does_not_disturb_a_localized_robot() -> None:
     assert measure.tracking(measure.RECOVERING, SEEDS[:1], 60.0).rmse.max() <= 0.05
 
 
 @pytest.mark.slow
-def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a_good_cloud_away() -> None:
+def test_recovery_keeps_good_particles_despite_people_furniture_and_slip() -> None:
     """Scans are hard to explain, but the robot is not lost; averages of the likelihood itself made it 6 m wrong."""
     assert measure.among_people(measure.RECOVERING_PROB, SEEDS_AMONG_PEOPLE, 40.0).max() <= 0.6
     assert measure.among_people(measure.RECOVERING, SEEDS_AMONG_PEOPLE, 40.0).max() <= 1.5
@@ -56,7 +54,7 @@ def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a
 
 @pytest.mark.slow
 @pytest.mark.parametrize("world", ["clutter", "pillars"])
-def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(world: str) -> None:
+def test_random_particles_of_recovery_do_not_disperse_good_particles(world: str) -> None:
     """Errors of 5 and 16 m when as large a share as the averages asked for went anywhere with each scan, of 2.3 m in
     the former when a twentieth did, and went on straying: 80 % of the particles after ten seconds.
     """
@@ -69,7 +67,7 @@ def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without(is_quick: 
     assert not measure.kidnapping(measure.PROB, SEEDS[:1]).found.any()
 
 
-def test_a_filter_tuned_to_its_sensors_is_about_as_wrong_as_it_says() -> None:
+def test_tuned_filter_is_nearly_consistent() -> None:
     """3 would be exact. It is not, place by place: the map's cells err by the same half a cell in every run."""
     assert 1.0 < measure.tracking(measure.TUNED, SEEDS, 60.0).anees.mean() < 5.0
 

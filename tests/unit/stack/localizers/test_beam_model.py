@@ -23,7 +23,7 @@ def stepped(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> flo
 
 
 @pytest.mark.parametrize("limit", [12.0, 2.0])
-def test_rays_end_where_steps_of_a_millimeter_end(limit: float) -> None:
+def test_rays_equal_steps_of_a_millimeter(limit: float) -> None:
     field = opaque_field(grid(), 100.0)
     beams = select_beams(scan(np.full(BEAMS, 1.0), mount=MOUNT), 40, -1, limit)
     poses = drive(60.0).truth[::400]
@@ -44,7 +44,7 @@ def test_unknown_cells_and_the_end_of_the_map_stop_a_ray() -> None:
     assert [backward, right, forward, left] == pytest.approx([0.55, 0.35, 0.95, 0.65], abs=0.051)
 
 
-def test_a_particle_off_the_map_sees_nothing_but_the_end_of_its_nose() -> None:
+def test_particle_outside_the_map_has_zero_ranges() -> None:
     beams = select_beams(scan(np.full(4, 1.0)), 60, -1, 100)
     assert (cast_rays(opaque_field(grid(), 100.0), np.array([[50.0, 1e6, 0.0]]), beams) == 0).all()
 

@@ -11,27 +11,27 @@ inf, nan = np.inf, np.nan
 
 
 @pytest.mark.parametrize("given", [1, 2, 59, 60, 61, 360, 719, 720])
-def test_at_most_the_wanted_number_of_beams_is_used_and_at_least_half_of_it(given: int) -> None:
+def test_number_of_used_beams_is_between_half_and_the_whole_maximum(given: int) -> None:
     count = len(select_beams(scan(np.full(given, 2.0)), 60, -1, 100).ranges)
     assert min(given, 30) <= count <= 60
 
 
-def test_nan_is_left_out_and_everything_out_of_range_counts_as_maximal() -> None:
+def test_nan_is_ignored_and_out_of_range_is_the_maximum() -> None:
     beams = select_beams(scan(np.array([nan, inf, -inf, -1.0, 0.01, 3.0, 12.0, 15.0])), 60, -1, 100)
     assert beams.ranges.tolist() == [12, 12, 12, 12, 3, 12, 12]
 
 
-def test_the_narrower_of_the_lidars_and_the_filters_limits_holds() -> None:
+def test_narrower_limits_of_lidar_and_filter_apply() -> None:
     beams = select_beams(scan(np.array([0.2, 0.4, 4.0, 6.0])), 60, 0.3, 5.0)
     assert beams.ranges.tolist() == [5, 0.4, 4, 5]
     assert beams.range_max == 5
 
 
-def test_ends_are_the_points_that_the_lidar_hit_in_the_base_frame() -> None:
+def test_beam_ends_are_hit_points_in_the_base_frame() -> None:
     seen = scan(np.array([1.0, inf, 2.5, nan, 0.7, 3.0]), mount=Pose2(0.2, -0.1, 0.8))
     assert np.allclose(select_beams(seen, 60, -1, 100).ends.view(np.float64).reshape(-1, 2), seen.points())
 
 
-def test_a_scan_without_beams_has_no_ends() -> None:
+def test_scan_without_beams_has_no_beam_ends() -> None:
     beams = select_beams(scan(np.array([nan])), 60, -1, 100)
     assert beams.ends.shape == (0,)

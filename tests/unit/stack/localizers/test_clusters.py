@@ -28,7 +28,7 @@ def group(pose: Pose2, std: float, count: int, seed: int) -> Array:
 
 
 @pytest.mark.parametrize("yaw", [0.3, np.pi])
-def test_a_narrow_group_is_summed_up_as_any_other(yaw: float) -> None:
+def test_narrow_cluster_is_summarized_like_others(yaw: float) -> None:
     """By one product of all that is to be summed up: as on the circle to a microradian."""
     poses = group(Pose2(-20, 30, yaw), 0.02, 500, 5)
     poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
@@ -43,7 +43,7 @@ def test_a_narrow_group_is_summed_up_as_any_other(yaw: float) -> None:
     assert np.array_equal(covariance, covariance.T)
 
 
-def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_other() -> None:
+def test_pose_is_that_of_the_heaviest_cluster_with_covariance_of_all() -> None:
     poses = np.concatenate((group(Pose2(0, 0, 1), 0.02, 300, 1), group(Pose2(4, 0, 1), 0.02, 700, 2)))
     weights = np.concatenate((np.full(300, 0.6 / 300), np.full(700, 0.4 / 700)))
     pose, covariance = summarize(Particles(poses, weights))
@@ -51,7 +51,7 @@ def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_othe
     assert covariance[0, 0] == pytest.approx(0.4 * 16, rel=0.01)
 
 
-def test_a_pose_is_not_averaged_across_the_cut_of_the_circle_to_its_opposite() -> None:
+def test_mean_heading_near_pi_is_not_zero() -> None:
     poses = group(Pose2(1, 2, np.pi), 0.03, 400, 3)
     poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
     pose, covariance = summarize(Particles.with_equal_weights(poses))
@@ -81,7 +81,7 @@ def between_two(far: float, heavier: float, peak_power: float, inside: tuple[flo
 
 
 @pytest.mark.parametrize("peak_power", [1.0, 2.0, 16.0])
-def test_a_tail_of_lighter_particles_draws_the_pose_as_far_as_the_power_of_their_weights(peak_power: float) -> None:
+def test_light_tail_shifts_the_pose_by_its_powered_weights(peak_power: float) -> None:
     poses = np.concatenate((group(Pose2(0, 0, 0), 0.03, 300, 6), group(Pose2(0.6, 0, 0), 0.1, 300, 7)))
     weights = np.repeat([1.3, 1.0], 300)
     pose, _ = summarize(Particles(poses, weights / weights.sum()), peak_power)
@@ -94,7 +94,7 @@ def wide(count: int = 2000, width: float = 3.0) -> Array:
     return drawn
 
 
-def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_best_by_a_hair() -> None:
+def test_pose_of_a_wide_uniform_cloud_is_its_center() -> None:
     poses = wide()
     for best in (3, 1500):
         weights = np.ones(len(poses))
@@ -105,7 +105,7 @@ def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_bes
 
 
 @pytest.mark.parametrize("peak_power", [1.0, 16.0])
-def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_clouds_width(peak_power: float) -> None:
+def test_small_weight_changes_move_the_pose_proportionally(peak_power: float) -> None:
     """So there is no jump without a scan that says so."""
     poses, rng = wide(), np.random.default_rng(9)
     weights = rng.uniform(1, 3, len(poses))
@@ -115,7 +115,7 @@ def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_c
     assert before.distance(after) < 0.001 * peak_power * 3
 
 
-def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_without_a_jump() -> None:
+def test_pose_moves_continuously_between_two_groups_of_a_cluster() -> None:
     poses = np.concatenate((group(Pose2(0, 0, 0), 0.05, 500, 10), group(Pose2(0.7, 0, 0), 0.05, 500, 11)))
     found, heavier = [], np.geomspace(0.6, 1.7, 81)
     for times in heavier:
@@ -128,7 +128,7 @@ def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_withou
 
 
 @pytest.mark.parametrize("peak_power", [1.0, 16.0])
-def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak_power: float) -> None:
+def test_pose_of_a_narrow_cloud_is_at_its_highest_weights(peak_power: float) -> None:
     """Weights fall off as a normal distribution does, which any power leaves where it is."""
     poses = np.random.default_rng(12).uniform((-0.2, -0.2, -0.1), (0.2, 0.2, 0.1), (4000, 3))
     weights = np.exp(-0.5 * (np.square(poses - (0.05, -0.03, 0.02)) / 0.03**2).sum(axis=1))
@@ -136,7 +136,7 @@ def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak_power:
     assert pose == pytest.approx((0.05, -0.03, 0.02), abs=0.005)
 
 
-def test_a_single_particle_is_the_answer() -> None:
+def test_pose_of_a_single_particle_is_its_pose() -> None:
     pose, covariance = summarize(Particles.with_equal_weights(np.array([[1.0, 2.0, 3.0]])))
     assert pose == pytest.approx((1, 2, 3))
     assert not covariance.any()

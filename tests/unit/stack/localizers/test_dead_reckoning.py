@@ -14,14 +14,14 @@ SPEC = OdometryOnly(type="odometry")
 SILENT = Noise(translation=0, rotation=0, drift=0)
 
 
-def test_without_noise_it_is_exact_and_its_correction_never_changes() -> None:
+def test_odometry_localizer_without_noise_is_exact() -> None:
     way = drive(30.0)
     beliefs = run_localizer(build_localizer(SPEC, Estimate(Pose2(*way.truth[0])), 1), way, 1, SILENT)
     assert np.abs(pose_errors(beliefs, way.truth)).max() < 1e-9
     assert len({belief.map_from_odom for belief in beliefs}) == 1
 
 
-def test_the_error_stays_within_what_it_admits() -> None:
+def test_error_stays_within_the_covariance() -> None:
     """Its noise is the EKF's default, twice that of our wheels."""
     way = drive(30.0)
     for seed in range(5):
@@ -36,7 +36,7 @@ def test_the_first_odometry_is_the_reference_and_not_a_step() -> None:
     assert subject.belief.map_from_odom.compose(Pose2(5, 5, 1)) == pytest.approx((1, 2, 0))
 
 
-def test_an_unknown_start_is_the_origin_with_an_uncertainty_that_says_so() -> None:
+def test_unknown_start_is_the_origin_with_a_large_covariance() -> None:
     belief = build_localizer(SPEC, Estimate(None), 1).belief
     assert belief.pose == Pose2(0, 0, 0)
     assert np.sqrt(np.diag(belief.covariance)) == pytest.approx((100, 100, np.pi / np.sqrt(3)))

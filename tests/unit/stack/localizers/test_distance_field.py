@@ -26,14 +26,14 @@ def test_distances_are_those_between_cell_centers(seed: int) -> None:
     assert np.allclose(inner.ravel(), np.minimum(exact, 0.5))
 
 
-def test_a_map_without_obstacles_is_far_from_everything() -> None:
+def test_distances_without_obstacles_are_at_the_maximum() -> None:
     grid = OccupancyGrid(np.zeros((4, 5), dtype=np.int8), 0.1)
     assert (DistanceField(grid, grid.cells == OCCUPIED, 2.0, walled=False).table == 2).all()
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 9), st.floats(-3, 3), st.floats(-1e9, 1e9), st.floats(-4, 4), st.floats(-4, 4), st.floats(-4, 4))
-def test_a_point_finds_the_cell_it_is_in_or_the_border(
+def test_point_is_mapped_to_its_cell_or_the_border(
     seed: int, turned: float, far: float, x: float, y: float, yaw: float
 ) -> None:
     grid = some_grid(seed, Pose2(-1.3, 0.4, turned))

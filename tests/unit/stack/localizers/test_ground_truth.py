@@ -15,14 +15,14 @@ def said(subject: GroundTruthLocalizer, sensor: str, tick: int, pose: Pose2) -> 
     return subject.belief.pose
 
 
-def test_the_truth_is_believed_at_once_whatever_the_estimate_was() -> None:
+def test_ground_truth_replaces_any_estimate_at_once() -> None:
     subject = GroundTruthLocalizer(Estimate(Pose2(9, 9, 9)))
     assert said(subject, TRUTH, 0, Pose2(1, 2, 0.5)) == pytest.approx((1, 2, 0.5))
     assert np.linalg.cond(subject.belief.covariance) == 1
 
 
 @pytest.mark.parametrize("truth_first", [True, False])
-def test_the_truth_holds_in_whichever_order_the_readings_of_a_tick_come(truth_first: bool) -> None:
+def test_ground_truth_applies_in_any_order_of_readings(truth_first: bool) -> None:
     subject, true, drifted = GroundTruthLocalizer(Estimate(Pose2(0, 0, 0))), Pose2(1, 2, 0.5), Pose2(0.7, 0, 0.1)
     for tick in (0, 6, 12):
         true, drifted = true.compose(Pose2(0.1, 0, 0.02)), drifted.compose(Pose2(0.3, 0, 0.5))
@@ -33,14 +33,14 @@ def test_the_truth_holds_in_whichever_order_the_readings_of_a_tick_come(truth_fi
         assert subject.belief.map_from_odom.compose(drifted) == pytest.approx(true)
 
 
-def test_odometry_carries_the_truth_on_until_the_next() -> None:
+def test_pose_follows_odometry_between_ground_truth_readings() -> None:
     subject = GroundTruthLocalizer(Estimate(Pose2(0, 0, 0)))
     said(subject, "odom", 0, Pose2(5, 5, 0))
     said(subject, TRUTH, 0, Pose2(1, 2, np.pi / 2))
     assert said(subject, "odom", 6, Pose2(5.5, 5, 0)) == pytest.approx((1, 2.5, np.pi / 2))
 
 
-def test_without_any_truth_it_is_dead_reckoning() -> None:
+def test_without_ground_truth_it_is_dead_reckoning() -> None:
     subject = GroundTruthLocalizer(Estimate(Pose2(1, 1, 0)))
     assert said(subject, "odom", 0, Pose2(5, 5, 0)) == pytest.approx((1, 1, 0))
     assert said(subject, "odom", 6, Pose2(5.5, 5, 0)) == pytest.approx((1.5, 1, 0))

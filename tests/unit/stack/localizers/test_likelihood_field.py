@@ -58,7 +58,7 @@ def test_the_true_pose_is_likelier_than_poses_around_it() -> None:
         assert model.log_likelihood(np.array(POSE) + steps, beams, False).argmax() == steps.index((0, 0, 0))
 
 
-def test_the_inside_of_a_solid_is_no_place_for_a_beam_to_end() -> None:
+def test_beam_end_inside_a_solid_is_unlikely() -> None:
     solid = np.zeros((8, 9), dtype=np.bool_)
     solid[2:7, 3:8] = True
     solid[0, :] = True
@@ -67,7 +67,7 @@ def test_the_inside_of_a_solid_is_no_place_for_a_beam_to_end() -> None:
     assert found.sum() == 16 + 9
 
 
-def test_beams_that_hit_nothing_say_nothing() -> None:
+def test_beams_without_a_hit_have_no_effect() -> None:
     poses = np.random.default_rng(1).normal(POSE, 1.0, (20, 3))
     blind = select_beams(scan(np.full(BEAMS, np.inf)), 60, -1, 100)
     field = obstacle_field(grid(), 2.0)
@@ -82,7 +82,7 @@ def crowded() -> tuple[Beams, np.ndarray]:
     return select_beams(scan(ranges), 60, -1, 100), np.random.default_rng(2).normal(POSE, (0.05, 0.05, 0.03), (300, 3))
 
 
-def test_beam_skipping_leaves_out_what_few_particles_can_explain() -> None:
+def test_beam_skipping_ignores_beams_that_few_particles_explain() -> None:
     beams, poses = crowded()
     field, skipping = obstacle_field(grid(), 2.0), BeamSkipping(0.5, 0.3, 0.9)
     skipped = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, skipping).log_likelihood(poses, beams, True)
@@ -96,7 +96,7 @@ def test_beam_skipping_leaves_out_what_few_particles_can_explain() -> None:
     assert np.allclose(skipped, plain)
 
 
-def test_beam_skipping_waits_until_the_filter_has_converged_and_gives_up_when_too_much_is_wrong() -> None:
+def test_beam_skipping_needs_convergence_and_is_off_with_too_many_outliers() -> None:
     beams, poses = crowded()
     field = obstacle_field(grid(), 2.0)
     plain = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, beams, True)

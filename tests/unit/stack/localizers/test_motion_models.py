@@ -36,7 +36,7 @@ def test_differential_noise_has_the_variances_of_nav2(forward: float, turn_again
     assert np.var(local[:, 2]) == pytest.approx(heading_variance, rel=0.05)
 
 
-def test_driving_backward_is_as_noisy_as_driving_forward() -> None:
+def test_noise_is_equal_backward_and_forward() -> None:
     model = DifferentialMotionModel((0.01, 0.01, 0.01, 0.01))
     forward, backward = moved(model, Pose2(0.4, 0, 0.2)), moved(model, Pose2(-0.4, 0, 0.2))
     assert np.allclose(forward.std(axis=0), backward.std(axis=0), rtol=0.02)
@@ -67,7 +67,7 @@ def test_omni_noise_has_the_variances_of_nav2() -> None:
     "model", [DifferentialMotionModel((2e-4, 3e-4, 4e-4, 1e-4)), OmniMotionModel((2e-4, 3e-4, 4e-4, 1e-4, 5e-4))]
 )
 @pytest.mark.parametrize("delta", [Pose2(0.3, 0.1, 0.4), Pose2(-0.4, 0.05, -0.3), Pose2(0, 0, 0.9)])
-def test_the_carried_covariance_is_that_of_moved_particles(model: MotionModel, delta: Pose2) -> None:
+def test_propagated_covariance_equals_that_of_moved_particles(model: MotionModel, delta: Pose2) -> None:
     rng = np.random.default_rng(3)
     covariance = np.array([[4e-4, 1e-4, -5e-5], [1e-4, 3e-4, 2e-5], [-5e-5, 2e-5, 1e-4]])
     poses = model.sample(rng.multivariate_normal(START, covariance, MANY), delta, rng)
@@ -76,6 +76,6 @@ def test_the_carried_covariance_is_that_of_moved_particles(model: MotionModel, d
     assert np.allclose(np.cov(poses.T) / scale, carried / scale, atol=0.015)
 
 
-def test_headings_stay_on_the_circle() -> None:
+def test_headings_remain_wrapped() -> None:
     poses = moved(DifferentialMotionModel((0.2, 0.2, 0.2, 0.2)), Pose2(0, 0, 3.0))
     assert np.abs(poses[:, 2]).max() <= math.pi

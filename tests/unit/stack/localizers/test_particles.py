@@ -14,7 +14,7 @@ GRID = OccupancyGrid(
 )
 
 
-def test_anywhere_means_uniformly_over_the_free_cells_and_all_headings() -> None:
+def test_random_poses_are_uniform_over_free_cells_and_headings() -> None:
     poses = FreeSpace(GRID).draw(20_000, np.random.default_rng(1))
     cells = GRID.cell_of(poses[:, :2])
     counts = np.bincount(cells[:, 0] * 3 + cells[:, 1], minlength=6)
@@ -42,12 +42,12 @@ def test_particles_begin_around_the_estimate_with_its_standard_deviations() -> N
     assert np.abs(particles.poses[:, 2]).max() <= np.pi
 
 
-def test_the_effective_number_is_all_of_them_when_equal_and_one_when_one_has_it_all() -> None:
+def test_effective_number_is_between_one_and_all_particles() -> None:
     assert Particles.with_equal_weights(np.zeros((40, 3))).effective_count == pytest.approx(40)
     assert Particles(np.zeros((40, 3)), np.eye(40)[3]).effective_count == pytest.approx(1)
 
 
-def test_headings_on_both_sides_of_half_a_turn_are_near_to_each_other() -> None:
+def test_headings_on_both_sides_of_pi_are_close() -> None:
     poses = np.array([[0.0, 0.0, np.pi - 0.05], [0.1, 0.0, 0.02 - np.pi], [0.0, 0.3, np.pi - 0.01]])
     assert Particles.with_equal_weights(poses).extent == pytest.approx((0.1, 0.3, 0.07))
     around = np.array([[0.0, 0.0, heading] for heading in (-3.0, 0.0, 3.0)])

@@ -19,7 +19,7 @@ ANYWHERE = np.log(np.linspace(0.5, 1.5, 200))
 """Likelihoods of a scan at random places: one on average."""
 
 
-def test_a_drop_of_the_likelihood_below_that_of_other_places_asks_for_random_particles_until_it_is_made_up() -> None:
+def test_random_particles_are_added_while_other_poses_are_likelier() -> None:
     """Long after the start the averages are those of the book."""
     recovery, slow, fast = AugmentedMcl(0.01, 0.3), 6.0, 6.0
     for _ in range(3000):
@@ -35,7 +35,7 @@ def test_a_drop_of_the_likelihood_below_that_of_other_places_asks_for_random_par
     assert shares[-1] == 0
 
 
-def test_a_scan_that_is_hard_to_explain_anywhere_is_no_reason() -> None:
+def test_scan_that_fits_nowhere_adds_no_random_particles() -> None:
     recovery = AugmentedMcl(0.001, 0.1)
     for hard in [1.0] * 50 + [1e-3] * 50:
         recovery.observe(np.log(6.0 * hard), ANYWHERE + np.log(hard))
@@ -49,7 +49,7 @@ def test_scan_explained_better_than_elsewhere_adds_no_random_particles() -> None
         assert recovery.random_fraction == 0
 
 
-def test_no_more_particles_are_put_anywhere_than_the_sensor_model_bears() -> None:
+def test_share_of_random_particles_is_limited_by_the_sensor_model() -> None:
     free, bound = AugmentedMcl(0.001, 0.1), AugmentedMcl(0.001, 0.1, 0.01)
     for likelihood in [6.0] * 50 + [0.8] * 50:
         free.observe(np.log(likelihood), ANYWHERE)
@@ -58,7 +58,7 @@ def test_no_more_particles_are_put_anywhere_than_the_sensor_model_bears() -> Non
     assert free.random_fraction > 0.5
 
 
-def test_all_that_stray_are_at_most_what_a_few_scans_put_anywhere() -> None:
+def test_total_of_random_particles_is_limited() -> None:
     """A twentieth with each of many scans put eight of ten particles of a good cloud elsewhere within seconds."""
     recovery = AugmentedMcl(0.001, 0.1, 0.05)
     for likelihood in [6.0] * 50 + [0.8] * 50:

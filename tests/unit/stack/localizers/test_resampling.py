@@ -16,7 +16,7 @@ def weights(seed: int, count: int = 300) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_systematic_draws_what_filterpy_draws_from_the_same_number(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_systematic_resampling_equals_filterpy(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     offset = np.random.default_rng(seed).random()
     monkeypatch.setattr(filterpy_resampling, "random", lambda: offset)
     expected = filterpy_resampling.systematic_resample(weights(seed))
@@ -24,7 +24,7 @@ def test_systematic_draws_what_filterpy_draws_from_the_same_number(seed: int, mo
 
 
 @pytest.mark.parametrize("count", [1, 7, 300, 1000])
-def test_an_index_is_drawn_as_often_as_its_weight_says_rounded_either_way(count: int) -> None:
+def test_index_is_drawn_in_proportion_to_its_weight(count: int) -> None:
     drawn = np.bincount(systematic_resampling(weights(1), count, np.random.default_rng(1)), minlength=300)
     assert drawn.sum() == count
     assert (np.abs(drawn - count * weights(1)) < 1 + 1e-9).all()
@@ -46,7 +46,7 @@ def test_draws_follow_the_weights() -> None:
     assert stats.chisquare(drawn[likely], expected).pvalue > 1e-3
 
 
-def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
+def test_truncated_adaptive_draws_follow_the_weights() -> None:
     poses, rng = np.random.default_rng(1).uniform(-2, 2, (50, 3)), np.random.default_rng(2)
     given, bound = weights(6, 50), KldBound(0.05, 0.99, 100, 5000)
 
@@ -59,14 +59,14 @@ def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
     assert np.allclose(share, given, atol=0.001, rtol=0.02)
 
 
-def test_a_spread_out_set_keeps_more_particles_than_a_narrow_one() -> None:
+def test_wide_set_keeps_more_particles_than_a_narrow_one() -> None:
     rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 2000)
     sizes = [len(kld_sampling(lambda n, s=spread: rng.normal(0.2, s, (n, 3)), bound)) for spread in (0.01, 0.3, 0.8, 9)]
     assert sizes == sorted(sizes)
     assert (sizes[0], sizes[-1]) == (100, 2000)
 
 
-def test_the_number_kept_is_the_bound_of_the_bins_they_fill() -> None:
+def test_number_of_particles_is_the_bound_for_the_occupied_bins() -> None:
     rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 5000)
     kept = kld_sampling(lambda n: rng.normal(0, 0.5, (n, 3)), bound)
     assert len(kept) == pytest.approx(int(bound.samples(len(np.unique(bin_keys(kept))))), abs=1)

@@ -13,7 +13,7 @@ coordinates = st.integers(-2_000_000, 2_000_000)
 
 @pytest.mark.parametrize("z", [0.99, 2.326])
 @pytest.mark.parametrize("occupied", [3, 10, 50, 400, 3000])
-def test_the_bound_is_the_chi_square_quantile_it_stands_for(occupied: int, z: float) -> None:
+def test_kld_bound_equals_the_chi_square_quantile(occupied: int, z: float) -> None:
     """Fox (2003), equation 5: n = χ²(k-1, 1-δ) / 2ε, of which the bound is Wilson and Hilferty's approximation."""
     bound = KldBound(0.05, z, 1, 10**6)
     exact = stats.chi2.ppf(stats.norm.cdf(z), occupied - 1) / (2 * 0.05)
@@ -26,7 +26,7 @@ def test_the_bound_stays_between_its_limits_and_one_bin_needs_no_samples() -> No
 
 
 @given(coordinates, coordinates, st.integers(0, 35))
-def test_keys_stand_for_coordinates(x: int, y: int, yaw: int) -> None:
+def test_bin_keys_are_unique_per_coordinates(x: int, y: int, yaw: int) -> None:
     parts = decode_bins(encode_bins(*(np.array([part]) for part in (x, y, yaw))))
     assert [int(part[0]) for part in parts] == [x, y, yaw]
 
@@ -46,7 +46,7 @@ def test_headings_a_full_turn_apart_share_a_bin() -> None:
 
 @settings(max_examples=60)
 @given(st.lists(st.integers(0, 60), min_size=1, max_size=600), st.integers(1, 200))
-def test_enough_is_where_one_by_one_counting_stops(keys: list[int], least: int) -> None:
+def test_sufficient_number_equals_sequential_counting(keys: list[int], least: int) -> None:
     bound, seen, stop = KldBound(0.05, 0.99, least, 500), set(), None
     for count, key in enumerate(keys, 1):
         seen.add(key)

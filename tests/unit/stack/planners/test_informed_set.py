@@ -21,18 +21,18 @@ def ground(*boxes: tuple[float, float, float, float], radius: float = 0.22) -> T
 WALL = (4.9, 0.0, 5.0, 4.0)  # the way from (1, 1) to (9, 1) leads over its end, at (4.95, 4.22)
 
 
-def test_in_the_open_its_length_is_the_straight_distance_but_for_the_grid() -> None:
+def test_length_in_free_space_is_the_straight_distance() -> None:
     for goal in ((9.0, 1.0), (9.0, 5.0), (3.0, 5.0)):
         straight = math.dist((1.0, 1.0), goal)
         assert InformedSet(ground(), (1.0, 1.0), goal).length == pytest.approx(straight, rel=0.03, abs=0.2)
 
 
-def test_around_a_wall_its_length_is_that_of_the_way_around() -> None:
+def test_length_around_a_wall_is_that_of_the_detour() -> None:
     around = 2 * math.hypot(3.95, 3.22)
     assert InformedSet(ground(WALL), (1.0, 1.0), (9.0, 1.0)).length == pytest.approx(around, rel=0.05)
 
 
-def test_a_narrow_set_has_the_way_and_not_the_rooms_beside_it() -> None:
+def test_narrow_informed_set_contains_the_path_but_no_side_rooms() -> None:
     informed = InformedSet(ground(WALL), (1.0, 1.0), (9.0, 1.0))
     informed.restrict(0.05)
     assert informed.contains(4.95, 4.5)
@@ -43,14 +43,14 @@ def test_a_narrow_set_has_the_way_and_not_the_rooms_beside_it() -> None:
     assert informed.contains(1.0, 5.5)
 
 
-def test_no_way_has_no_length_and_a_thin_wall_is_not_leapt_over() -> None:
+def test_no_path_has_no_length_and_thin_walls_block() -> None:
     tested = ground((4.9, 0.0, 5.0, 6.0))
     assert math.isinf(InformedSet(tested, (1.0, 1.0), (9.0, 1.0)).length)
     slit = ground((4.9, 0.0, 5.0, 2.8), (4.9, 3.25, 5.0, 6.0), radius=0.25)
     assert math.isinf(InformedSet(slit, (1.0, 3.0), (9.0, 3.0)).length)
 
 
-def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> None:
+def test_informed_set_by_cost_contains_the_cheapest_path() -> None:
     tested = ground((4.9, 0.0, 5.0, 0.6), (4.9, 1.2, 5.0, 4.0))  # a narrow gap ahead, and roomy ground farther up
     tested.rates[(tested.rates > 1.0) & (tested.rates < math.inf)] *= 20.0
     informed = InformedSet(tested, (1.0, 1.0), (9.0, 1.0), by_cost=True)

@@ -76,7 +76,7 @@ def test_plans_are_within_ten_percent_of_the_shortest_path() -> None:
     assert max(ratios) < 1.20
 
 
-def test_the_plan_is_what_the_search_by_ompl_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plan_comes_from_the_ompl_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another search gives another plan: nothing before or after it decides the path."""
     view, detour = view_of(Flatland().room(14, 10)), [(2.0, 2.0), (3.0, 8.0), (11.0, 8.0), (12.0, 2.0)]
     ends = Pose2(2.0, 2.0), Pose2(12.0, 2.0)
@@ -86,14 +86,14 @@ def test_the_plan_is_what_the_search_by_ompl_finds(monkeypatch: pytest.MonkeyPat
     assert points == pytest.approx(densify(np.array(detour), SPACING_M))
 
 
-def test_a_plan_keeps_ten_centimeters_more_than_it_must_where_there_is_room() -> None:
+def test_plan_keeps_the_preferred_clearance_where_possible() -> None:
     view = view_of(house())
     path = planner().plan(view, Pose2(1, 1), Pose2(13, 9), 1)
     columns, rows = ((path.points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
     assert view.distance[rows.astype(int), columns.astype(int)].min() > 0.22 + 0.05
 
 
-def test_a_robot_that_stands_too_near_a_wall_gets_away_from_it() -> None:
+def test_plan_from_a_start_near_a_wall_leads_away_from_it() -> None:
     path = planner().plan(view_of(house()), Pose2(0.12, 1.0), Pose2(3.0, 1.0), 1)
     assert path.points[0, :2] == pytest.approx((0.12, 1.0))
 
@@ -131,7 +131,7 @@ def test_too_few_iterations_end_in_no_valid_path() -> None:
     assert failed.value.code == ErrorCode.NO_VALID_PATH
 
 
-def test_a_long_robot_takes_a_way_on_which_it_can_turn() -> None:
+def test_long_robot_takes_a_path_on_which_it_can_turn() -> None:
     world = Flatland().room(8, 6)
     world.boxes += [(4.0, 0.0, 4.1, 2.8), (4.0, 3.25, 4.1, 3.8)]  # a slit of 0.45 m ahead, a gap farther up
     path = planner(robot=box_robot()).plan(view_of(world, box_robot(), (8, 6)), Pose2(3, 3), Pose2(5, 3), 1)
@@ -146,7 +146,7 @@ def test_plan_uses_a_tight_gap_without_an_alternative() -> None:
 
 
 @pytest.mark.slow
-def test_a_way_of_hundreds_of_meters_through_many_doors_is_found() -> None:
+def test_path_of_hundreds_of_meters_through_many_doors_is_found() -> None:
     world = Flatland().room(60, 20)
     for k in range(1, 15):  # a serpentine: doors at the one end and at the other in turn
         low, high = (0.0, 18.6) if k % 2 else (1.4, 20.0)
@@ -171,7 +171,7 @@ def struck(view: CostmapView, points: np.ndarray) -> bool:
     return bool((view.distance[rows, columns] == 0.0).any())
 
 
-def test_a_way_that_is_too_tight_by_a_hair_is_not_smoothed_through_walls() -> None:
+def test_path_that_barely_fails_to_fit_is_not_smoothed_through_walls() -> None:
     view = hall((4.0, 0.0, 4.1, 6.0))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     way = np.array([(2.0, 2.0), (2.0, 6.15), (4.05, 6.15), (6.0, 6.15), (6.0, 2.0)])  # for a radius of 22 cm
@@ -218,7 +218,7 @@ def test_a_plan_leads_through_a_narrow_gap_if_there_is_no_other_path() -> None:
     assert plan_through(two_rooms(2 * ROBOT.inscribed_radius + 0.1, detour=False)) < 6.0
 
 
-def test_without_gap_clearance_any_gap_will_do() -> None:
+def test_any_gap_is_used_without_gap_clearance() -> None:
     assert plan_through(two_rooms(2 * ROBOT.inscribed_radius + 0.1), gap_clearance=0.0) < 6.0
 
 
@@ -230,7 +230,7 @@ def test_a_robot_in_a_narrow_gap_and_a_goal_beside_a_wall_are_planned_for() -> N
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("clearance", [0.03, 0.07, 0.2])
-def test_blocked_gaps_are_those_of_a_comparison_of_all_cells(clearance: float) -> None:
+def test_blocked_gaps_equal_brute_force(clearance: float) -> None:
     """A cell is blocked unless it, or a cell within the clearance, is farther from obstacles than needed."""
     rng = np.random.default_rng(3)
     world = Flatland().room(5, 5)

@@ -37,14 +37,14 @@ class Asked:
         return Path(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
 
 
-def test_a_small_costmap_is_looked_at_whole():
+def test_small_costmap_is_searched_completely():
     costs = np.zeros((1000, MAX_FULL_SEARCH_CELLS // 1000), dtype=np.uint8)
     small, asked = CostmapView(costs, costs.astype(np.float32), 0.05, (0.0, 0.0)), Asked(7.0)
     plan_in_windows(asked.plan, small, START, GOAL, 1)
     assert asked.views == [small]
 
 
-def test_a_way_that_is_shorter_than_any_that_leaves_the_window_is_taken():
+def test_path_in_the_window_is_used_if_no_outside_path_can_be_shorter():
     asked = Asked(20.0)
     assert plan_in_windows(asked.plan, hall(), START, GOAL, 1).length() == 20.0
     (view,) = asked.views
@@ -53,14 +53,14 @@ def test_a_way_that_is_shorter_than_any_that_leaves_the_window_is_taken():
 
 
 @pytest.mark.parametrize("first", [20.95, None])
-def test_a_longer_one_or_none_is_looked_for_in_a_larger_window_and_at_last_everywhere(first):
+def test_window_grows_up_to_the_whole_map_for_longer_or_missing_paths(first):
     """Over the window's upper side the shortest way is 2 · 10 m up and down, 6 m along: 20.88 m."""
     asked = Asked(first, 50.0, 50.0)
     assert plan_in_windows(asked.plan, hall(), START, GOAL, 1).length() == 50.0
     assert [view.costs.size for view in asked.views] == [400 * 520, EDGE * EDGE]
 
 
-def test_over_the_edge_of_the_map_no_way_leaves():
+def test_edge_of_the_map_needs_no_larger_window():
     """From the corner the window's upper side is the nearest that can be crossed: 7 + 10 m up and down again."""
     asked = Asked(19.9)
     assert plan_in_windows(asked.plan, hall(), Pose2(1.0, 1.0, 0.0), Pose2(1.0, 4.0, 0.0), 1).length() == 19.9
@@ -73,7 +73,7 @@ def test_missing_path_on_the_whole_costmap_fails():
     assert failure.value.code == ErrorCode.NO_VALID_PATH
 
 
-def test_an_end_off_the_map_is_reported_by_the_planner():
+def test_start_or_goal_outside_the_map_is_reported_by_the_planner():
     asked = Asked(None)
     with pytest.raises(NavigationFailure):
         plan_in_windows(asked.plan, hall(), START, Pose2(-3.0, 0.0, 0.0), 1)
@@ -81,7 +81,7 @@ def test_an_end_off_the_map_is_reported_by_the_planner():
 
 
 @pytest.mark.parametrize("wall", [60, 300])
-def test_the_way_around_a_wall_is_found_wherever_its_end_is(wall):
+def test_path_around_a_wall_is_found_for_any_gap(wall):
     """3 m to either side, within the window; 15 m, beyond it."""
     planner = MedialAxisPlanner(PlannerSpec(type="medial_axis"), round_robot())
     path = planner.plan(hall(wall), START, GOAL, seed=1)

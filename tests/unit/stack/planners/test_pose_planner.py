@@ -66,7 +66,7 @@ def test_a_holonomic_long_hull_is_led_away_sideways() -> None:
     assert touching[0] and not touching[int(np.argmin(touching)) :].any()
 
 
-def test_a_hull_that_is_shut_in_cannot_start() -> None:
+def test_enclosed_hull_cannot_start() -> None:
     stakes = ((2.65, 2.4, 2.7, 2.75), (2.65, 3.25, 2.7, 3.6), (3.3, 2.4, 3.35, 2.75), (3.3, 3.25, 3.35, 3.6))
     pocket = (*stakes, (2.45, 2.6, 2.6, 3.4), (3.4, 2.6, 3.55, 3.4))
     with pytest.raises(NavigationFailure) as failed:
@@ -74,7 +74,7 @@ def test_a_hull_that_is_shut_in_cannot_start() -> None:
     assert failed.value.code is ErrorCode.START_OCCUPIED
 
 
-def test_without_allow_unknown_no_pose_lies_where_it_is_not_known() -> None:
+def test_no_pose_is_in_unknown_space_without_allow_unknown() -> None:
     """Not on a single cell either: the blocks in which ways are looked for hold known ones beside it."""
     view = hall()
     view.costs[np.random.default_rng(1).random(view.costs.shape) < 0.02] = 255

@@ -24,7 +24,7 @@ def test_any_heading_can_be_a_goal(yaw):
     assert wrap(poses[-1].yaw - yaw) == pytest.approx(0, abs=1e-6)
 
 
-def test_nothing_is_searched_if_the_robot_cannot_be_at_an_end():
+def test_no_search_if_start_or_goal_is_invalid():
     asked = []
 
     def is_free(x, y, yaw):

@@ -54,12 +54,12 @@ def test_optimizing_planners_avoid_expensive_cells(kind: str) -> None:
     assert cost(points) < 8.0
 
 
-def test_planners_that_take_their_first_path_do_not_care_what_it_costs() -> None:
+def test_feasible_planners_ignore_costs() -> None:
     paths = [search("rrt_connect", PROBLEM, seed, 3000, 400) for seed in range(1, 6)]
     assert max(cost(path) for path in paths if path is not None) > 15.0
 
 
-def test_bit_star_goes_by_the_samples_it_is_given_and_no_others() -> None:
+def test_bit_star_uses_only_the_given_samples() -> None:
     samples = np.array([(0.7, 3.0), (2.0, 3.1), (3.3, 3.0), (2.0, 0.5)])
     points = SampledSearch(PROBLEM, samples, 2.3, 1, 3000).solve(simplify=False)
     assert points is not None
@@ -68,6 +68,6 @@ def test_bit_star_goes_by_the_samples_it_is_given_and_no_others() -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(PLANNERS))
-def test_the_same_seed_finds_the_same_way(kind: str) -> None:
+def test_same_seed_gives_the_same_path(kind: str) -> None:
     one, other = (search(kind, PROBLEM, 7, 2000, 50) for _ in range(2))
     assert one == other

@@ -47,7 +47,7 @@ def test_costly_distance_is_the_length_in_expensive_cells() -> None:
 
 
 @pytest.mark.parametrize("turn", range(8))
-def test_along_an_axis_or_a_diagonal_the_cells_are_those_passed(turn: int) -> None:
+def test_cells_along_axis_and_diagonal_are_exact(turn: int) -> None:
     costs = np.zeros((41, 41))
     heading = turn * math.pi / 4
     middle = Pose2(CORNER[0] + 20.5 * SIZE, CORNER[1] + 20.5 * SIZE)
@@ -68,7 +68,7 @@ def test_path_outside_the_costmap_or_near_an_obstacle_is_expensive() -> None:
     assert costly_distance(view, inside, Pose2(CORNER[0] + 0.9, CORNER[1] + 0.5), 1.0) == pytest.approx(0.4)
 
 
-def test_the_default_planner_goes_straight_on_where_that_costs_nothing() -> None:
+def test_default_planner_plans_straight_lines_in_free_space() -> None:
     costs = np.zeros((80, 120))
     costs[30:50, 60:70] = 200
     planner, (x, y) = OmplPlanner(PlannerSpec(), round_robot()), CORNER
