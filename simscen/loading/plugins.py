@@ -1,6 +1,6 @@
-"""Plugins that a scenario uses, and plugins that a log needs but that are not installed.
+"""Types of plug-ins that a scenario uses, and types of plug-ins that a log needs but that are not installed.
 
-A plugin is a type, such as a criterion, that an installed package adds. A RegisteredType describes it.
+A plug-in is an installed package that adds types, such as criteria. A RegisteredType describes a type.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -14,40 +14,40 @@ from simscen.spec.choice import Choice
 from simscen.spec.registry import RegisteredType, find_type, plugins_with_spec
 
 _HEADER_PREFIX = "plugin."
-"""Beginning of the header keys of plugins in a log."""
+"""Beginning of the header keys of plug-ins in a log."""
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
-    """Return the plugins that a scenario and its robots use, sorted by group and name."""
+    """Return the types of plug-ins that a scenario and its robots use, sorted by group and name."""
     return _plugins_of_specs(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[RegisteredType, ...]:
-    """Return the plugins that at least one of the scenarios uses, sorted by group and name."""
+    """Return the types of plug-ins that at least one of the scenarios uses, sorted by group and name."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
 
 
 def _plugins_of_specs(*specs: Any) -> tuple[RegisteredType, ...]:
-    """Return the plugins that the specifications use, sorted by group and name."""
+    """Return the types of plug-ins that the specifications use, sorted by group and name."""
     found = {entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)}
     return _sorted(found)
 
 
 def log_header_key(entry: RegisteredType) -> str:
-    """Return the header key of a plugin in a log, e.g. `plugin.criterion.dwell`. Its value is `requirement_of`."""
+    """Return the header key of a type in a log, e.g. `plugin.criterion.dwell`. Its value is from `requirement_of`."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: RegisteredType) -> str:
-    """Return the pip requirement for the package of a plugin: `package==version`."""
+    """Return the pip requirement for the package that adds a type: `package==version`."""
     return f"{entry.distribution}=={entry.version}"
 
 
 def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[Problem]:
-    """Return a problem for each plugin of a log that is not installed in the same version.
+    """Return a problem for each type of a log whose package is not installed in the same version.
 
-    `header` are the header entries of the log. Only plugins of `groups`, e.g. "criterion", are checked. The path of the
+    `header` are the header entries of the log. Only types of `groups`, e.g. "criterion", are checked. The path of the
     problems is "".
     """
     missing: list[Problem] = []
@@ -66,12 +66,12 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
 
 
 def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
-    """Return the plugins sorted by group and name."""
+    """Return the types sorted by group and name."""
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 
 def _plugins_of_part(keys: Keys, part: Any) -> Iterator[RegisteredType]:
-    """Yield the plugin that defines `part`, the part of a specification at `keys`; nothing if simscen defines it."""
+    """Yield the type of `part`, the part of a specification at `keys`; nothing for a type that simscen ships."""
     if isinstance(part, Choice):
         entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

@@ -1,4 +1,4 @@
-"""Loading of a scenario, its variations (sets of values), and all files that it refers to."""
+"""Loading of a scenario with its variations (sets of values) and all files that it names."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -117,8 +117,8 @@ class ChangedScenario:
     ) -> None:
         """Read the file and check the selected variation.
 
-        With None instead of the name of a variation, nothing is checked. The other parameters and the errors are those
-        of `load_scenario`.
+        If `variation` is None, nothing is checked. The other parameters and the errors are the same as in
+        `load_scenario`.
         """
         self._library, self._choice = Library(PathSandbox.around(root, world_path)), choice
         if variation is not None:
@@ -173,7 +173,7 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
 def _load_variation(
     variation: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """Return one variation, with the stack `choice` unless it is None; or all its problems."""
+    """Load one variation, with the stack `choice` unless it is None. Return the scenario or all its problems."""
     tree = variation.tree if choice is None else multirobot.apply_stack_choice(variation.tree, choice)
     if choice is not None and (ineffective := list(_ineffective_variation_problems(variation, tree, choice))):
         return library.with_source(ineffective)
@@ -218,7 +218,7 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
 def _load_multi_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
 ) -> LoadedScenario | list[Problem]:
-    """Return a scenario of several robots, or all its problems without duplicates."""
+    """Load a scenario of several robots. Return the scenario, or all its problems without duplicates."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
@@ -246,9 +246,9 @@ def _load_multi_robot(
 def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """Return a scenario of one robot, or a view: the robot `name` of several, without the robots `others`.
+    """Load a scenario of one robot, or the view of the robot `name`. Return the scenario, or all its problems.
 
-    Return all problems instead if there is an error.
+    In a view, `others` are the names of the other robots.
     """
     assets = Assets(library)
     world = assets.world_of(spec.world, tree, file)

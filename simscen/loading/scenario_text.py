@@ -20,7 +20,7 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
 from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
-"""Groups of the registry with plugins that are needed to judge a log."""
+"""Groups of the registry with types that are needed to judge a log."""
 _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
 """Top-level keys of a scenario that are needed to judge a log of it."""
 
@@ -63,7 +63,7 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
     """Return the criteria in the scenario text of a log, ignoring the rest of the scenario.
 
     `name` is the path of the text in messages. `facts` are the header entries of the log. `robot` selects one of
-    several robots. Raises InvalidInput for an invalid text, and for a criterion or metric of a plugin that is not
+    several robots. Raises InvalidInput for an invalid text, and for a criterion or metric of a plug-in that is not
     installed in the version of the log.
     """
     if missing := missing_plugins(facts, JUDGING_PLUGINS):

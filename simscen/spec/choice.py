@@ -100,7 +100,7 @@ class Choice(Spec):
 
     @property
     def plugin_suffix(self) -> str:
-        """Name of the plugin as a suffix for messages, e.g. " (criterion `dwell` of yardwork 1.2)".
+        """Type and plug-in as a suffix for messages, e.g. " (criterion `dwell` of yardwork 1.2)".
 
         It is "" if simscen ships the choice.
         """

@@ -1,6 +1,6 @@
-"""Annotations of fields that accept all types of a registry group, such as planners, including plugins.
+"""Annotations of fields that accept all types of a registry group, such as planners, including types of plug-ins.
 
-A plugin is a type that an installed package adds.
+A plug-in is an installed package that adds types.
 """
 
 import math
@@ -40,7 +40,7 @@ class ExtensibleUnion:
         return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
 
     def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        """Return the specification of a value, validated by the shipped union or by a plugin."""
+        """Return the specification of a value, validated by the shipped union or by a plug-in."""
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
         if self.allows_names and isinstance(value, str) and value not in _shipped_names(self.group):
@@ -57,7 +57,7 @@ class ExtensibleUnion:
 
 @dataclass(frozen=True)
 class TypeName:
-    """Annotation of a string that names a type of a registry group, shipped or from a plugin."""
+    """Annotation of a string that names a type of a registry group, shipped or from a plug-in."""
 
     group: str
 
@@ -73,7 +73,7 @@ class TypeName:
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
-"""Name of a recovery behavior, shipped or from a plugin."""
+"""Name of a recovery behavior, shipped or from a plug-in."""
 
 
 def _shipped_names(group: str) -> frozenset[str]:
@@ -93,12 +93,12 @@ def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
 
 
 _CHECKED_PROPERTIES = ("horizon", "clearance_range")
-"""Properties of plugins that are read before a run: a time in s, and a distance in m."""
+"""Properties of plug-ins that are read before a run: a time in s, and a distance in m."""
 
 
 @dataclass(frozen=True)
 class PluginSpec(LazySpec):
-    """Annotation of a field with a specification of a plugin."""
+    """Annotation of a field with a specification of a plug-in."""
 
     entry: RegisteredType
 
@@ -111,7 +111,7 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
-    """Return the specification of a value, validated by a plugin. Errors of the plugin become validation errors."""
+    """Return the specification of a value, validated by a plug-in. Errors of the plug-in become validation errors."""
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
@@ -124,7 +124,7 @@ def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
 
 
 def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
-    """Return the validation error for a plugin that cannot be used."""
+    """Return the validation error for a plug-in that cannot be used."""
     return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 

@@ -1,7 +1,7 @@
 """Registry of types that YAML files select by name: planners, criteria, faults, sensors, and so on.
 
-simscen ships types. An installed package adds a type, called a plugin, by an entry point. The value of the entry point
-is the address of a specification class (a pydantic model of the YAML):
+simscen ships types. An installed package (a plug-in) adds a type by an entry point. The value of the entry point is the
+address of a specification class (a pydantic model of the YAML):
 
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"
@@ -45,7 +45,7 @@ class Group:
     shipped: str
     """Address "module:name" of the shipped types: a Choice class, or a dict of addresses by name."""
     reserved: tuple[str, ...] = ()
-    """Names that plugins cannot have, because YAML files use them as keys."""
+    """Names that types of plug-ins cannot have, because YAML files use them as keys."""
 
 
 GROUPS: dict[str, Group] = {

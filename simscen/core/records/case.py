@@ -1,4 +1,4 @@
-"""Input of the judge: the parts of a scenario that criteria need (Case). Its output: a judged run (Run)."""
+"""Parts of a scenario that criteria need (Case), and a simulated and judged run (Run)."""
 
 import math
 from collections.abc import Mapping

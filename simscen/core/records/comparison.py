@@ -20,10 +20,10 @@ class OutcomeCounts:
 
 @dataclass(frozen=True)
 class Flip:
-    """Pair of runs with the same scenario and seed, of which only one passed.
+    """Scenario and seed for which only one of two stacks or sessions passed.
 
-    `passed` and `failed` are the names of the stack or session of the passed and of the failed run. `why` is the
-    criterion that failed.
+    `passed` and `failed` are the names of the stack or session that passed and that failed. `why` is the criterion that
+    failed.
     """
 
     scenario: str

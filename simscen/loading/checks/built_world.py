@@ -17,7 +17,7 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc
 BLOCKING_HEIGHTS_M = 0.02, 0.4
 """Lowest and highest z in m between which an obstacle blocks most robots."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1, 0.35, 0.03
-"""Wheel radius, maximum slope, and maximum step of an assumed robot, which climbs typical ramps."""
+"""Wheel radius, maximum slope, and maximum step of an assumed robot that can climb typical ramps."""
 
 
 class BuiltWorldFile(NamedTuple):

@@ -64,7 +64,7 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     for number, step in enumerate(run.steps):
         own = 0.0 if step.when is None or step.when.edge == "falling" else step.when.delay + _earliest_true_s(step.when)
         earliest[number] = own + (0.0 if step.after is None else earliest[step.after])
-        if step.after is None or not run.is_reached(step) or step.when is None:
+        if step.after is None or not run.is_reachable(step) or step.when is None:
             continue
         keys = (*step.keys, "when")
         if earliest[number] >= limit > own and earliest[step.after] < limit:
@@ -104,8 +104,8 @@ def possible_run(loaded: LoadedScenario) -> "PossibleRun":
 class PossibleRun:
     """Run in which the events, faults, and marks with the names `possible` can happen.
 
-    A private method with the name of a condition, such as `_goal`, takes the specification of the condition. It returns
-    the reason why the condition can never be true, or None.
+    The methods `_why_never_KIND`, such as `_why_never_goal`, take the specification of a condition of this kind. They
+    return the reason why the condition can never be true, or None.
     """
 
     loaded: LoadedScenario
@@ -118,15 +118,15 @@ class PossibleRun:
 
     @property
     def triggers(self) -> Iterator[tuple[Keys, Trigger | None, str, bool]]:
-        """The keys, trigger, name, and value of `required` of each reachable step, then of each fault."""
+        """The keys of the trigger, the trigger, the name, and `required` of each reachable step, then of each fault."""
         for step in self.steps:
-            if self.is_reached(step):
+            if self.is_reachable(step):
                 yield (*step.keys, "when"), step.when, step.name, step.required
         for index, fault in enumerate(self.loaded.spec.faults):
             yield ("faults", index, "when"), fault.when, fault.label, fault.required
 
-    def is_reached(self, step: SequenceStep) -> bool:
-        """Return whether the step before `step` in its sequence can happen; True if there is none."""
+    def is_reachable(self, step: SequenceStep) -> bool:
+        """Return whether the previous step in the sequence of a step can happen; True for the first step."""
         return step.after is None or self.steps[step.after].name in self.possible
 
     def earlier_steps(self, step: SequenceStep) -> frozenset[str]:
@@ -139,7 +139,7 @@ class PossibleRun:
     def next_possible(self) -> frozenset[str]:
         """Names of the events, faults, and marks that can happen if the ones in `possible` can happen."""
         triggers = [
-            *((step.when, step.name) for step in self.steps if self.is_reached(step)),
+            *((step.when, step.name) for step in self.steps if self.is_reachable(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
         ]
         happening = {name for when, name in triggers if when is None or self.why_never(when, ()) is None}
@@ -176,7 +176,7 @@ class PossibleRun:
         if condition.not_ is not None:
             always = condition.not_.time is not None and _earliest_true_s(condition.not_) == 0
             return ((*keys, "not"), "the condition under `not` is always true") if always else None
-        check = _CONDITIONS.get(condition.kind)
+        check = _WHY_NEVER_BY_KIND.get(condition.kind)
         reason = check(self, condition.chosen) if check else None
         return ((*keys, condition.kind), reason) if reason else None
 
@@ -204,23 +204,23 @@ class PossibleRun:
         )
         return len(listed) + sent
 
-    def _time(self, time: Any) -> str | None:
+    def _why_never_time(self, time: Any) -> str | None:
         limit = self.loaded.spec.time_limit
         return f"{time.root:g} s is not before the time limit of {limit:g} s" if time.root >= limit else None
 
-    def _travelled(self, travelled: Any) -> str | None:
+    def _why_never_travelled(self, travelled: Any) -> str | None:
         top, limit = self._top_speed, self.loaded.spec.time_limit
         if top is None or travelled.root <= MAX_SPEED_RATIO * top * limit:
             return None
         return f"at its top speed of {top:g} m/s the robot drives {top * limit:g} m within the time limit"
 
-    def _speed_above(self, speed: Any) -> str | None:
+    def _why_never_speed_above(self, speed: Any) -> str | None:
         top = self._top_speed
         if top is None or speed.root <= MAX_SPEED_RATIO * top or self._may_be_pushed:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
-    def _turning_above(self, rate: Any) -> str | None:
+    def _why_never_turning_above(self, rate: Any) -> str | None:
         spec = self.loaded.robot.spec
         if spec is None or self._may_be_pushed or self.may_do("push"):
             return None
@@ -228,19 +228,19 @@ class PossibleRun:
             return None
         return f"the robot's maximum turn rate is {spec.limits.angular:g} rad/s"
 
-    def _distance_remaining(self, _: Any) -> str | None:
+    def _why_never_distance_remaining(self, _: Any) -> str | None:
         return None if self.goal_count(None) else "the robot has no goal"
 
-    def _localization_error(self, error: Any) -> str | None:
+    def _why_never_localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
         gets_truth = isinstance(stack, StackSpec) and stack.gets_ground_truth
         too_large = getattr(error, "root", error) >= MAX_TRUTH_ERROR_M
         return "the localizer gets the true pose" if gets_truth and too_large else None
 
-    def _localization_lost(self, lost: Any) -> str | None:
-        return self._localization_error(lost.tolerance) if lost.std is None else None
+    def _why_never_localization_lost(self, lost: Any) -> str | None:
+        return self._why_never_localization_error(lost.tolerance) if lost.std is None else None
 
-    def _goal(self, goal: Any) -> str | None:
+    def _why_never_goal(self, goal: Any) -> str | None:
         count, suffix = self.goal_count(goal.name), "" if goal.name is None else f" called `{goal.name}`"
         if goal.count > count:
             return f"the robot gets {f'only {count}' if count else 'no'} goal{'' if count == 1 else 's'}{suffix}"
@@ -253,21 +253,21 @@ class PossibleRun:
             return "the run ends after the first failed goal (`on_goal_failure: stop`)"
         return None
 
-    def _waypoint(self, waypoint: Any) -> str | None:
-        return self._goal(SimpleNamespace(status="reached", name=waypoint.name, count=waypoint.count))
+    def _why_never_waypoint(self, waypoint: Any) -> str | None:
+        return self._why_never_goal(SimpleNamespace(status="reached", name=waypoint.name, count=waypoint.count))
 
-    def _replan(self, _: Any) -> str | None:
+    def _why_never_replan(self, _: Any) -> str | None:
         return None if self.goal_count(None) else "the robot has no goal to plan for"
 
-    def _recovery(self, recovery: Any) -> str | None:
+    def _why_never_recovery(self, recovery: Any) -> str | None:
         if not self.goal_count(None):
             return "the robot has no goal to recover for"
         return why_no_recovery(self.loaded, recovery.name)
 
-    def _pedestrian(self, _: Any) -> str | None:
+    def _why_never_pedestrian(self, _: Any) -> str | None:
         return None if self.may_do("pedestrian", "crowd") else "no event adds a pedestrian"
 
-    def _event(self, event: Any) -> str | None:
+    def _why_never_event(self, event: Any) -> str | None:
         if event.name not in self.possible:
             return f"it waits for `{event.name}`, which can never happen"
         lasting = [fault for fault in self.loaded.spec.faults if fault.label == event.name and fault.for_ is None]
@@ -291,21 +291,21 @@ class PossibleRun:
         return moving or any(thing.move for thing in world.spec.objects)
 
 
-_CONDITIONS = {
-    "time": PossibleRun._time,
-    "travelled": PossibleRun._travelled,
-    "speed_above": PossibleRun._speed_above,
-    "distance_remaining": PossibleRun._distance_remaining,
-    "believed_distance_remaining": PossibleRun._distance_remaining,
-    "turning_above": PossibleRun._turning_above,
-    "localization_error": PossibleRun._localization_error,
-    "localization_lost": PossibleRun._localization_lost,
-    "goal": PossibleRun._goal,
-    "waypoint": PossibleRun._waypoint,
-    "replan": PossibleRun._replan,
-    "recovery": PossibleRun._recovery,
-    "pedestrian": PossibleRun._pedestrian,
-    "event": PossibleRun._event,
+_WHY_NEVER_BY_KIND = {
+    "time": PossibleRun._why_never_time,
+    "travelled": PossibleRun._why_never_travelled,
+    "speed_above": PossibleRun._why_never_speed_above,
+    "distance_remaining": PossibleRun._why_never_distance_remaining,
+    "believed_distance_remaining": PossibleRun._why_never_distance_remaining,
+    "turning_above": PossibleRun._why_never_turning_above,
+    "localization_error": PossibleRun._why_never_localization_error,
+    "localization_lost": PossibleRun._why_never_localization_lost,
+    "goal": PossibleRun._why_never_goal,
+    "waypoint": PossibleRun._why_never_waypoint,
+    "replan": PossibleRun._why_never_replan,
+    "recovery": PossibleRun._why_never_recovery,
+    "pedestrian": PossibleRun._why_never_pedestrian,
+    "event": PossibleRun._why_never_event,
 }
 """Methods that return the reason why a condition can never be true, or None, by kind of the condition."""
 

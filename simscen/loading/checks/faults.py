@@ -18,7 +18,7 @@ from simscen.triggers.base import Trigger
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 """Descriptions for messages of fault targets other than sensors, by kind of the target."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Kinds of faults that repeat the measurement, which is only possible at the time of the measurement."""
+"""Kinds of faults that repeat a measurement. They only work before faults that delay messages."""
 
 
 class ListedFault(NamedTuple):

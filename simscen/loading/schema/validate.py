@@ -32,10 +32,7 @@ LANGUAGE_VERSION = 1
 """Version of the scenario language, which files state under the key `simscen`."""
 
 FindMissingKeys = Callable[[MappingNode], list[Problem]]
-"""Function that returns the problems of missing keys that pydantic does not report.
-
-Such a key is only required if another key is absent.
-"""
+"""Function that returns the problems of keys that are required only if other keys are missing."""
 
 
 def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | None = None) -> Model | list[Problem]:
@@ -66,7 +63,7 @@ def _supported_mapping(tree: Node) -> MappingNode | Problem:
 
 
 def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list[dict[str, Any]]]:
-    """Return the specification (None if it is invalid), and pydantic's errors except errors that empty values cause."""
+    """Return the specification, or None and pydantic's errors. Errors that empty values cause are left out."""
     try:
         return model.model_validate(tree.plain, by_alias=True, by_name=False), []
     except ValidationError as error:
@@ -217,5 +214,5 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
 
 
 def _spelling_hint(missing: Problem) -> str:
-    """Return the hint that a misspelling of this missing key would have."""
+    """Return the hint for a misspelling of this missing key."""
     return f"did you mean {missing.message.split()[2]}?"

@@ -20,9 +20,9 @@ SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
 COMMON_STACK_KEYS = ("controller_frequency",)
 """Keys under `stack` that are valid for all types of stacks."""
 GOAL_CHECKER = "goal_checker"
-"""Key under `stack` with the goal tolerances."""
+"""Key under `stack` of the goal checker, which contains the goal tolerances."""
 TOLERANCES = ("xy_goal_tolerance", "yaw_goal_tolerance")
-"""Keys under `goal_checker` of the goal tolerances."""
+"""Keys of the goal tolerances under `goal_checker`."""
 EXTERNAL = "external"
 """Key under `stack` with the name of an external stack."""
 REFERENCE = "reference"
@@ -63,8 +63,8 @@ class StackChoice:
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree of one robot with the selected stack.
 
-    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type of
-    stack or a command replaces them only if the scenario has a stack of another type. COMMON_STACK_KEYS are then kept.
+    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type or a
+    command replaces them only if the scenario has a stack of another type, and keeps COMMON_STACK_KEYS.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):

@@ -54,7 +54,7 @@ IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Parameters have no effect in simulation if their name contains one of these parts."""
+"""Parts of names: further parameters with one of these parts in their names have no effect in simulation."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
@@ -97,7 +97,7 @@ The name `a.b` stands for the parameter `b` in the mapping `a`.
 
 @dataclass(frozen=True)
 class Translation:
-    """Translation of a parameter of a Nav2 node: to a value in simscen, to a note for the user, to both, or to none."""
+    """Translation of a parameter of a Nav2 node to a value in simscen, to a note for the user, or to both."""
 
     node: str
     parameter: str
@@ -133,7 +133,7 @@ def strings(value: Any) -> list[str]:
 
 
 def parameters_below(parameters: Parameters, name: str) -> Iterator[tuple[str, Any]]:
-    """Yield the parameters in the mapping `name` with their names relative to `name`; nothing if `name` is ""."""
+    """Yield the parameters below `name`, with names relative to `name`; nothing if `name` is ""."""
     for key, value in parameters.items():
         if name and key.startswith(f"{name}."):
             yield key.removeprefix(f"{name}."), value

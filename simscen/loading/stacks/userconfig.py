@@ -88,7 +88,7 @@ def undefined_stack(
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if the robots of a scenario need several of the commands in `--stack` options; else [].
+    """Return a problem if the robots of a scenario need the commands of several `--stack` options; else [].
 
     `given` are the names of the stacks in these options. `config_file` is the user configuration.
     """

@@ -1,6 +1,6 @@
 """Sampling of values for variations: draws from distributions, and pairwise combinations (covering arrays).
 
-The draws are computed by hashes of the seed, the path, and the number of the draw, without a random generator.
+All random numbers are hashes of the seed, the path, and the number of the draw.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""Reading and writing of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2), unlike in PyYAML.
+"""Reading and writing of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
 
 PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because YAML 1.1 reads them as octal, but YAML
 1.2 as decimal.
