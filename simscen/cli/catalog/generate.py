@@ -78,7 +78,10 @@ _GROUPS = {
         "external stacks.",
     ),
     "localizer": ("Localizers", "Value of `stack.localizer`, selected by `type`; the default is `amcl`."),
-    "controller": ("Controllers", "Value of `stack.controller`, selected by `type`."),
+    "controller": (
+        "Controllers",
+        "Value of `stack.controller`, selected by `type`. The critics and the validator at the end are keys of `mppi`.",
+    ),
     "behavior": (
         "Recovery behaviors",
         "Entries of `stack.recovery.behaviors`: a name, or a mapping with that name as its `type`. Missing parameters "
@@ -97,7 +100,8 @@ key for a task, see [All keys by task](../guides/words.md). In a terminal, `sims
 
 - A default of – means that the key is optional and has no fixed default.
 - A *place* is a named pose of the world.
-- A *mapping* contains further keys, which the section with the name of the key lists.
+- A *mapping* contains further keys. They are in the section with the name of the key, or in the chapter about its
+  types: those of `drive` are in [Drives](#drives).
 """
 _COMMANDS_INTRO = """\
 This page lists every command with its options and exit codes; `simscen COMMAND --help` prints the same. To learn the

@@ -17,14 +17,17 @@ from pydantic_core import PydanticUndefined
 
 from simscen.actions.base import AnyAction
 from simscen.advanced.spec import MedialAxisPlanner
+from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria import error_codes
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model import (
+    acceptance,
     controllers,
     costmaps,
     guards,
     localizers,
+    mppi,
     navigation,
     planners,
     recovery,
@@ -44,7 +47,7 @@ from simscen.spec.base import LazySpec, annotation_of, field_docs
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec, SpeedMask
-from simscen.spec.quantities import UNITS, Quantity
+from simscen.spec.quantities import UNITS, Amount, Quantity
 from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
@@ -129,6 +132,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *_installed_types("localizer", installed),
         *_installed_types("planner", installed),
         *(_topic("controller", kind, model) for kind, model in members_by_type(controllers.Controller)),
+        *(_topic("controller", name, annotation_of(mppi.Mppi.model_fields[name])) for name in _MPPI_SECTIONS),
         *_installed_types("controller", installed),
         *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
         *_installed_types("behavior", installed),
@@ -144,6 +148,7 @@ def topics(installed: bool = False) -> list[Topic]:
 _SCENARIO: dict[str, type[BaseModel]] = {
     "scenario": scenario.ScenarioSpec,
     "robot entry": scenario.RobotEntry,
+    "robots": scenario.MultiRobotEntry,
     "initial_estimate": scenario.InitialEstimate,
     "payload": scenario.Payload,
     "goals": scenario.GoalEntry,
@@ -154,8 +159,16 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "then": StepEntry,
     "pose": PoseSpec,
     "physics": scenario.Physics,
+    "expected": scenario.ExpectedFailure,
     "variations": variations.VariationBlock,
     "sampled": variations.Sampled,
+    "uniform": variations.Uniform,
+    "log_uniform": variations.LogUniform,
+    "normal": variations.Normal,
+    "integer": variations.Integer,
+    "choice": variations.OneOf,
+    "acceptance": acceptance.Acceptance,
+    "pass_rate": acceptance.PassRate,
 }
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,
@@ -178,6 +191,8 @@ _STACK: dict[str, type[BaseModel]] = {
     "smac_2d": planners.Smac2d,
     "medial_axis": MedialAxisPlanner,
 }
+_MPPI_SECTIONS = [name for name in mppi.Mppi.model_fields if name[0].isupper()]
+"""Keys of `mppi` that are mappings: its critics and its validator."""
 _BEHAVIORS: dict[str, type[BaseModel]] = {
     "clear_costmap": recovery.ClearCostmap,
     "spin": recovery.Spin,
@@ -284,7 +299,7 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     if quantity is not None:
         text = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
     else:
-        text = names.get(kind, "mapping" if isinstance(kind, type) and issubclass(kind, BaseModel) else "choice")
+        text = names.get(kind) or _kind_without_name(kind)
     bounds = {
         name: getattr(mark, name)
         for mark in _all_marks(metadata)
@@ -296,6 +311,15 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     else:
         texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
     return ", ".join([text.replace("ratio in %", "ratio"), *texts])
+
+
+def _kind_without_name(kind: Any) -> str:
+    """Return the description of a mapping, a list of fixed length, a quantity of any dimension, or an error code."""
+    if get_origin(kind) is tuple:
+        return f"list of {len(get_args(kind))} values"
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return "mapping"
+    return {Amount: "quantity", ErrorCode: "error code"}.get(kind, "value")
 
 
 def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
@@ -323,7 +347,10 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
         kind = annotation_of(choice.model_fields[name])
         models = [m for m in get_args(kind) or (kind,) if isinstance(m, type) and m is not NoneType]
         model = models[0] if models and issubclass(models[0], BaseModel) and models[0] is not choice else None
-        yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
+        if model is not None:
+            yield _topic(group, key, model)
+        else:
+            yield Topic(group, key, None, docs.get(name, ""), _SECTION_EXAMPLES.get(f"{group}.{key}", ""))
 
 
 def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
@@ -339,8 +366,47 @@ def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
             yield replace(_topic(group, name, model), origin=origins[name])
 
 
+_SECTION_EXAMPLES = {
+    "trigger.all": "when: {all: [{robot_in: {region: hall}}, {speed_above: 0.4 m/s}]}",
+    "trigger.any": "when: {any: [{travelled: 5 m}, {time: 30 s}]}",
+    "trigger.not": "when: {not: {robot_in: {region: hall}}}",
+    "trigger.when": "when: {speed_above: 0.4 m/s, for: 2 s, delay: 1 s, times: 3}",
+    "fault.faults": "faults: [{sensor: lidar, off: {}, name: blackout, when: {travelled: 3 m}, for: 2 s}]",
+    "criterion.pass": "pass: [{clearance: {min: 10 cm}, id: near miss, severity: warn}]",
+    "scenario.robot entry": "robot: {model: amr, pose: dock}",
+    "scenario.initial_estimate": "initial_estimate: {x: 1 m, y: 2 m, yaw: 90 deg, std: [0.1, 0.1, 5 deg]}",
+    "scenario.payload": "payload: {mass: 30 kg, at: [0, 0, 0.5]}",
+    "scenario.goals": "goals: [{name: shelf, pose: {x: 5, y: 3, yaw: 90 deg}, timeout: 60 s}]",
+    "scenario.events": "events: [{name: robot is pushed, when: {time: 10 s}, do: {push: {impulse: [0, 2]}}}]",
+    "scenario.then": "then: [{when: {time: 3 s}, do: {open: {name: gate}}}]",
+    "scenario.pose": "pose: {x: 5 m, y: 3 m, yaw: 90 deg}",
+    "scenario.physics": "physics: {truth_rate: 80 Hz}",
+    "scenario.variations": "variations: {grid: {robot.motor_torque: [50 %, 100 %], robot.model: [amr, jackal]}}",
+    "scenario.sampled": "sampled: {count: 20, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}",
+    "scenario.acceptance": "acceptance: {pass_rate: {min: 95 %, confidence: 95 %}}",
+    "stack.stack": "stack: {profile: advanced, controller: {type: dwb}, costmap: {inflation_radius: 0.5 m}}",
+    "stack.speed_zones": "speed_zones: [{region: crossing, speed_limit: 0.2 m/s}]",
+    "stack.speed_mask": "speed_mask: {file: masks/speed.yaml, type: percent, base: 100, multiplier: -1}",
+    "stack.recovery": "recovery: {behaviors: [clear_costmap, spin], number_of_retries: 3}",
+    "stack.latency": "latency: {planner: 200 ms, controller: 25 ms}",
+    "world.walls": "walls: [{name: north wall, points: [[0, 8], [12, 8]], thickness: 20 cm}]",
+    "world.obstacles": "obstacles: [{name: pillar, cylinder: [0.25, 1.0], pose: {x: 4, y: 3}}]",
+    "world.ramps": "ramps: [{name: ramp, start: [2, 1], end: [4, 1], width: 1 m, height: 10 cm}]",
+    "world.objects": "objects: [{name: crate, box: [0.4, 0.4, 0.4], mass: 3 kg, pose: {x: 3, y: 6}}]",
+    "world.doors": "doors: [{name: gate, points: [[6, 5.2], [6, 4.2]], closed: true}]",
+    "robot.body": "body: [{box: [0.80, 0.50, 0.20], z: 0.04}]",
+    "robot.limits": "limits: {linear: 1.2 m/s, angular: 1.5 rad/s, linear_acceleration: 1, angular_acceleration: 2}",
+    "robot.mount": "mount: {x: 0.2, z: 0.4, pitch: 20 deg}",
+    "drive.differential": "drive: {type: differential, wheel_radius: 8 cm, wheel_separation: 42 cm}",
+    "sensor.lidar": "sensors: {front: {lidar: {beams: 541, field_of_view: 270 deg, mount: {x: 0.35, z: 0.18}}}}",
+    "sensor.camera": "sensors: {left_eye: {camera: {width: 64, height: 48, mount: {y: 0.2, yaw: 90 deg}}}}",
+}
+"""Example of each topic whose docstring has none, by its group and name."""
+
+
 def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:
     """Return the topic of a model, from its docstring. A line "Example: …" becomes the example."""
     text = inspect.cleandoc(model.__doc__ or "")
     example = _EXAMPLE.search(text)
-    return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), example[1] if example else "")
+    shown = example[1] if example else _SECTION_EXAMPLES.get(f"{group}.{name}", "")
+    return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), shown)

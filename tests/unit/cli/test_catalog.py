@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import Any
 
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, RootModel
 
 from simscen.actions.base import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
@@ -25,6 +25,11 @@ from simscen.triggers import base as trigger_registry
 TOPICS = topics()
 WORDS = [topic for topic in TOPICS if topic.group in ("trigger", "action", "fault", "criterion") and topic.model]
 SINGLE = [topic for topic in WORDS if topic.name not in ("when", "faults", "pass")]
+SECTIONS = [
+    topic
+    for topic in TOPICS
+    if topic.example and topic.group in ("scenario", "stack", "world", "robot", "drive") and topic.name != "robots"
+]
 
 
 def load_yaml(text: str) -> Any:
@@ -64,6 +69,14 @@ def test_every_topic_has_a_valid_example(topic: Topic) -> None:
     source = example[key] if key else example
     model.model_validate(source, by_alias=True, by_name=False)
     assert topic.name in source
+
+
+@pytest.mark.parametrize("topic", SECTIONS, ids=_id)
+def test_example_of_every_section_is_valid(topic: Topic) -> None:
+    (value,) = load_yaml(topic.example).values()
+    assert topic.model is not None
+    entry = value[0] if isinstance(value, list) and not issubclass(topic.model, RootModel) else value
+    topic.model.model_validate(entry, by_alias=True, by_name=False)
 
 
 @pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_id)
