@@ -45,4 +45,5 @@ def sentence(event: Event) -> str:
 
 
 def _short(value: object) -> str:
+    """Return a value as text, with four significant digits if it is a float."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

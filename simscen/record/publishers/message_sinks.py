@@ -44,6 +44,7 @@ class TopicWriter:
         self.write: Write = self._first
 
     def _first(self, time: int, data: bytes) -> None:
+        """Open the topic, and write its first message."""
         self.write = self._open_topic()
         self.write(time, data)
 
@@ -125,6 +126,7 @@ class _ChunkBatchWriter(BatchWriter):
             channel.entries += (time, start + offset)
 
     def _compile_layout(self) -> None:
+        """Generate the function that packs all messages, after their channels have been opened."""
         parts: list[bytes | Slot] = []
         for topic, message in self._layouts:
             channel = self._publisher.channel(topic)
@@ -158,4 +160,5 @@ class NamespacedPublisher:
         self._out.flush_if_due()
 
     def _with_namespace(self, topic: Topic) -> Topic:
+        """Return the topic in the namespace of the robot."""
         return topic if topic == CLOCK else topic._replace(name=f"/{self._robot}{topic.name}")
