@@ -22,6 +22,7 @@ from simscen.core.version import PACKAGE
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.loading.yaml.parser import parse_yaml
+from simscen.model.mppi import Mppi
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, all_types
@@ -137,6 +138,7 @@ STACK = "stack:\n  "
 PLACES = {
     "scenario.scenario": Place("scenario", ""),
     "scenario.robot entry": Place("scenario", "robot:\n  "),
+    "scenario.robots": Place("scenario", "robots:\n  left:\n    "),
     "scenario.initial_estimate": Place("scenario", "robot:\n  pose: dock\n  initial_estimate:\n    "),
     "scenario.goals": Place("scenario", "goals:\n  -\n    "),
     "scenario.expect": Place("scenario", "goals:\n  - pose: dock\n    expect:\n      "),
@@ -144,6 +146,10 @@ PLACES = {
     "scenario.events": Place("scenario", "events:\n  -\n    "),
     "scenario.variations": Place("scenario", "variations:\n  "),
     "scenario.sampled": Place("scenario", "variations:\n  sampled:\n    "),
+    "scenario.normal": Place(
+        "scenario", "variations:\n  sampled:\n    values:\n      seed:\n        normal:\n          "
+    ),
+    "scenario.pass_rate": Place("scenario", "acceptance:\n  pass_rate:\n    "),
     "scenario.then": Place("scenario", "events:\n  - when: {time: 1}\n    then:\n      -\n        "),
     "scenario.pose": Place("scenario", "robot:\n  pose:\n    "),
     "scenario.payload": Place("scenario", "robot:\n  pose: dock\n  payload:\n    "),
@@ -161,6 +167,11 @@ PLACES = {
     **{
         f"stack.{each}": Place("scenario", f"{STACK}planner:\n    type: {each}\n    ")
         for each in ("navfn", "smac_2d", "medial_axis")
+    },
+    **{
+        f"controller.{key}": Place("scenario", f"{STACK}controller:\n    type: mppi\n    {key}:\n      ")
+        for key in Mppi.model_fields
+        if key.endswith(("Critic", "Validator"))
     },
     "stack file.stack file": Place("stack", ""),
     "stack file.configuration": Place("config", ""),
@@ -186,7 +197,12 @@ TYPED = {
     "stack": Place("scenario", "stack:\n  "),
 }
 """Where a mapping stands that is chosen by its `type`, by its group."""
-NOT_TYPED_IN_OURS = {"world.ROS map": "a file of map_server's", "fault.faults": "a room", "criterion.pass": "a room"}
+NOT_TYPED_IN_OURS = {
+    "world.ROS map": "a file of map_server's",
+    "fault.faults": "a room",
+    "criterion.pass": "a room",
+    **{f"scenario.{key}": "no mapping" for key in ("uniform", "log_uniform", "integer", "choice")},
+}
 
 
 def places() -> Iterator[tuple[Topic, Place]]:
