@@ -28,7 +28,7 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
         ("world,ref_path_len\n", "lists no worlds"),
     ],
 )
-def test_an_unusable_list_of_worlds_is_named(tmp_path: Path, text: str, said: str) -> None:
+def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "scenarios.csv").write_text(text)
     with pytest.raises(UsageError) as raised:
         read_barn_worlds(tmp_path)
@@ -36,13 +36,13 @@ def test_an_unusable_list_of_worlds_is_named(tmp_path: Path, text: str, said: st
     assert said in str(raised.value)
 
 
-def test_a_folder_without_a_list_of_worlds_is_named(tmp_path: Path) -> None:
+def test_folder_without_a_list_of_worlds_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"cannot read the list of BARN's worlds: .*scenarios\.csv"):
         read_barn_worlds(tmp_path)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
-def test_the_worlds_of_the_dataset_are_there_with_their_reference_lengths() -> None:
+def test_worlds_of_the_dataset_have_their_reference_lengths() -> None:
     worlds = {world.file.stem: world for world in read_barn_worlds(DATA)}
     assert len(worlds) == 6
     assert worlds["world_1"].reference_length == 12.431

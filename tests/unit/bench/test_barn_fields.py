@@ -6,7 +6,7 @@ from simscen.bench.navigation import barn
 from simscen.bench.navigation.barn import CELL_SIZE_M, CROSSING_RADIUS_M, GOAL, START, generate_obstacle_field
 
 
-def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
+def test_field_depends_only_on_its_number() -> None:
     first, again, other = generate_obstacle_field(3), generate_obstacle_field(3), generate_obstacle_field(4)
     assert np.array_equal(first.centers, again.centers)
     assert not np.array_equal(first.centers, other.centers)
@@ -52,5 +52,5 @@ def test_narrow_field_width_matches_an_independent_library() -> None:
     assert not crossable(blocked_radius + CELL_SIZE_M / 3)  # as fine as the lattice on which that is looked for
 
 
-def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
+def test_width_option_does_not_change_the_default_fields() -> None:
     assert generate_obstacle_field(3).shortest_path_m == generate_obstacle_field(3, CROSSING_RADIUS_M).shortest_path_m

@@ -28,7 +28,7 @@ def test_a_wall_has_its_openings() -> None:
     assert wall_boxes((1, 0), (1, 2), 0.2).tolist() == [[0.9, 0, 1.1, 2]]
 
 
-def test_a_rebuilt_floor_is_the_same_left_of_the_middle_and_another_right_of_it() -> None:
+def test_rebuilt_floor_differs_only_right_of_the_center() -> None:
     floor, again, rebuilt = generate_building(2001), generate_building(2001), generate_building(2001, 1)
     assert floor.size[0] > 40
     assert np.array_equal(floor.furniture, again.furniture)
@@ -37,7 +37,7 @@ def test_a_rebuilt_floor_is_the_same_left_of_the_middle_and_another_right_of_it(
     assert not np.array_equal(floor.furniture, rebuilt.furniture)
 
 
-def test_a_log_is_the_same_each_time_and_keeps_clear_of_walls_while_its_odometry_drifts() -> None:
+def test_generated_log_is_reproducible_collision_free_and_has_odometry_drift() -> None:
     made, again = short("tracked"), generate_log(2001, 1, "tracked", seconds=15.0)
     assert np.array_equal(made.sensed.truth, again.sensed.truth)
     assert (

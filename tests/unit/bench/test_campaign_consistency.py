@@ -56,7 +56,7 @@ def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: f
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.3])
-def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: float) -> None:
+def test_bounds_over_buildings_contain_only_a_consistent_filter(shared: float) -> None:
     """An inconsistent filter, whose standard deviations are 1.5 times too small or too large, is outside the bounds."""
     values = filtered(np.random.default_rng(3), 400, 8, shared)
 

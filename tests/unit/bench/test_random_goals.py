@@ -48,7 +48,7 @@ def test_every_drive_is_reachable_with_free_start_and_goal() -> None:
             assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE_MARGIN_M
 
 
-def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
+def test_drive_depends_only_on_its_number() -> None:
     one, two, three = random_drives(two_rooms(), 0.22, (1, 2, 3), min_length=2.0)
     assert [one, two, three] != [one, one, one]
     assert list(random_drives(two_rooms(), 0.22, (3, 1), min_length=2.0)) == [three, one]
@@ -85,7 +85,7 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
         assert a.world == file.name  # its interval is over buildings, not over faults in one
 
 
-def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
+def test_corridors_and_ramps_load_and_differ(tmp_path: Path) -> None:
     for made in (
         generated_worlds.write_two_robots(tmp_path / "c", (1, 2, 3)),
         generated_worlds.write_ramps(tmp_path / "r", (1, 2, 3)),
@@ -94,7 +94,7 @@ def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
         assert len(names) == 3
 
 
-def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
+def test_ramps_are_not_walls_on_the_map(tmp_path: Path) -> None:
     for drive in generated_worlds.write_ramps(tmp_path, range(1, 21)).drives:
         loaded = load_scenario(drive.file, tmp_path)
         (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)

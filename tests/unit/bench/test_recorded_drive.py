@@ -19,7 +19,7 @@ def errors(reference_times, offset=0.2):
     return compare_with_reference(localized, sensed, 1.0)
 
 
-def test_a_dense_reference_is_compared_throughout():
+def test_dense_reference_is_compared_at_all_beliefs():
     found = errors(np.arange(0.0, 60.5, 0.5))
     assert found.compared == 1.0
     assert found.distance == pytest.approx(0.2)

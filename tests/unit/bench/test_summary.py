@@ -29,7 +29,7 @@ def test_rates_are_over_all_runs_and_times_over_successful_runs() -> None:
     assert row.seconds == 8.0
 
 
-def test_a_score_counts_failures_as_nothing() -> None:
+def test_failed_runs_have_score_zero() -> None:
     # 10 m at 2 m/s is 5 s; arriving within 10 s is worth 0.5.
     assert summarize("BARN", [Trial(ARRIVED, 10.0), Trial(HIT, 10.0)]).score == pytest.approx(0.25)
 

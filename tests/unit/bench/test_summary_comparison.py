@@ -9,7 +9,7 @@ from simscen.core.statistics import wilson_interval
 SLOW = run(Outcome.PASSED, seconds=12.0)
 
 
-def test_the_interval_is_over_worlds_however_many_seeds_each_has() -> None:
+def test_interval_is_over_worlds_not_seeds() -> None:
     few = [Trial(r, world=f"{n}") for n, r in enumerate((ARRIVED, HIT, ARRIVED, ARRIVED, HIT, ARRIVED))]
     many = [Trial(trial.run, world=trial.world) for trial in few for _ in range(20)]
     assert success_interval(few) == success_interval(many)
@@ -27,7 +27,7 @@ def test_mixed_outcomes_give_a_nonempty_interval() -> None:
     assert (low, high) == pytest.approx(wilson_interval(3, 6))
 
 
-def test_a_world_with_more_drives_counts_as_often_as_it_was_driven_in_rate_and_interval() -> None:
+def test_worlds_are_weighted_by_their_number_of_drives() -> None:
     many, once = [Trial(HIT, world="a")] * 15, [Trial(ARRIVED, world=f"{n}") for n in range(5)]
     row = summarize("maps", many + once)
     assert row.success == 0.25
@@ -40,7 +40,7 @@ def test_one_world_has_no_interval() -> None:
     assert summarize("doorway", [Trial(ARRIVED, world="w")] * 20).success_interval is None
 
 
-def test_a_stack_is_compared_in_the_drives_that_both_have_done() -> None:
+def test_stacks_are_compared_on_drives_that_both_completed() -> None:
     before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
     after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
     said = compare_drives("fields", before, after)
@@ -59,7 +59,7 @@ def test_the_interval_of_a_difference_is_that_of_the_binomial_distribution_by_ha
     assert (said.mean, said.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
 
 
-def test_the_difference_is_that_of_the_two_rates_in_the_table_however_many_drives_a_world_has() -> None:
+def test_difference_equals_that_of_the_rates_in_the_table() -> None:
     worlds = ("a", "a", "a", "b", "c", "d", "e", "f")
     before = [Trial(ARRIVED, 10.0, world) for world in worlds]
     after = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]

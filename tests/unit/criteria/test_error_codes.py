@@ -9,12 +9,12 @@ ADAPTER = TypeAdapter(ErrorCodeValue)
 
 
 @pytest.mark.parametrize("written", ["GOAL_OCCUPIED", 206, ErrorCode.GOAL_OCCUPIED])
-def test_a_code_may_be_written_by_name_or_number(written):
+def test_error_code_can_be_a_name_or_number(written):
     assert ADAPTER.validate_python(written) is ErrorCode.GOAL_OCCUPIED
 
 
 @pytest.mark.parametrize("written", ["GOAL_OCUPIED", 999, True, 206.0, None, "206"])
-def test_anything_else_is_refused_with_the_names(written):
+def test_unknown_error_code_is_refused_with_the_valid_names(written):
     with pytest.raises(ValidationError, match="GOAL_OCCUPIED"):
         ADAPTER.validate_python(written)
 
@@ -38,5 +38,5 @@ def test_schema_of_error_codes_lists_names_and_numbers():
         ({"error_code": 206, "error_name": "GOAL_OCCUPIED"}, "GOAL_OCCUPIED"),
     ],
 )
-def test_an_event_tells_its_code_by_name(data, name):
+def test_event_shows_the_name_of_its_error_code(data, name):
     assert error_code_name(Event(1, "goal.failed", "a", data)) == name

@@ -76,7 +76,7 @@ def test_a_margin_has_the_sign_of_the_status():
 
 
 @pytest.mark.parametrize("kind", CHOICES)
-def test_on_a_log_that_was_cut_off_nothing_passes(kind):
+def test_nothing_passes_on_a_truncated_log(kind):
     (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "ended": None}), synthetic_case(CASE))
     assert verdict.status is not Status.PASS
 
@@ -92,13 +92,13 @@ def nothing_in(seconds):
 @pytest.mark.parametrize("kind", CHOICES)
 @pytest.mark.parametrize("seconds", [0, 8])
 @pytest.mark.parametrize("case", [CASE, {}], ids=["with goals", "without goals"])
-def test_a_whole_log_with_nothing_in_it_is_never_a_pass_nor_a_crash(kind, seconds, case):
+def test_complete_log_without_messages_does_not_pass(kind, seconds, case):
     (verdict,) = judge([example(kind)], nothing_in(seconds), synthetic_case(case))
     assert verdict.status in (Status.FAIL, Status.INCONCLUSIVE), verdict
 
 
 @pytest.mark.parametrize("kind", ["path_length", "speed", "stopped_within", "localization_error", "goals_reached"])
-def test_a_nan_in_the_truth_is_an_error_that_names_the_time(kind):
+def test_nan_in_the_truth_is_an_error_with_its_time(kind):
     truth = [[0, 0, 0], [4, 2, math.nan], [4.1, 2, 0.5], [8, 2.5, 0.5]]
     (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "truth": truth}), synthetic_case(CASE))
     assert verdict.status is Status.ERROR
@@ -131,6 +131,6 @@ def test_counts_are_bounded_on_both_sides(count, low, high):
     assert (above.status is Status.PASS) == (count <= high)
 
 
-def test_a_nan_is_never_compared():
+def test_comparison_with_nan_is_refused():
     with pytest.raises(InvalidTrace, match="clearance is not a number"):
         at_most("clearance", math.nan, 1.0, "m")

@@ -24,7 +24,7 @@ from simscen.testing.synthetic_trace import synthetic_trace
         (0.5, math.inf, "0.50 m", "≤ inf m"),
     ],
 )
-def test_as_many_digits_as_tell_the_two_apart(value, limit, measured, told):
+def test_numbers_have_enough_digits_to_differ(value, limit, measured, told):
     finding = at_most("x", value, limit, "m")
     assert (finding.measured, finding.limit) == (measured, told)
 
@@ -35,12 +35,12 @@ def test_the_reason_is_reported_only_for_a_violation(value, detail):
     assert at_least("x", -value, -0.5, "m", detail=["why"]).detail == detail
 
 
-def test_scope_of_a_limit_follows_it():
+def test_scope_is_written_after_the_limit():
     assert at_most("x", 1.0, 2.0, "s", context="after lidar.off").limit == "≤ 2.00 s after lidar.off"
     assert at_least("x", 1.0, 2.0, "").limit == "≥ 2.00"
 
 
-def test_counts_are_words():
+def test_counts_are_written_with_a_noun():
     (few,) = counted("x", 1, "recovery", 2, None)
     (many,) = counted("x", 2, "recovery", None, 3)
     assert (few.measured, few.limit, few.margin, few.value) == ("1 recovery", "≥ 2", -1.0, 1.0)
@@ -48,7 +48,7 @@ def test_counts_are_words():
     assert counted("x", 0, "replan", 0, None)[0].measured == "0 replans"
 
 
-def test_a_place_is_that_of_the_moment():
+def test_position_of_a_finding_is_that_at_its_time():
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 2]]})
     finding = missed("x", "a", "b", (trace, 480), ["why"])
     assert (finding.tick, finding.place, finding.detail) == (480, (2.0, 1.0), ("why",))

@@ -51,7 +51,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 @given(SEEDS)
 @settings(deadline=None)
-def test_the_sign_and_every_positive_distance_are_those_of_shapely(seed):
+def test_sign_and_positive_distances_equal_those_of_shapely(seed):
     rng = np.random.default_rng(seed)
     hull, region = star(rng, 0.8, rng.integers(3, 8)), star(rng, 2.0, rng.integers(3, 12))
     if not (shapely.Polygon(hull).is_valid and shapely.Polygon(region).is_valid):

@@ -57,7 +57,7 @@ def placed(outline, x, y, yaw):
 
 @given(SEEDS, st.sampled_from([LONG, NOTCHED]))
 @settings(deadline=None)
-def test_the_distance_to_a_keepout_mask_is_that_of_shapely_to_each_of_its_cells(seed, hull):
+def test_distance_to_a_keepout_mask_equals_that_of_shapely(seed, hull):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [40, 100, 100], share=0.3)
     x, y, yaw = *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)
@@ -76,7 +76,7 @@ def test_the_distance_to_a_keepout_mask_is_that_of_shapely_to_each_of_its_cells(
 
 @given(SEEDS)
 @settings(deadline=None, max_examples=30)
-def test_a_drive_is_as_far_from_a_keepout_mask_as_its_nearest_pose(seed):
+def test_distance_of_a_drive_to_a_keepout_mask_is_that_of_its_nearest_pose(seed):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [100], share=0.1)
     way = [[t, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)] for t in (0, 2, 4)]
@@ -101,7 +101,7 @@ def test_a_round_robot_without_a_footprint_is_judged_by_its_radius():
 
 @given(SEEDS, st.sampled_from([0.0, 0.2, 0.5]))
 @settings(deadline=None, max_examples=50)
-def test_the_speed_is_judged_by_the_cell_that_the_robot_truly_is_in(seed, grace):
+def test_speed_limit_is_that_of_the_cell_at_the_true_pose(seed, grace):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [20, 60], share=0.6)
     way = [[t, *rng.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
@@ -123,7 +123,7 @@ def test_the_speed_is_judged_by_the_cell_that_the_robot_truly_is_in(seed, grace)
         assert finding.status is Status.INCONCLUSIVE
 
 
-def test_a_mask_that_the_log_does_not_have_is_no_pass():
+def test_missing_mask_in_the_log_is_not_a_pass():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     for criterion in (
         {"keepout": {"mask": "b.yaml"}},
@@ -159,7 +159,7 @@ def test_contradictory_values_are_refused(criterion, words):
 
 
 @given(SEEDS)
-def test_highest_value_around_each_sample_is_that_of_all_samples_within_reach(seed):
+def test_windowed_maximum_equals_brute_force(seed):
     """Against a comparison with each other sample; some are exactly at the end of the reach."""
     rng = np.random.default_rng(seed)
     ticks = np.unique(rng.integers(0, 60, 20))

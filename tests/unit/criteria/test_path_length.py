@@ -26,13 +26,13 @@ def found(words, events=REACHED, case=CASE, step=0.5, steps=8):
 
 
 @pytest.mark.parametrize(("limit", "margin", "tick"), [(4.0, 0.0, 960), (3.5, -0.5, 960), (2.0, -2.0, 600)])
-def test_a_length_is_placed_where_it_first_went_beyond_its_bound(limit, margin, tick):
+def test_violated_length_has_the_position_where_the_bound_was_exceeded(limit, margin, tick):
     finding = found({"max": limit})
     assert (finding.margin, finding.tick) == (margin, tick)
     assert finding.place == (tick / 240, 0.0)
 
 
-def test_a_length_that_holds_is_placed_where_the_drive_ended():
+def test_satisfied_length_has_the_position_at_the_end():
     assert found({"max": 5.0}).tick == 960
 
 
@@ -42,12 +42,12 @@ def test_a_perfect_drive_has_the_ratio_one(ratio, status):
 
 
 @pytest.mark.parametrize(("shortest", "status"), [(4.0, Status.INCONCLUSIVE), (3.5, Status.FAIL)])
-def test_without_arriving_only_a_way_that_is_too_long_already_is_decided(shortest, status):
+def test_without_arrival_only_an_exceeded_length_is_decided(shortest, status):
     case = {**CASE, "shortest": {"a": shortest}}
     assert found({"max_ratio": 1.0}, events=REACHED[:1], case=case).status is status
 
 
-def test_a_goal_nearby_has_a_ratio_too():
+def test_near_goal_has_a_path_length_ratio():
     case = {**CASE, "shortest": {"a": 0.5}}
     assert found({"max_ratio": 1.0}, case=case, step=0.25, steps=2).margin == 0.0
 

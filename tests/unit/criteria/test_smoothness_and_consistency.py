@@ -38,7 +38,7 @@ def test_spectrum_uses_the_rate_of_the_truth():
     assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
 
 
-def test_two_samples_have_a_spectrum():
+def test_two_samples_are_enough_for_a_spectrum():
     speeds = np.array([1.0, 0.5])
     assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
 
@@ -103,7 +103,7 @@ def test_last_belief_is_sampled():
     assert "(mean of 1 NEES" in found.limit
 
 
-def test_after_the_last_belief_there_is_no_sample():
+def test_no_sample_after_the_last_belief():
     trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
     (found,) = LocalizationConsistency(every=1.0, after=1 / 240).judge(trace, CASE)
     assert "(mean of 10 NEES" in found.limit

@@ -34,7 +34,7 @@ def spec(kind, words):
         ("clearance", {"min": 0}),
     ],
 )
-def test_each_bound_can_stand_alone(kind, words):
+def test_each_bound_is_optional(kind, words):
     assert spec(kind, words).model_dump(exclude_unset=True) == words
 
 
@@ -92,7 +92,7 @@ def test_defaults_match_the_reference(kind, words, meant):
     assert {key: getattr(found, key) for key in meant} == meant
 
 
-def test_only_clearance_asks_for_clearance_and_for_half_a_meter_more_than_its_bound():
+def test_only_clearance_needs_clearance_up_to_half_a_meter_beyond_its_bound():
     assert spec("clearance", {"min": 3}).clearance_range == 3.5
     others = [spec("speed", {"max": 1}), spec("collisions", {}), spec("goals_reached", {})]
     assert [isinstance(other, Criterion) and other.clearance_range for other in others] == [0.0, 0.0, 0.0]

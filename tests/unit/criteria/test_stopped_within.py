@@ -30,7 +30,7 @@ def found(speeds, *faults, turning=0.0, scans=(), **words):
     return verdict.findings
 
 
-def test_the_bounds_of_rest_belong_to_rest():
+def test_standstill_includes_its_speed_limits():
     (finding,) = found([MOVING] * 12 + [0.02] * 10, (1.0, None), turning=0.05)
     assert (finding.status, finding.value) == (Status.PASS, 0.2)
     (finding,) = found([MOVING] * 12 + [0.0201] * 10, (1.0, None))
@@ -39,7 +39,7 @@ def test_the_bounds_of_rest_belong_to_rest():
     assert finding.status is Status.FAIL
 
 
-def test_a_rest_that_was_over_when_the_fault_began_is_none():
+def test_standstill_before_the_fault_does_not_count():
     (finding,) = found([*[MOVING] * 9, STILL, *[MOVING] * 12], (1.05, None), hold=0.1, time=0.2)
     assert finding.status is Status.FAIL
     both = [*[MOVING] * 8, STILL, *[MOVING] * 13]
@@ -48,7 +48,7 @@ def test_a_rest_that_was_over_when_the_fault_began_is_none():
     assert "it never came to rest" in finding.detail
 
 
-def test_a_rest_that_ends_as_the_fault_begins_is_none():
+def test_standstill_that_ends_at_the_start_of_the_fault_does_not_count():
     speeds = [*[MOVING] * 9, STILL, *[MOVING] * 30]
     first, _ = found(speeds, (1.0, 1.7), (2.5, None), hold=0.1)
     assert (first.status, first.value) == (Status.FAIL, 0.7)
@@ -60,25 +60,25 @@ def test_newest_sample_determines_standstill_at_the_fault():
     assert found([STILL, *[MOVING] * 13], (0.0, None))[0].status is Status.INCONCLUSIVE
 
 
-def test_a_fault_from_the_first_tick_on_sees_the_first_sample():
+def test_fault_from_the_first_tick_includes_the_first_sample():
     first, second = found([STILL, *[MOVING] * 12, *[STILL] * 5], (0.0, 0.5), (1.0, None), hold=0.1)
     assert (first.status, first.value) == (Status.PASS, 0.0)
     assert (second.status, second.value) == (Status.PASS, 0.3)
 
 
-def test_stopping_as_the_fault_ends_is_stopping():
+def test_stop_at_the_end_of_the_fault_counts():
     (finding,) = found([MOVING] * 15 + [STILL] * 5, (1.0, 1.5))
     assert (finding.status, finding.margin) == (Status.PASS, 0.0)
 
 
-def test_moving_when_the_run_and_the_time_end_together_decides_nothing():
+def test_motion_is_undecided_if_run_and_time_limit_end_together():
     (finding,) = found([MOVING] * 16, (1.0, None))
     assert finding.status is Status.INCONCLUSIVE
     (finding,) = found([MOVING] * 17, (1.0, None))
     assert (finding.status, finding.value) == (Status.FAIL, 0.6)
 
 
-def test_moving_when_the_fault_and_the_time_end_together_decides_nothing():
+def test_motion_is_undecided_if_fault_and_time_limit_end_together():
     (finding,) = found([MOVING] * 30, (1.0, 1.5))
     assert finding.status is Status.INCONCLUSIVE
 
@@ -97,7 +97,7 @@ def test_a_scan_older_than_two_periods_is_reported(scan, told):
 
 
 @pytest.mark.parametrize(("peak", "told"), [(9, "0.50"), (10, "0.75"), (15, "0.75"), (20, "0.50"), (21, "0.50")])
-def test_the_top_speed_is_that_of_the_time_it_took(peak, told):
+def test_finding_states_the_maximum_speed_in_the_given_duration(peak, told):
     speeds = [MOVING] * 20 + [STILL] * 5
     if peak < 20:
         speeds[peak] = 0.75
@@ -105,7 +105,7 @@ def test_the_top_speed_is_that_of_the_time_it_took(peak, told):
     assert finding.detail[1] == f"its top speed in that time was {told} m/s"
 
 
-def test_the_top_speed_may_be_low_and_be_that_of_the_last_moment():
+def test_maximum_speed_can_be_at_the_end():
     (finding,) = found([0.1] * 25, (1.0, None))
     assert finding.detail[1] == "its top speed in that time was 0.10 m/s"
     (finding,) = found([0.1] * 24 + [0.2], (1.0, None))

@@ -37,7 +37,7 @@ def to_the_end(start):
     ],
     ids=["once", "again", "another entry's end is not its own", "one within the other", "in turns", "no time"],
 )
-def test_a_fault_lasts_from_its_own_start_to_its_own_end(events, expected):
+def test_fault_is_active_from_its_start_to_its_end(events, expected):
     assert happened(*events) == expected
 
 
@@ -51,13 +51,13 @@ def switched(*switches, grace=0.0, region="wet"):
     return [(first / SECOND, last / SECOND) for first, last in enabled_spans(trace, "keepout", region, grace)]
 
 
-def test_zone_is_on_from_each_switch_on_to_the_next_switch_off():
+def test_zone_is_enabled_between_switching_on_and_off():
     assert switched((2, True), (5, False), (7, True), (9, False)) == [(2, 5), (7, 9)]
     assert switched((2, True)) == [(2, 20)]
     assert switched() == []
 
 
-def test_zone_that_is_switched_off_first_was_on_from_the_start():
+def test_zone_first_switched_off_is_enabled_from_the_start():
     assert switched((3, False)) == [(0, 3)]
     assert switched((0, False)) == [(0, 0)]
 
@@ -66,7 +66,7 @@ def test_switching_to_the_same_state_changes_nothing():
     assert switched((2, True), (4, True), (6, False), (8, False), (9, True)) == [(2, 6), (9, 20)]
 
 
-def test_grace_is_left_out_after_each_switch_on():
+def test_grace_period_follows_each_switch_on():
     assert switched((2, True), (5, False), (7, True), (8, False), grace=1.0) == [(3, 5), (8, 8)]
     assert switched((2, True), (3, False), grace=1.5) == []
 

@@ -17,7 +17,7 @@ def drawn(x: float, radius_px: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("radius_px", [MAX_ELLIPSE_RADIUS_PX, MAX_ELLIPSE_RADIUS_PX + 1, 1e6])
-def test_the_edge_of_a_large_disc_is_where_it_belongs(radius_px: float) -> None:
+def test_edge_of_a_large_disc_is_exact(radius_px: float) -> None:
     row = drawn(5.0 - radius_px / 50.0, radius_px)[500]
     edge = 5 * 50 * SUPERSAMPLING
     assert row[edge - 8].tolist() == list(RED)

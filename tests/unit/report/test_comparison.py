@@ -54,7 +54,7 @@ def lines(comparison: Comparison, columns: int | None = None) -> list[str]:
     return [plain_text(line) for line in comparison_lines(comparison, "", columns)]
 
 
-def test_on_the_console_it_is_exactly_this(comparison) -> None:
+def test_console_output_snapshot(comparison) -> None:
     assert "\n".join(lines(comparison)) + "\n" == EXPECTED
 
 
@@ -67,7 +67,7 @@ def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(compariso
         assert (next(iter(long)) in "\n".join(told)) == (columns == 200)
 
 
-def test_a_long_name_keeps_its_ends() -> None:
+def test_long_name_is_shortened_in_the_middle() -> None:
     assert shorten("navigation-stack-of-january", 16) == "navigat…-january"
     assert shorten("short", 16) == "short"
 
@@ -79,7 +79,7 @@ def test_first_changed_outcomes_are_listed_and_the_rest_counted(comparison) -> N
     assert "    and 15 more, in the JSON results" in told
 
 
-def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:
+def test_comparison_is_before_the_last_line_of_piped_output(comparison) -> None:
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     with text_reporter(out) as listen:
         listen(SessionStarted("0.1.0", 20, 2, 1, ids=("a/b", "a/c"), stacks=("ref=reference", "mine=./nav")))
@@ -91,7 +91,7 @@ def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:
     assert told.splitlines()[-1].startswith("1 passed")
 
 
-def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, passed) -> None:
+def test_comparison_on_the_page_is_escaped(comparison, passed) -> None:
     html = to_html(SessionReport([passed], comparison=comparison))
     for tag in ("section", "table", "tr", "td", "th", "h3", "p", "div"):
         assert len(re.findall(f"<{tag}[ >]", html)) == html.count(f"</{tag}>"), tag
@@ -101,7 +101,7 @@ def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, 
     assert '<section class="in"' not in to_html(SessionReport([passed]))
 
 
-def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
+def test_comparison_is_in_the_github_summary(comparison, passed) -> None:
     session = SessionFinished(1, 0, 0, 1.0, 1.0, comparison=comparison)
     told = summary_markdown([passed], session)
     assert "| navigation/goal | 10/10 | 6/9 |" in told
@@ -110,7 +110,7 @@ def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
     assert rows[0].count("|") == 9
 
 
-def test_in_results_json_it_is_data(comparison, passed) -> None:
+def test_comparison_in_results_json(comparison, passed) -> None:
     assert (
         json.loads("".join(json_parts([passed], "", comparison)))["comparison"]["against"][0]["flips"][0]["seed"] == 3
     )

@@ -53,7 +53,7 @@ def of(run, **changes):
     return replace(run, result=replace(run.result, **changes))
 
 
-def test_the_folder_that_all_ids_share_is_not_repeated_on_every_line(passed):
+def test_common_folder_of_the_ids_is_omitted(passed):
     out = io.StringIO()
     one, other = (of(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
     ids = ("scenarios/fancy/long", "scenarios/faults/a")
@@ -67,7 +67,7 @@ def told(reporter, session):
             listen(event)
 
 
-def test_piped_output_is_exactly_this(session):
+def test_piped_output_snapshot(session):
     out = io.StringIO()
     told(text_reporter(utf8(out)), session)
     assert out.getvalue() == EXPECTED
@@ -91,7 +91,7 @@ class utf8:
         return False
 
 
-def test_a_stream_that_knows_only_ascii_gets_ascii(session):
+def test_ascii_stream_gets_ascii_symbols(session):
     raw = io.BytesIO()
     out = io.TextIOWrapper(raw, encoding="ascii")
     told(text_reporter(out), session)
@@ -101,7 +101,7 @@ def test_a_stream_that_knows_only_ascii_gets_ascii(session):
     assert "  x faults/lidar_off" in text
 
 
-def test_a_terminal_that_knows_only_ascii_gets_plain_lines(session):
+def test_ascii_terminal_gets_plain_lines(session):
     class Terminal(io.TextIOWrapper):
         def isatty(self):
             return True
@@ -113,7 +113,7 @@ def test_a_terminal_that_knows_only_ascii_gets_plain_lines(session):
     assert b"\x1b" not in raw.getvalue()
 
 
-def test_a_terminal_gets_the_same_facts_in_color_and_user_text_is_no_markup(session):
+def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
     out = io.StringIO()
     told(text_reporter(out, live=True), session)
     plain = re.sub(r"\x1b(\[[0-9;?]*[a-zA-Z]|\]8;.*?\x1b\\)", "", out.getvalue())
@@ -131,7 +131,7 @@ def test_runs_of_one_scenario_show_their_seeds(passed):
     assert "navigation/goal (seed 2) " in out.getvalue()
 
 
-def test_no_line_of_plain_output_can_be_taken_for_a_command_of_a_ci(session, failed):
+def test_plain_output_contains_no_ci_commands(session, failed):
     sly = replace(of(failed, key=RunKey("::set-output name=x::y", 1)), again="::stop-commands::x\n##[group]x")
     named = replace(failed.result.verdicts[0], id="::error::y", criterion="::error::y")
     sly = of(sly, verdicts=(named,), lines=(1,))
@@ -140,7 +140,7 @@ def test_no_line_of_plain_output_can_be_taken_for_a_command_of_a_ci(session, fai
     assert not re.search(r"^\s*::|##\[", out.getvalue(), re.MULTILINE)
 
 
-def test_github_annotations_stand_at_the_line_of_the_criterion_and_are_escaped(failed, crashed):
+def test_github_annotations_have_the_line_of_the_criterion_and_are_escaped(failed, crashed):
     error, warning = annotations(failed)
     assert error == (
         "::error file=scenarios/faults/lidar_off.scenario.yaml,line=27,title=faults/lidar_off (seed 7)::"
@@ -155,7 +155,7 @@ def test_github_annotations_stand_at_the_line_of_the_criterion_and_are_escaped(f
     assert "100 %25, a:b" in line
 
 
-def test_github_annotations_name_files_from_the_checkout_wherever_the_command_was_called(failed, tmp_path, monkeypatch):
+def test_github_annotations_have_paths_relative_to_the_checkout(failed, tmp_path, monkeypatch):
     file = tmp_path / "repo/robots/sim/aisle.scenario.yaml"
     file.parent.mkdir(parents=True)
     file.write_text("")
@@ -170,7 +170,7 @@ def test_github_annotations_name_files_from_the_checkout_wherever_the_command_wa
     assert "file=etc/hostname,line=27," in annotations(outside)[0]
 
 
-def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_live_markup(session, passed, crashed):
+def test_github_summary_lists_failures_first_and_is_escaped(session, passed, crashed):
     summary = summary_markdown([passed, crashed], session[-1])
     rows = summary.splitlines()[4:]
     assert "crashed: SIGSEGV" in rows[0]
@@ -187,7 +187,7 @@ def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
     assert stopped.startswith(" stopped&#95;within: 0.84 s &#62; 0.50 s") and fast.startswith("speed: 0.60 m/s")
 
 
-def test_the_summary_shows_the_pictures_of_failures_where_they_have_an_address(session, passed, failed):
+def test_summary_shows_pictures_of_failures_that_have_a_url(session, passed, failed):
     here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
     told = summary_markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
     assert told.endswith(
@@ -197,7 +197,7 @@ def test_the_summary_shows_the_pictures_of_failures_where_they_have_an_address(s
     assert "![" not in summary_markdown([passed, here], session[-1])
 
 
-def test_github_output_holds_the_plain_lines_too(session):
+def test_github_output_contains_the_plain_lines(session):
     out, summary = io.StringIO(), io.StringIO()
     told(GitHubReporter(utf8(out), summary), session)
     lines = [line for line in out.getvalue().splitlines() if not line.startswith("::")]
@@ -205,7 +205,7 @@ def test_github_output_holds_the_plain_lines_too(session):
     assert summary.getvalue().startswith("### simscen: 1 passed, 1 failed, 1 error\n")
 
 
-def test_the_machine_format_is_the_results_file_and_nothing_else(session, passed, failed, crashed):
+def test_json_format_is_the_results_file(session, passed, failed, crashed):
     out = io.StringIO()
     told(JsonReporter(out), session)
     assert json.loads(out.getvalue()) == json.loads("".join(json_parts([passed, failed, crashed], "out")))
@@ -213,7 +213,7 @@ def test_the_machine_format_is_the_results_file_and_nothing_else(session, passed
 
 
 @pytest.mark.parametrize("live", [True, False])
-def test_a_session_that_breaks_off_leaves_the_terminal_as_it_was(session, live):
+def test_aborted_session_restores_the_terminal(session, live):
     out = io.StringIO()
     with pytest.raises(KeyboardInterrupt), text_reporter(out, live=live) as listen:
         listen(session[0])
@@ -223,7 +223,7 @@ def test_a_session_that_breaks_off_leaves_the_terminal_as_it_was(session, live):
     assert hidden == shown
 
 
-def test_a_command_that_repeats_a_run_is_one_line_that_a_shell_reads_as_it_was(failed):
+def test_repeat_command_is_one_quoted_shell_line(failed):
     words = ["simscen", "run", "a.yaml", "--stack", "x=sh -c 'echo  two;\n\techo \"it'\"'\"'s\"'"]
     out = io.StringIO()
     told(text_reporter(utf8(out)), [replace(failed, again=shlex.join(words))])

@@ -45,11 +45,11 @@ class Stream(io.StringIO):
     ],
     ids=str,
 )
-def test_the_environment_decides_before_the_terminal_does(terminal, environ, look):
+def test_environment_variables_override_the_terminal(terminal, environ, look):
     assert detect_style(Stream(terminal), environ) == look
 
 
-def test_a_stream_that_knows_only_ascii_gets_no_escapes():
+def test_ascii_stream_gets_no_escape_sequences():
     assert detect_style(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == TerminalStyle(
         has_color=False, has_live_progress=False, is_terminal=True
     )

@@ -38,13 +38,13 @@ def test_long_column_is_wrapped_between_words():
     ]
 
 
-def test_behind_a_label_the_text_goes_on_below_itself():
+def test_text_after_a_label_has_a_hanging_indent():
     line = (StyledText("      happened  ", "quiet"), StyledText("the pallet falls: t = 10.00 s, it fell"))
     assert texts(line, 42) == ["      happened  the pallet falls: t =", "              10.00 s, it fell"]
 
 
 @pytest.mark.parametrize("columns", [40, 60, 80])
-def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
+def test_wrapped_command_can_be_copied(columns):
     words = ["simscen", "run", "a b.yaml", "--stack", "mine=./my_nav --verbose", "--world-path", "worlds", "--lenient"]
     lines = texts((StyledText("      again     ", "quiet"), StyledText(shlex.join(words), is_shell=True)), columns)
     assert len(lines) > 1
@@ -54,7 +54,7 @@ def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
     assert subprocess.run(shell, capture_output=True, text=True, check=True).stdout.split("\0")[:-1] == words
 
 
-def test_a_path_is_longer_than_a_line_rather_than_broken():
+def test_long_path_is_not_broken():
     path = "simscen-out/20261122T074142Z-09d4/runs/scenarios/faults/lidar_off/seed-1/map.png"
     line = (StyledText("      picture   ", "quiet"), StyledText(path, file=path))
     assert texts(line, 40)[-1] == path
@@ -71,7 +71,7 @@ def test_wrapping_breaks_only_at_spaces():
     assert all(not text.lstrip().startswith(",") for n in range(9, 40) for text in texts(line, n))
 
 
-def test_a_line_without_a_terminal_is_as_long_as_it_is():
+def test_lines_are_not_wrapped_without_a_terminal():
     assert wrap_line(RUN, None) == [RUN]
 
 
@@ -80,7 +80,7 @@ TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Zl", "Zp"
 
 @given(st.lists(TEXTS, min_size=1, max_size=4), st.integers(20, 100))
 @example(["  ", "", " a ", "b"], 20)
-def test_the_words_are_the_same_in_the_same_order_and_fit_unless_one_alone_does_not(parts, columns):
+def test_wrapping_keeps_all_words_in_order_within_the_width(parts, columns):
     line = tuple(StyledText(part) for part in parts)
     lines = texts(line, columns)
     assert "".join("".join(lines).split()) == "".join(plain_text(line).split())

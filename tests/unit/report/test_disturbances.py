@@ -41,7 +41,7 @@ def printed(run) -> list[str]:
     return out.read().splitlines()
 
 
-def test_the_console_tells_of_a_failed_run_what_happened_when(disturbed):
+def test_console_lists_disturbances_of_a_failed_run_with_times(disturbed):
     lines = printed(disturbed)
     assert lines[1] == "      disturbance did not happen: <b>::error:: (when time: 90 s)"
     assert lines[5:8] == [
@@ -55,7 +55,7 @@ def test_a_run_that_passed_stays_one_line(passed):
     assert len(printed(replace(passed, result=replace(passed.result, disturbances=(FELL, AGAIN, NEVER))))) == 1
 
 
-def test_junit_tells_all_of_them_and_names_the_one_that_failed(disturbed):
+def test_junit_lists_all_disturbances_and_the_failed_one(disturbed):
     case = next(ElementTree.fromstring(b"".join(xml_parts([disturbed]))).iter("testcase"))
     assert case.find("failure").get("type") == "disturbance"
     assert "lidar_off.scenario.yaml:9: disturbance did not happen" in case.find("failure").text
@@ -66,7 +66,7 @@ def test_junit_tells_all_of_them_and_names_the_one_that_failed(disturbed):
     ]
 
 
-def test_an_annotation_stands_at_the_line_of_the_entry(disturbed):
+def test_annotation_has_the_line_of_the_entry(disturbed):
     assert any("line=9" in line and "disturbance did not happen" in line for line in annotations(disturbed))
 
 

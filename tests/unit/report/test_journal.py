@@ -36,7 +36,7 @@ def written(folder, runs, finished, ended=True):
     assert journal.error is None
 
 
-def test_reports_made_from_the_journal_are_those_of_the_session(tmp_path, runs):
+def test_reports_from_the_journal_equal_those_of_the_session(tmp_path, runs):
     inside = [
         replace(run, artifacts=replace(run.artifacts, **dict.fromkeys(("folder", "mcap", "picture", "result"), "")))
         for run in runs
@@ -49,7 +49,7 @@ def test_reports_made_from_the_journal_are_those_of_the_session(tmp_path, runs):
     assert "".join(json_parts(past.runs)) == "".join(json_parts(inside))
 
 
-def test_files_are_kept_relative_to_the_folder_so_that_it_can_be_moved(tmp_path, passed):
+def test_paths_in_the_journal_are_relative_to_its_folder(tmp_path, passed):
     (tmp_path / "old").mkdir()
     log = str(tmp_path / "old" / "a" / "run.mcap")
     written(tmp_path / "old", [passed], [replace(passed, artifacts=replace(passed.artifacts, mcap=log))])
@@ -70,7 +70,7 @@ def test_planned_run_without_result_is_an_error(tmp_path, runs):
 
 
 @pytest.mark.parametrize("lost", [1, 10, 200])
-def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
+def test_truncated_last_line_is_ignored(tmp_path, runs, lost):
     written(tmp_path, runs, runs, ended=False)
     file = tmp_path / JOURNAL_FILE
     file.write_bytes(file.read_bytes()[:-lost])
@@ -79,7 +79,7 @@ def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
     ] == "interrupted"
 
 
-def test_the_next_session_goes_on_behind_the_last_whole_line(tmp_path, runs):
+def test_next_session_continues_after_the_last_complete_line(tmp_path, runs):
     written(tmp_path, runs, runs, ended=False)
     with (tmp_path / JOURNAL_FILE).open("ab") as file:
         file.write(b'{"event": "fini')
@@ -104,7 +104,7 @@ def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
         Journal(tmp_path)
 
 
-def test_a_full_disk_costs_lines_but_never_half_a_line(tmp_path, runs, monkeypatch):
+def test_full_disk_loses_only_whole_lines(tmp_path, runs, monkeypatch):
     import errno
     import os
 
@@ -136,14 +136,14 @@ def test_a_full_disk_costs_lines_but_never_half_a_line(tmp_path, runs, monkeypat
         (b'{"event": "planned", "format": 1, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),
     ],
 )
-def test_other_files_are_no_journals(tmp_path, content, told):
+def test_other_files_are_refused_as_journals(tmp_path, content, told):
     if content is not None:
         (tmp_path / JOURNAL_FILE).write_bytes(content)
     with pytest.raises(InvalidInput, match=told):
         read_journal(tmp_path)
 
 
-def test_answers_that_an_interrupt_kept_from_the_journal_are_added_once(tmp_path, runs):
+def test_results_missing_after_an_interrupt_are_added_once(tmp_path, runs):
     journal = Journal(tmp_path)
     journal.plan(planned(runs), "0.1.0", 2)
     journal(runs[1])

@@ -38,7 +38,7 @@ def cases(document):
     return {case.name: case for suite in document for case in suite}
 
 
-def test_another_reader_sees_one_case_for_each_run(passed, failed, crashed):
+def test_junitparser_reads_one_case_for_each_run(passed, failed, crashed):
     document = read([failed, crashed, passed])
     assert (document.tests, document.failures, document.errors) == (3, 1, 1)
     assert [suite.name for suite in document] == sorted(run.result.path for run in (passed, failed, crashed))
@@ -48,7 +48,7 @@ def test_another_reader_sees_one_case_for_each_run(passed, failed, crashed):
     assert found["lidar_off [seed 7]"].result[0].type == "stopped_within"
 
 
-def test_another_reader_sees_known_failures_and_what_was_not_run_as_skipped(passed, failed):
+def test_junitparser_reads_known_failures_and_unrun_cases_as_skipped(passed, failed):
     known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
     skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
     document = read([known, skipped])
@@ -61,7 +61,7 @@ def test_another_reader_sees_known_failures_and_what_was_not_run_as_skipped(pass
     }
 
 
-def test_a_failure_says_where_and_what_for_every_criterion(failed):
+def test_failure_has_position_and_reason_of_each_criterion(failed):
     (element,) = ElementTree.fromstring(b"".join(xml_parts([failed]))).iter("failure")
     message = "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"
     assert element.get("message") == message
@@ -92,7 +92,7 @@ def test_file_line_properties_and_attachments_are_there(failed):
     ]
 
 
-def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed):
+def test_strict_family_conforms_to_the_jenkins_schema(passed, failed, crashed):
     known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
     skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
     root = ElementTree.fromstring(b"".join(xml_parts([passed, failed, crashed, known, skipped], family="xunit2")))
@@ -105,7 +105,7 @@ def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed)
 @pytest.mark.parametrize(
     "kind", ["crashed", "timeout", "out-of-memory", "invalid", "interrupted", "not-run", "internal"]
 )
-def test_a_run_that_could_not_be_completed_is_an_error_of_its_kind(crashed, kind):
+def test_aborted_run_is_an_error_with_its_kind(crashed, kind):
     run = of(crashed, error=RunFailure(kind, "why", "worker's last words"))
     (element,) = ElementTree.fromstring(b"".join(xml_parts([run]))).iter("error")
     assert element.get("type") == kind
@@ -117,20 +117,20 @@ def test_names_are_unique_even_when_runs_are_not(passed):
     assert len(cases(document)) == 3
 
 
-def test_the_order_in_which_runs_end_does_not_show(passed, failed, crashed):
+def test_order_of_finished_runs_does_not_change_the_file(passed, failed, crashed):
     assert b"".join(xml_parts([passed, failed, crashed])) == b"".join(xml_parts([crashed, passed, failed]))
 
 
 @settings(max_examples=60)
 @given(st.text(max_size=60), st.text(max_size=200), st.text(max_size=40))
-def test_whatever_the_text_the_document_is_well_formed_and_reads_back(name, tail, kind):
+def test_document_with_any_text_is_well_formed(name, tail, kind):
     failure = RunFailure(kind, tail, tail)
     run = RunFinished(RunResult(RunKey(name, 1), name, Outcome.ERROR, error=failure, ended=name), again=tail)
     root = ElementTree.parse(io.BytesIO(b"".join(xml_parts([run])))).getroot()
     assert len(list(root.iter("testcase"))) == 1
 
 
-def test_escape_sequences_and_lone_surrogates_become_visible(crashed):
+def test_escape_sequences_and_lone_surrogates_are_made_visible(crashed):
     run = of(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
     text = b"".join(xml_parts([run])).decode()
     assert r"\x1b[31m \ud800 \u202e" in text

@@ -40,7 +40,7 @@ def failed_in(folder):
     return {key.scenario for key in last_failed(folder)}
 
 
-def test_without_a_session_there_is_nothing_to_say(tmp_path):
+def test_no_failed_runs_without_a_session(tmp_path):
     assert last_failed(tmp_path) is None
     assert last_failed(tmp_path / "nowhere") is None
 
@@ -50,7 +50,7 @@ def test_failures_and_errors_count_as_failed(session, tmp_path):
     assert failed_in(tmp_path) == {"a", "c"}
 
 
-def test_the_newest_outcome_of_each_run_counts(session, tmp_path):
+def test_newest_outcome_of_each_run_counts(session, tmp_path):
     session(2, a="passed", b="failed")
     newest = session(3, b="passed")
     session(1, a="failed", b="failed", c="failed")
@@ -58,18 +58,18 @@ def test_the_newest_outcome_of_each_run_counts(session, tmp_path):
     assert failed_in(tmp_path) == {"c"}
 
 
-def test_a_run_that_was_interrupted_is_still_what_it_was(session, tmp_path):
+def test_interrupted_run_keeps_its_earlier_outcome(session, tmp_path):
     session(1, a="failed", b="passed")
     session(2, a="interrupted", b="not-run", c="interrupted")
     assert failed_in(tmp_path) == {"a"}
 
 
-def test_of_two_runs_that_should_be_equal_one_failure_is_enough(session, tmp_path):
+def test_one_failure_of_two_determinism_runs_counts(session, tmp_path):
     session(1, a="passed", a_again="nondeterministic")
     assert failed_in(tmp_path) == {"a"}
 
 
-def test_a_journal_that_cannot_be_read_and_the_link_to_the_newest_are_passed_over(session, tmp_path):
+def test_unreadable_journals_and_the_latest_link_are_ignored(session, tmp_path):
     (session(2, a="failed") / "events.jsonl").write_text("{")
     folder = session(1, a="failed")
     (tmp_path / "latest").symlink_to(folder.name)

@@ -79,7 +79,7 @@ def test_free_space_and_walls_are_where_the_map_has_them():
     assert near(pixel(image, -0.2, 3.0), palette.UNKNOWN)
 
 
-def test_the_driven_way_runs_through_the_door_and_changes_color_with_time():
+def test_driven_path_leads_through_the_door_and_is_colored_by_time():
     image = draw_map_picture(scene())
     early, late = pixel(image, 1.0, 1.75), pixel(image, 7.0, 2.5)
     assert near(early, palette.time_color(0.25), 40)
@@ -87,7 +87,7 @@ def test_the_driven_way_runs_through_the_door_and_changes_color_with_time():
     assert early[2] > late[2]
 
 
-def test_a_spawned_object_stands_where_its_event_says():
+def test_spawned_object_is_drawn_at_the_pose_of_its_event():
     assert not near(pixel(draw_map_picture(scene()), 7.3, 4.6), palette.FREE)
     without = scene(events=[[1, "goal.accepted", "end"]])
     assert near(pixel(draw_map_picture(without), 6.8, 4.2), palette.FREE)
@@ -118,7 +118,7 @@ def test_the_same_run_gives_the_same_picture(tmp_path):
 
 
 @pytest.mark.parametrize("seconds", [0, 0.025, 1])
-def test_a_run_that_hardly_began_has_a_picture_too(seconds):
+def test_picture_of_a_run_of_one_tick(seconds):
     short = scene(seconds=seconds, truth=[[0, 1, 1]], ended=None, events=[])
     assert draw_map_picture(short).width > 300
 
@@ -136,7 +136,7 @@ def test_a_turned_map_is_painted_turned():
     assert near(image.getpixel((int(u), int(v))), palette.FREE)
 
 
-def test_thin_walls_of_a_huge_map_stay_whole():
+def test_thin_walls_of_a_huge_map_are_not_interrupted():
     cells = np.zeros((2000, 2000), dtype=np.int8)
     cells[:, 1000] = 100
     map_picture = OccupancyGrid(cells, 0.01)
@@ -156,7 +156,7 @@ def test_outline_has_all_parts_and_unknown_shapes_are_discs():
 
 
 @pytest.mark.parametrize("data", [{}, {"shape": "mesh", "size": []}, {"shape": "box", "size": "big"}])
-def test_an_event_that_does_not_describe_a_shape_still_gives_one(data):
+def test_event_without_a_shape_is_drawn_as_a_default_shape(data):
     event = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[
         0
     ]

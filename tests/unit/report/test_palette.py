@@ -34,13 +34,13 @@ def deuteranope(color):
 
 @pytest.mark.parametrize("theme", [palette.LIGHT, palette.DARK])
 @pytest.mark.parametrize("text", TEXTS)
-def test_every_text_of_a_page_can_be_read_on_it(theme, text):
+def test_text_of_the_page_has_enough_contrast(theme, text):
     for ground in ("page", "panel"):
         assert contrast(rgb(theme[text]), rgb(theme[ground])) >= 4.5
 
 
 @pytest.mark.parametrize("color", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PEDESTRIAN])
-def test_every_text_of_a_picture_can_be_read_on_it(color):
+def test_text_of_the_picture_has_enough_contrast(color):
     assert contrast(color, palette.PAGE) >= 4.5
 
 
@@ -49,6 +49,6 @@ def test_pass_and_fail_colors_are_distinguishable_with_color_blindness():
     assert apart > 60
 
 
-def test_the_colors_of_time_grow_lighter():
+def test_time_colors_become_lighter():
     steps = [luminance(palette.time_color(k / 8)) for k in range(9)]
     assert steps == sorted(steps)

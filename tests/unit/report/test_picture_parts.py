@@ -104,17 +104,17 @@ def of(scene, what):
     return [points for name, points in drawn_parts(scene) if name.startswith(what)]
 
 
-def test_the_picture_has_every_part_where_the_world_has_it():
+def test_picture_has_all_parts_at_their_positions():
     assert told(everything()) == GOLDEN.read_text(encoding="utf-8").splitlines()
 
 
-def test_a_door_that_shut_hangs_on_its_hinge_and_ends_at_its_post():
+def test_closed_door_is_drawn_from_hinge_to_post():
     (panel,) = of(everything(), "door door")
     assert (panel[:, 1].min(), panel[:, 1].max()) == pytest.approx((2.0, 3.0))
     assert panel[:, 0].mean() == pytest.approx(5.0, abs=0.001)
 
 
-def test_a_robot_that_is_carried_leaves_a_gap_with_a_mark_on_either_side():
+def test_kidnapping_is_a_gap_with_marks_on_both_sides():
     scene = everything()
     ways = of(scene, "path")
     assert [np.round(way, 1).tolist() for way in ways] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
@@ -122,12 +122,12 @@ def test_a_robot_that_is_carried_leaves_a_gap_with_a_mark_on_either_side():
     assert np.round(of(scene, "set down")[0], 1).tolist() == [[7, 1]]
 
 
-def test_a_short_teleport_leaves_a_gap_as_well():
+def test_short_teleport_is_a_gap():
     near = everything(truth=[[0, 1, 1], [4, 1, 3], [4.02, 1.1, 3], [10, 3, 3]])
     assert len(of(near, "path")) == 2
 
 
-def test_a_belief_that_jumps_is_not_a_line_through_walls():
+def test_jump_of_the_belief_is_not_a_line():
     assert len(of(everything(), "belief")) == 2
 
 
@@ -136,21 +136,21 @@ def test_goal_shows_its_result(goal, fate):
     assert [name for name, _ in drawn_parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
 
 
-def test_a_goal_that_was_never_sent_is_not_there():
+def test_goal_that_was_never_sent_is_not_drawn():
     assert of(everything(), "goal unsent") == []
 
 
-def test_a_goal_that_only_the_robot_believes_reached_has_failed():
+def test_goal_reached_only_by_the_estimate_is_drawn_as_failed():
     events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
     assert "goal shelf failed" in {name for name, _ in drawn_parts(everything(events=events))}
 
 
-def test_a_failure_is_reported_with_the_code_and_name_that_nav2_gives_it():
+def test_failure_has_the_error_code_and_name_of_nav2():
     assert map_picture.end_reason(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
     assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in drawn_parts(everything()))
 
 
-def test_labels_keep_off_ways_robots_goals_and_each_other():
+def test_labels_do_not_overlap_paths_robots_goals_or_each_other():
     canvas = map_picture.draw_map_canvas(everything())
     busy, boxes = canvas.blocked_fractions, []
     for note in canvas.texts:
@@ -163,7 +163,7 @@ def test_labels_keep_off_ways_robots_goals_and_each_other():
         boxes.append((left, top, right, low))
 
 
-def test_no_reason_is_cut_off_beside_the_map():
+def test_reasons_beside_the_map_are_not_truncated():
     long = " ".join(f"reason{k}" for k in range(60)) + " " + "x" * 90
     assert " ".join(sidebar._wrap(long)).replace(" ", "") == long.replace(" ", "")
     scene = everything()
@@ -201,7 +201,7 @@ pass: [{collisions: {max: 0}}]
 """
 
 
-def test_a_picture_from_the_log_alone_has_the_parts_of_that_of_the_run(tmp_path):
+def test_picture_from_the_log_has_the_parts_of_that_of_the_run(tmp_path):
     file = tmp_path / "doors.scenario.yaml"
     file.write_text(DOORS)
     prepared = prepare(load_scenario(file, tmp_path))

@@ -44,11 +44,11 @@ def test_kept_runs_do_not_count_for_the_estimate(session):
     assert session(done=2, kept=5).remaining_s == 3.0
 
 
-def test_after_one_run_it_is_too_early_to_say(session):
+def test_no_estimate_after_one_run(session):
     assert session(done=1).text == "1 of 10"
 
 
-def test_a_single_run_counts_nothing():
+def test_single_run_has_no_progress_text():
     remaining = ProgressEstimate(Clock())
     remaining(SessionStarted("0.1.0", 1, 1, 1))
     assert remaining.text == ""

@@ -87,7 +87,7 @@ class Read:
 
 
 @pytest.mark.parametrize("step", [1.0, 0.01, 1e-5])
-def test_numbers_come_back_to_within_half_a_step(step: float) -> None:
+def test_quantized_numbers_are_exact_to_half_a_step(step: float) -> None:
     values = np.concatenate(([0.0, -1e3, 1e3, math.inf, -math.inf], np.random.default_rng(3).normal(0, 50, 500)))
     columns = PackedColumns()
     columns.add([1.0])
@@ -109,7 +109,7 @@ def test_nonnumeric_values_stay_none() -> None:
     assert (first, third) == (1.0, 2.0) and math.isnan(second)
 
 
-def test_positions_are_those_of_the_log_and_every_event_is_there() -> None:
+def test_replay_contains_positions_and_events_of_the_log() -> None:
     words = {
         "seconds": 4,
         "truth": [[0, 0, 0, 0], [2, 1, 0.5, 3.0], [4, 1, 2, -3.0]],
@@ -141,7 +141,7 @@ def test_positions_are_those_of_the_log_and_every_event_is_there() -> None:
     assert [goal["line"] for goal in robot["goals"]] == [5, 6]
 
 
-def test_a_bound_is_drawn_on_the_signal_that_it_bounds() -> None:
+def test_bound_is_drawn_on_its_signal() -> None:
     finding = Finding(Status.FAIL, "speed", "0.50 m/s", "≤ 0.40 m/s", -0.1, "m/s", 0.5, 240, (1.0, 0.0))
     log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}, text=TEXT)
     run = Read(replay_page([(log, result_of(Verdict("speed", "speed", "fail", (finding,))))])).runs[0]
@@ -185,7 +185,7 @@ def test_script_is_one_module_and_never_creates_markup_from_text() -> None:
             assert len(re.findall(rf"^(?:async )?(?:function|class|const) {name}\b", text, re.MULTILINE)) == 1
 
 
-def test_a_local_costmap_lies_where_the_robot_believes_that_its_odometry_began() -> None:
+def test_local_costmap_is_drawn_at_the_estimated_odom_frame() -> None:
     """The sketch's odometry is the truth; the belief is beside it and turned, and so is the odom frame in the map."""
     log = log_of({"seconds": 2, "truth": [[0, 1, 0, 0], [2, 3, 0, 0]], "belief": {"offset": [0.5, 1.0, np.pi / 2]}})
     correction = map_from_odom(log.trace, 240)
@@ -194,7 +194,7 @@ def test_a_local_costmap_lies_where_the_robot_believes_that_its_odometry_began()
     assert correction.compose(rolled) == pytest.approx(tuple(believed[:3]))
 
 
-def test_grids_of_one_place_are_kept_as_their_differences() -> None:
+def test_grids_with_equal_frame_are_stored_as_differences() -> None:
     cells = np.zeros((3, 4), dtype=np.int8)
     near = np.full((2, 2), 50, dtype=np.int8)
     seen = SensorMessages(SimTime(240))

@@ -5,7 +5,7 @@ from simscen.judge.result_json import from_data
 from simscen.report.results_json import as_document, json_parts
 
 
-def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
+def test_results_contain_each_run_once(passed, failed, crashed):
     document = json.loads("".join(json_parts([failed, passed, crashed], "out")))
     assert (document["total"], document["passed"], document["failed"], document["error"]) == (3, 1, 1, 1)
     assert [run["scenario"] for run in document["runs"]] == [
@@ -16,14 +16,14 @@ def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
     assert from_data(document["runs"][1]).verdicts == failed.result.verdicts
 
 
-def test_the_figures_of_the_session_are_in_it(passed, failed, crashed):
+def test_results_contain_the_figures_of_the_session(passed, failed, crashed):
     figures = as_document([passed, failed, crashed])["suite"]
     assert figures["runs"] == 3
     assert figures["measured_runs"] == sum(bool(run.result.metrics) for run in (passed, failed, crashed))
     assert "collisions_per_km" in figures
 
 
-def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(failed):
+def test_artifact_paths_are_relative_to_the_session_folder(failed):
     (run,) = json.loads("".join(json_parts([failed], "out")))["runs"]
     assert run["artifacts"] == {"mcap": "x/run.mcap", "picture": "x/map.png", "result": "x/result.json"}
 
@@ -32,7 +32,7 @@ def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
     assert "".join(json_parts([passed, failed])) == "".join(json_parts([replace(failed, wall=99.0), passed]))
 
 
-def test_second_runs_of_a_comparison_are_no_evidence(passed, failed):
+def test_determinism_runs_do_not_count_as_evidence(passed, failed):
     again = [replace(run, result=replace(run.result, key=run.key.repetition)) for run in (passed, failed)]
     assert as_document([passed, failed, *again])["suite"] == as_document([passed, failed])["suite"]
 

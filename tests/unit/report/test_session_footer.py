@@ -75,12 +75,12 @@ page: out/report.html
 
 
 @pytest.mark.parametrize(("columns", "expected"), [(80, AT_80), (40, AT_40)])
-def test_a_narrow_terminal_breaks_no_word(session, passed, failed, columns, expected):
+def test_words_are_not_broken_in_a_narrow_terminal(session, passed, failed, columns, expected):
     lines = told([session[0], passed, failed], columns=columns) + told([session[-1]], columns=columns)
     assert "\n".join(lines) + "\n" == expected
 
 
-def test_a_wide_terminal_has_the_lines_of_a_pipe(session):
+def test_lines_in_a_wide_terminal_equal_piped_lines(session):
     assert told(session, columns=200) == told(session)
 
 
@@ -92,7 +92,7 @@ def test_every_criterion_that_failed_has_its_own_line(failed):
     assert sum(line.startswith("      ") and " > " in line for line in lines) == 3
 
 
-def test_a_recap_tells_the_first_cause_of_several_and_how_many_more_there_are(session, passed, failed):
+def test_recap_has_the_first_cause_and_the_number_of_others(session, passed, failed):
     first, second = failed.result.verdicts
     run = of(failed, verdicts=(replace(second, severity="fail"), first), lines=(28, 27))
     lines = told([passed, run, session[-1]])
@@ -103,16 +103,16 @@ def test_a_recap_tells_the_first_cause_of_several_and_how_many_more_there_are(se
     ]
 
 
-def test_a_single_run_is_not_told_twice(session, failed):
+def test_single_run_has_no_recap(session, failed):
     assert "did not pass:" not in told([failed, session[-1]])
     assert "did not pass:" not in told([failed, keyed(failed, 7, again=True), session[-1]])
 
 
-def test_where_all_passed_there_is_no_recap(session, passed):
+def test_no_recap_if_all_runs_passed(session, passed):
     assert "did not pass:" not in told([passed, keyed(passed, 2), session[-1]])
 
 
-def test_of_very_many_failures_only_the_first_say_where_to_look(session, failed):
+def test_only_the_first_of_many_failures_have_details(session, failed):
     lines = told([*(keyed(failed, number) for number in range(1, 31)), session[-1]])
     recap = lines[lines.index("did not pass:") :]
     assert sum("✗" in line for line in recap) == 30
@@ -131,7 +131,7 @@ def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
     assert sum("s simulated" in line and line.startswith("    ") for line in everything) == 3
 
 
-def test_second_runs_stand_in_the_same_column(passed):
+def test_determinism_runs_are_in_the_same_column(passed):
     pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
     key = pair[0].key
     _, first, second = told([session_started("0.1.0", [key, key.repetition], 1, Path("out"), ()), *pair])
@@ -167,7 +167,7 @@ def test_spread_of_different_runs_is_reported(session, failed):
     assert "  verdicts equal in 1 of 2, time to goal differs by up to 0.50 s" in lines
 
 
-def test_a_run_without_a_log_is_not_among_those_whose_logs_are_equal(session, failed):
+def test_run_without_a_log_does_not_count_as_equal(session, failed):
     bare = replace(failed.artifacts, mcap="")
     pair = [failed, replace(keyed(failed, 7, again=True), artifacts=bare)]
     assert not any(line.startswith("logs") for line in told([*pair, session[-1]]))
@@ -188,7 +188,7 @@ def test_an_interrupted_session_ends_with_two_lines(session, passed, crashed):
     assert not any("not-run!" in line or "interrupted!" in line for line in lines)
 
 
-def test_runs_that_fail_fast_left_out_are_counted_and_not_listed(session, failed, crashed):
+def test_runs_skipped_by_fail_fast_are_only_counted(session, failed, crashed):
     end = replace(session[-1], passed=0, failed=1, errors=2)
     lines = told([failed, undone(crashed, 2, "not-run"), undone(crashed, 3, "not-run"), end])
     assert lines[-2].startswith("0 passed, 1 failed, 2 not run · ")
@@ -204,7 +204,7 @@ def shown(events, look, reporter):
     return out.getvalue()
 
 
-def test_forced_colors_come_without_moving_the_cursor(session):
+def test_forced_colors_do_not_move_the_cursor(session):
     text = shown(session, TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False), ColorReporter)
     assert "\x1b[32m✓\x1b[0m" in text
     assert set(re.findall(r"\x1b\[[0-9;?]*([a-zA-Z])", text)) == {"m"}
@@ -222,19 +222,19 @@ def a_terminal_that_can(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
 
 
-def test_a_terminal_without_colors_is_live_all_the_same(session):
+def test_terminal_without_colors_has_live_output(session):
     text = shown(session, TerminalStyle(has_color=False, has_live_progress=True, is_terminal=True), LiveReporter)
     assert "\x1b[?25l" in text
     assert not re.search(r"\x1b\[[0-9;]*m", text)
 
 
-def test_paths_can_be_clicked_where_there_are_colors(session, monkeypatch, tmp_path):
+def test_paths_are_links_if_colors_are_on(session, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     text = shown(session, TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True), LiveReporter)
     assert re.search(rf"\x1b\]8;[^;]*;file://{re.escape(str(tmp_path))}/out/report.html\x1b\\", text)
 
 
-def test_progress_says_how_many_are_done(session, monkeypatch):
+def test_progress_shows_the_number_of_finished_runs(session, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     text = shown(
         [session[0], session[1], session[2]],

@@ -70,7 +70,7 @@ def test_changes_of_a_behavior_tree_keep_their_order_within_a_tick() -> None:
     ]
 
 
-def test_lines_of_the_stack_are_there_but_events_of_simscen_are_not() -> None:
+def test_stack_report_contains_log_lines_but_no_simscen_events() -> None:
     lines = [
         (0, INFO, EVENT_LOGGER, "goal.accepted shelf"),
         (5, WARNING, "planner_server", "no\npath"),
@@ -105,11 +105,11 @@ def test_parameters_in_another_form_are_not_shown(nodes: object) -> None:
 
 
 @pytest.mark.parametrize("about", ["{", "[]", "3"])
-def test_a_description_that_is_no_object_has_no_parameters(about: str) -> None:
+def test_description_that_is_not_an_object_has_no_parameters(about: str) -> None:
     assert parameters_data(log_with(stack={"about": about}), Spy()) == []
 
 
-def test_a_log_without_an_external_stack_has_nothing_of_it() -> None:
+def test_log_without_an_external_stack_has_no_stack_report() -> None:
     empty = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
     assert behavior_tree_data(empty, Spy()) is None
     assert log_lines_data(empty, Spy()) == parameters_data(empty, Spy()) == []
@@ -139,7 +139,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
     ]
 
 
-def test_the_stand_in_reports_all_of_it() -> None:
+def test_example_stack_reports_all_parts() -> None:
     log_ = with_nav2_report(log_with())
     tree = behavior_tree_data(log_, Spy())
     assert tree is not None and "FollowPath" in tree["nodes"]

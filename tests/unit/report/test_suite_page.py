@@ -81,7 +81,7 @@ def test_console_text_of_a_failure_can_be_copied(passed, failed):
     assert "again     simscen run" in said
 
 
-def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed):
+def test_external_text_is_escaped_in_tags_attributes_and_links(passed, crashed):
     evil = '"><script>alert(1)</script><img src=x onerror=y>'
     bad = replace(
         of(passed, key=RunKey(f"{evil}/x", 1, evil, "s"), reason=evil, ended=evil),
@@ -101,7 +101,7 @@ def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed
     assert not re.search("\x1b", html)
 
 
-def test_nothing_but_the_pages_own_style_and_script_is_let_in(passed):
+def test_content_security_policy_allows_only_own_style_and_script(passed):
     html = to_html(SessionReport([passed]))
     policy = next(a["content"] for tag, a in parsed(html) if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'; img-src data:; style-src 'sha256-")
@@ -109,12 +109,12 @@ def test_nothing_but_the_pages_own_style_and_script_is_let_in(passed):
     assert not [a for _, a in parsed(html) if "style" in a or (a.get("src") or "data:")[:5] != "data:"]
 
 
-def test_the_same_results_give_the_same_bytes_in_whatever_order_they_came(passed, failed, crashed):
+def test_page_does_not_depend_on_the_order_of_results(passed, failed, crashed):
     runs = [replace(passed, tags=("b", "a")), failed, crashed]
     assert to_html(SessionReport(runs)) == to_html(SessionReport(runs[::-1]))
 
 
-def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(passed, failed):
+def test_repeated_scenario_is_a_group_with_a_mark_for_each_run(passed, failed):
     group = [called(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
     html = to_html(SessionReport([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
     assert "4 of 5 as expected" in html
@@ -123,7 +123,7 @@ def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(
     assert html.count('class="group"') == 1
 
 
-def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
+def test_runs_have_attributes_for_filters_and_sorting(failed):
     (data,) = runs_on(to_html(SessionReport([replace(failed, tags=("door", "smoke"))])))
     found = {name: value for name, value in data.items() if name.startswith("data-")}
     assert found == {
@@ -136,7 +136,7 @@ def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
     }
 
 
-def test_the_least_margin_is_a_share_of_its_limit(passed, failed):
+def test_smallest_margin_is_relative_to_its_limit(passed, failed):
     assert smallest_margin(passed) == pytest.approx(0.014)
     assert smallest_margin(failed) == pytest.approx(-0.68)
     assert scenario_folder(RunKey("navigation/goal", 1)) == "navigation"
@@ -150,7 +150,7 @@ def test_every_run_has_an_anchor_of_its_own(passed):
     ]  # fmt: skip
 
 
-def test_links_lead_to_what_the_run_left_in_the_folder(failed, tmp_path):
+def test_links_point_to_existing_files_of_the_run(failed, tmp_path):
     folder = tmp_path / "out"
     (folder / "runs/a b").mkdir(parents=True)
     (folder / "runs/a b/worker.log").write_text("said")
@@ -160,7 +160,7 @@ def test_links_lead_to_what_the_run_left_in_the_folder(failed, tmp_path):
     assert links == ["./runs/a%20b/run.mcap", "./runs/a%20b/worker.log"]
 
 
-def test_the_picture_is_inside_the_page(failed, tmp_path):
+def test_picture_is_embedded_in_the_page(failed, tmp_path):
     path = tmp_path / "map.png"
     Image.new("RGB", (4, 4)).save(path)
     html = to_html(SessionReport([replace(failed, artifacts=Artifacts(picture=str(path)))]))
@@ -169,11 +169,11 @@ def test_the_picture_is_inside_the_page(failed, tmp_path):
     assert image["alt"] == "map of faults/lidar_off, seed 7: failed"
 
 
-def test_a_picture_that_is_gone_is_left_out(failed):
+def test_missing_picture_is_omitted(failed):
     assert "<img" not in to_html(SessionReport([failed]))
 
 
-def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, failed, tmp_path, monkeypatch):
+def test_embedded_pictures_are_limited_with_failures_first(passed, failed, tmp_path, monkeypatch):
     picture = tmp_path / "map.png"
     Image.new("L", (8, 8)).save(picture)
     monkeypatch.setattr(elements, "MAX_EMBEDDED_BYTES", picture.stat().st_size)
@@ -209,24 +209,24 @@ def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
 
 
-def test_a_session_that_left_no_results_or_damaged_ones_is_passed_over(sessions, tmp_path):
+def test_sessions_with_missing_or_damaged_results_are_ignored(sessions, tmp_path):
     (sessions / "two/results.json").write_text("{")
     (sessions / "one/results.json").unlink()
     assert past_sessions(sessions / "three") == []
     assert past_sessions(tmp_path / "elsewhere") == []
 
 
-def test_a_page_of_a_session_that_goes_on_says_how_far_it_is_and_comes_again(passed, failed):
+def test_page_of_a_running_session_shows_progress_and_reloads(passed, failed):
     html = to_html(SessionReport([passed], live=RunningSession(3, (failed.key,))))
     assert "1 of 3 runs done, running: faults/lidar_off, seed 7" in html
     assert "<noscript><meta http-equiv=refresh" in html
     assert "refresh" not in to_html(SessionReport([passed])).replace("refreshing", "").partition("<script>")[0]
 
 
-def test_a_session_without_a_run_has_a_page_too():
+def test_session_without_runs_has_a_page():
     assert "<h1>✓ 0 passed</h1>" in to_html(SessionReport([], live=RunningSession(5)))
 
 
-def test_every_outcome_has_a_sign_beside_its_color(passed):
+def test_every_outcome_has_a_symbol_and_a_color(passed):
     page = to_html(SessionReport([passed]))
     assert f'class="pill {Outcome.PASSED.value}"><span aria-hidden="true">✓ </span>passed' in page

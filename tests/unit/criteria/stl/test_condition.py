@@ -97,20 +97,20 @@ def test_bound_at_the_limit_of_the_range_is_valid(signal, op, value):
     assert Condition.model_validate({"signal": signal, "op": op, "value": value}).value == value
 
 
-def test_a_bound_is_of_the_signals_dimension():
+def test_bound_has_the_dimension_of_its_signal():
     told = Condition.model_validate({"signal": "speed", "op": ">", "value": "50 cm/s", "scale": "10 cm/s"})
     assert (told.value, told.scale) == (0.5, 0.1)
     assert Condition.model_validate({"signal": "nees", "op": ">", "value": 3}).value == 3.0
 
 
-def test_a_misspelled_signal_is_one_mistake_whatever_the_unit_of_its_bound():
+def test_misspelled_signal_is_a_single_problem():
     assert refused({"signal": "sped", "op": ">", "value": "1 m/s"}).count(";") == 0
     assert refused({"signal": "sped", "op": ">", "value": "1 N s"}).count(";") == 0
     assert refused({"signal": "sped", "op": ">", "value": 1}).count(";") == 0
     assert "valid number" in refused({"signal": "sped", "op": ">", "value": "fast"})
 
 
-def test_a_condition_knows_its_comparisons_in_the_order_they_are_written():
+def test_comparisons_of_a_condition_are_in_written_order():
     hurt = {"signal": "in_collision"}
     told = Condition.model_validate(
         {"any": [{"all": [NEAR, LOST]}, {"until": {"hold": hurt, "release": NEAR}}, {"whenever": LOST, "then": hurt}]}
@@ -137,7 +137,7 @@ def test_signal_arguments_use_the_keys_of_the_language():
         ({"between": [1, 2]}, (1.0, 2.0)),
     ],
 )
-def test_window_is_an_interval_ahead(words, stretch):
+def test_window_must_be_a_future_interval(words, stretch):
     assert Window.model_validate(words).interval == stretch
 
 
@@ -153,6 +153,6 @@ def test_window_is_an_interval_ahead(words, stretch):
         ({"within": 0}, "greater than 0"),
     ],
 )
-def test_a_window_is_one_stretch_and_not_empty(words, why):
+def test_window_must_be_one_nonempty_interval(words, why):
     with pytest.raises(ValidationError, match=why):
         Window.model_validate(words)

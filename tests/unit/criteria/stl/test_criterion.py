@@ -82,7 +82,7 @@ def test_a_margin_is_in_the_unit_that_all_its_signals_share(condition, margin, u
     assert (finding.margin, finding.unit) == (margin if margin is None else pytest.approx(margin), unit)
 
 
-def test_a_tie_that_does_not_hold_keeps_its_sign():
+def test_margin_of_a_strict_bound_violated_by_equality_is_negative():
     finding = found({"always": {**FAR, "value": 2.25}}, WAY, FAR_SIGHTED)
     assert finding.status is Status.FAIL
     assert -1e-300 < finding.margin < 0
@@ -103,7 +103,7 @@ def test_a_signal_that_is_infinite_has_no_margin():
     )
 
 
-def test_a_finding_tells_the_deciding_moment_its_place_and_its_signal():
+def test_finding_has_time_position_and_signal_of_the_decision():
     finding = found({"eventually": {"signal": "goal_distance", "op": "<", "value": 1.0}}, WAY, GOAL)
     assert (finding.what, finding.status, finding.value, finding.tick) == ("goal_distance", Status.PASS, 0.5, 960)
     assert finding.place == pytest.approx((2.0, 0.0))
@@ -125,7 +125,7 @@ def test_open_window_at_the_end_of_the_run_is_undecided():
     assert finding.limit == "always within 9 s clearance > 2 m"
 
 
-def test_a_signal_that_was_not_recorded_leaves_it_undecided():
+def test_condition_with_a_missing_signal_is_undecided():
     finding = found({"always": {"signal": "nees", "op": "<", "value": 9}}, {**STILL, "belief": None})
     assert (finding.status, finding.measured) == (Status.INCONCLUSIVE, "no covariance was recorded")
 
@@ -145,7 +145,7 @@ WHENEVER = {"whenever": HURT, "then": FAR}
     ("words", "has_hint"),
     [(WHENEVER, True), ({"always": {"all": [FAR, WHENEVER]}}, False), ({"eventually": WHENEVER}, False)],
 )
-def test_only_an_untested_whenever_at_the_top_can_be_made_optional(words, has_hint):
+def test_only_a_top_level_whenever_can_be_optional(words, has_hint):
     finding = found(words, {**WAY, "events": [[4, "run.ended", "time limit"]]}, FAR_SIGHTED)
     assert finding.status is Status.INCONCLUSIVE
     assert ("`required: false` lets such a run pass" in finding.detail) == has_hint

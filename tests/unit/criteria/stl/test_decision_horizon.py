@@ -39,7 +39,7 @@ def eventually(**more):
         ({"whenever": NOW, "then": always(within=9.0)}, 0, 0),
     ],
 )
-def test_the_least_time_after_which_it_is_known(condition, holds, does_not):
+def test_time_until_a_condition_is_decided(condition, holds, does_not):
     parsed = Condition.model_validate(condition)
     assert (decision_horizon(parsed), decision_horizon(parsed, False)) == (holds, does_not)
 
@@ -56,5 +56,5 @@ def test_the_least_time_after_which_it_is_known(condition, holds, does_not):
         ({"collisions": {"max": 0}}, 0),
     ],
 )
-def test_a_criterion_says_when_it_can_be_decided(criterion, horizon):
+def test_criterion_states_when_it_can_be_decided(criterion, horizon):
     assert AnyCriterion.model_validate(criterion).chosen.horizon == horizon

@@ -56,6 +56,6 @@ def test_condition_description_is_readable(condition, told):
         ({"signal": "localized", "op": ">=", "value": 1}, 1.0, False, ("yes", "yes")),
     ],
 )
-def test_a_witness_tells_what_was_measured_against_what(condition, value, negated, told):
+def test_witness_has_value_and_bound(condition, value, negated, told):
     witness = Witness(Condition.model_validate(condition), 0, value, negated)
     assert (describe_value(witness), describe_limit(witness)) == told

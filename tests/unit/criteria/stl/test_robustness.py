@@ -69,7 +69,7 @@ def test_loosening_a_bound_never_turns_a_pass_into_a_fail(p, q, bound, by):
 
 @given(FORMULAS, VALUES, st.integers(1, 1000))
 @settings(deadline=None)
-def test_a_run_that_begins_later_is_judged_alike(formula, p, later):
+def test_verdict_does_not_depend_on_the_start_tick(formula, p, later):
     trace = run(p, p)
     moved = replace(
         trace,
@@ -86,7 +86,7 @@ def test_a_run_that_begins_later_is_judged_alike(formula, p, later):
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
-def test_a_run_may_be_of_few_samples(samples):
+def test_runs_with_few_samples_are_judged(samples):
     scene = EvaluationContext(run([1.0] * samples, [0.0] * samples), CASE, run_ended=True)
     assert len(robustness(validated({"signal": "clearance", "op": ">", "value": 0}), scene).low) == samples
 
@@ -110,12 +110,12 @@ def test_a_window_without_a_sample_is_refused():
     assert (window.first[0], window.last[0]) == (2, 2)
 
 
-def test_of_a_single_sample_the_next_one_may_be_a_tick_away():
+def test_single_sample_has_a_spacing_of_one_tick():
     window = EvaluationContext(run([1.0], [0.0]), CASE, run_ended=True).sample_windows(Window(within=1 / 240))
     assert (window.first.tolist(), window.last.tolist(), window.past_end.tolist()) == ([0], [0], [True])
 
 
-def test_an_answer_below_other_conditions_is_due_from_the_first_sample_on():
+def test_nested_response_is_required_from_the_first_sample():
     premise, answer = ({"signal": name, "op": ">=", "value": 0.5} for name in ("clearance", "yaw_rate"))
     formula = validated({"all": [{"whenever": premise, "then": answer}]})
     scene = EvaluationContext(run([1.0, 0.0, 0.0], [-1.0, 1.0, 1.0]), CASE, run_ended=True)
@@ -123,7 +123,7 @@ def test_an_answer_below_other_conditions_is_due_from_the_first_sample_on():
 
 
 @pytest.mark.parametrize(("clearance", "may_be_tested"), [(0.75, True), (0.5, False)])
-def test_a_premise_may_be_tested_by_little_when_the_run_ends(clearance: float, may_be_tested: bool) -> None:
+def test_premise_with_an_undecided_future_may_be_tested(clearance: float, may_be_tested: bool) -> None:
     later = {"eventually": {"signal": "yaw_rate", "op": ">", "value": 5, "within": 9}}
     premise = {"all": [{"signal": "clearance", "op": ">", "value": 0.5}, later]}
     formula = validated({"whenever": premise, "then": {"signal": "yaw_rate", "op": "<", "value": 9}})
@@ -133,7 +133,7 @@ def test_a_premise_may_be_tested_by_little_when_the_run_ends(clearance: float, m
     assert found.may_be_tested is may_be_tested
 
 
-def test_a_signal_that_is_no_number_is_named_with_its_first_moment():
+def test_nan_signal_is_reported_with_its_first_time():
     lost = Path(np.full((2, 3), np.nan), 480)
     trace = replace(run([1.0] * 5, [0.0] * 5), plans=(lost,))
     with pytest.raises(InvalidTrace, match=r"plan_deviation is not a number at t = 2.00 s"):

@@ -22,7 +22,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("seed", range(6))
-def test_gap_is_that_of_shapely(shape: str, seed: int) -> None:
+def test_gap_equals_that_of_shapely(shape: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     x, y, yaw = (float(value) for value in rng.uniform(-3.0, 3.0, 3))
     people = {name: [[0, *rng.uniform(-3.0, 3.0, 2).tolist()]] for name in ("anna", "bert")}

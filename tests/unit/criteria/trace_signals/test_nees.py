@@ -97,6 +97,6 @@ def test_nees_is_undefined_without_covariances_beliefs_or_truth():
     assert len(nees_samples(trace)) == 1
 
 
-def test_a_belief_that_is_not_finite_is_named():
+def test_nonfinite_belief_is_reported():
     with pytest.raises(InvalidTrace, match=r"the belief is not finite at t = 0.50 s"):
         nees_samples(believing([(0, 0, 0, 0)], [(0, 0, 0, 0), (120, math.nan, 0, 0)]))

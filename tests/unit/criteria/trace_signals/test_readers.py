@@ -284,7 +284,7 @@ def test_contacts_with_two_objects_end_independently():
     assert [at(signal("collision_count", words), t) for t in (0.975, 1, 2)] == [0, 1, 2]
 
 
-def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
+def test_goal_is_active_until_it_ends_or_is_replaced():
     events = [
         [1, "goal.accepted", "a"],
         [2, "goal.accepted", "b"],
@@ -305,14 +305,14 @@ def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
     assert at(signal("time", words), 3.5) == 3.5
 
 
-def test_a_signal_that_is_not_finite_names_itself_and_the_time():
+def test_error_of_a_nonfinite_signal_has_its_name_and_time():
     truth = [[0, 0, 0], [2, math.nan, 0], [4, 0, 0]]
     with pytest.raises(InvalidTrace, match=r"the true pose is not finite at t = 0.03 s"):
         signal("travelled", {"seconds": 4, "truth": truth})
 
 
 @pytest.mark.parametrize("name", ["clearance", "speed", "time", "goal_distance", "scan_age"])
-def test_without_the_truth_there_is_no_clock(name):
+def test_signals_need_the_truth_for_their_clock(name):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     blind: Trace = replace(trace, truth=nothing)

@@ -39,7 +39,7 @@ def test_uneven_samples_are_interpolated_from_the_first_to_the_last() -> None:
     assert found.values[:, 0].tolist() == [20.0, 40.0, 60.0, 80.0, 100.0]
 
 
-def test_resampling_ends_before_the_last_sample_where_the_grid_does() -> None:
+def test_resampling_ends_at_the_last_grid_point() -> None:
     assert evenly_spaced(samples(0, 10, 20, 29), RATE).ticks.tolist() == [0, 10, 20]
     assert evenly_spaced(samples(0, 10, 20, 31), RATE).ticks.tolist() == [0, 10, 20, 30]
     assert evenly_spaced(samples(0, 10, 20, 30, 39), RATE).ticks.tolist() == [0, 10, 20, 30]
@@ -73,7 +73,7 @@ def with_truth_at(*ticks: int, end: int = 480):  # type: ignore[no-untyped-def]
         ((0, 100, 240), ""),
     ],
 )
-def test_gaps_longer_than_a_second_are_named_from_start_to_end(ticks: tuple[int, ...], gap: str) -> None:
+def test_gaps_longer_than_a_second_are_reported_with_start_and_end(ticks: tuple[int, ...], gap: str) -> None:
     found = time_gaps(with_truth_at(*ticks))
     assert found.get(Evidence.TRUTH, "") == (f"the truth has no sample {gap}" if gap else "")
     assert found.get(Evidence.VELOCITY, "") == found.get(Evidence.TRUTH, "")
@@ -88,7 +88,7 @@ def test_samples_one_tick_apart_are_in_order() -> None:
     ("ticks", "seconds"),
     [((0, 120, 120, 480), "0.50"), ((0, 1, 240, 120, 480), "1.00"), ((0, 120, 60, 480, 30), "0.50")],
 )
-def test_samples_out_of_order_are_refused_with_the_first_place(ticks: tuple[int, ...], seconds: str) -> None:
+def test_unordered_samples_are_refused_with_the_first_position(ticks: tuple[int, ...], seconds: str) -> None:
     with pytest.raises(InvalidTrace, match=f"not in chronological order after t = {seconds} s"):
         check_recorded_signals(with_truth_at(*ticks))
 
