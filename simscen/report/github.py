@@ -116,7 +116,7 @@ def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pict
 
 def _picture_lines(runs: list[RunFinished], folder: str, pictures_url: str) -> list[str]:
     """Return the pictures of the first runs that did not pass. `folder` is the output folder of the session."""
-    failures = [run for run in runs if not run.outcome.good and run.artifacts.picture]
+    failures = [run for run in runs if not run.outcome.is_good and run.artifacts.picture]
     lines = []
     for run in failures[:MAX_PICTURES]:
         address = f"{pictures_url.rstrip('/')}/{quote(relative_path(run.artifacts.picture, folder))}"

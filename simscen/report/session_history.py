@@ -77,7 +77,7 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
     Return "" if the outcome has not changed, or if no earlier session contains the run.
     """
     known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
-    if not known or known[-1].outcome.good == run.outcome.good:
+    if not known or known[-1].outcome.is_good == run.outcome.is_good:
         return ""
     return f"{known[-1].outcome.value.replace('-', ' ')} before"
 
@@ -122,7 +122,7 @@ def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
         return
     for run in runs:
         if run.result.error is None or run.result.error.kind not in UNFINISHED_KINDS:
-            yield run.key, run.outcome.good
+            yield run.key, run.outcome.is_good
 
 
 def _session_time(session: Path) -> str:

@@ -232,7 +232,7 @@ def failure_lines(runs: Sequence[RunFinished], name: NameOfRun) -> Iterator[Styl
 
     Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
     """
-    failed = {run.key for run in runs if not run.outcome.good}
+    failed = {run.key for run in runs if not run.outcome.is_good}
     failures = [
         run for run in runs if run.key in failed and (run.key == run.key.original or run.key.original not in failed)
     ]

@@ -115,7 +115,7 @@ def _links(sessions: dict[str, JournaledSession]) -> Links:
         (name, labeled_key(run.key, name).test, run.key.seed): _link(run)
         for name, session in sessions.items()
         for run in session.runs
-        if not run.outcome.good
+        if not run.outcome.is_good
     }
 
 

@@ -244,7 +244,7 @@ class Falsification:
     def _save_failure(self, finished: RunFinished) -> None:
         """Write a scenario that reproduces the run, if the run failed with a new signature."""
         result = finished.result
-        if result.outcome.good or not is_counted(result) or (new := signature(result)) in self._signatures:
+        if result.outcome.is_good or not is_counted(result) or (new := signature(result)) in self._signatures:
             return
         if len(self.found) >= self._request.failures:
             return

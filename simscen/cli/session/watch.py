@@ -64,7 +64,7 @@ class WatchReporter:
     def __call__(self, event: SessionEvent) -> None:
         """Write the outcome of a finished run. Ignore other events."""
         if isinstance(event, RunFinished):
-            self._write({"scenario": self._files[event.key.scenario], "good": event.outcome.good})
+            self._write({"scenario": self._files[event.key.scenario], "good": event.outcome.is_good})
 
     def _write(self, message: dict[str, Any]) -> None:
         self._out.write(json.dumps(message) + "\n")

@@ -134,7 +134,7 @@ class Run:
     @property
     def as_expected(self) -> bool:
         """Whether the run passed, or failed as its scenario expects."""
-        return self.result.outcome.good
+        return self.result.outcome.is_good
 
     def verdict(self, name: str) -> Verdict:
         """Return the verdict with the id `name`, e.g. "path_length". Raises KeyError if no verdict has this id."""

@@ -20,7 +20,7 @@ class Outcome(str, Enum):
     SKIPPED = "skipped"
 
     @property
-    def good(self) -> bool:
+    def is_good(self) -> bool:
         """Whether the outcome is as intended: passed, failed as expected, or skipped."""
         return self not in (Outcome.FAILED, Outcome.ERROR)
 

@@ -12,7 +12,7 @@ from simscen.report.suite.run_entry import full_run_name
 
 MAX_CHANGES = 20
 """Maximum number of listed runs whose outcome has changed."""
-_GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.good)
+_GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.is_good)
 
 
 def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
@@ -43,15 +43,15 @@ def _session_row(session: PastSession) -> str:
 def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return a line chart of the fraction of good outcomes in the earlier sessions and in this session."""
     shares = [session.count(*_GOOD_OUTCOMES) / max(1, len(session.runs)) for session in reversed(past)]
-    shares.append(sum(run.outcome.good for run in runs) / max(1, len(runs)))
+    shares.append(sum(run.outcome.is_good for run in runs) / max(1, len(runs)))
     values = ", ".join(f"{share:.0%}" for share in shares)
     return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)
 
 
 def _change_counts(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return the numbers of newly failing and newly passing runs."""
-    worse = sum(outcome_change(run, past) != "" and not run.outcome.good for run in runs)
-    better = sum(outcome_change(run, past) != "" and run.outcome.good for run in runs)
+    worse = sum(outcome_change(run, past) != "" and not run.outcome.is_good for run in runs)
+    better = sum(outcome_change(run, past) != "" and run.outcome.is_good for run in runs)
     parts = [f"{number} {word}" for number, word in ((worse, "newly failing"), (better, "newly passing")) if number]
     return f'<span class="quiet">{", ".join(parts) or "no change since the last session"}</span>'
 
@@ -59,7 +59,7 @@ def _change_counts(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> 
 def _changed_list(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return a list of the runs whose outcome has changed, failures first, with links to their entries."""
     changed = [run for run in runs if outcome_change(run, past)]
-    changed.sort(key=lambda run: (run.outcome.good, run.key))
+    changed.sort(key=lambda run: (run.outcome.is_good, run.key))
     rows = "".join(
         f'<li><a href="#{anchor(run.key)}">{html_text(full_run_name(run.key))}</a>: '
         f"{run.outcome.value.replace('-', ' ')}, "

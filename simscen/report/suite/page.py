@@ -114,7 +114,7 @@ class Totals:
         for run in runs:
             self.outcomes[run.outcome] += 1
             self.simulated_s += run.result.simulated
-            self.good[run.key.scenario] += run.outcome.good
+            self.good[run.key.scenario] += run.outcome.is_good
             self.runs[run.key.scenario] += 1
 
 
@@ -124,7 +124,7 @@ def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
         return runs
     bad, good = list[int](), list[int]()
     for index, run in enumerate(runs):
-        target = good if run.outcome.good else bad
+        target = good if run.outcome.is_good else bad
         if len(target) < MAX_LISTED_RUNS:
             target.append(index)
     return [runs[index] for index in (*bad, *good)[:MAX_LISTED_RUNS]]

@@ -51,7 +51,7 @@ def run_element(
     outcomes = [None if one is None else one.outcome for one in past]
     marks = outcome_symbols([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
     return (
-        f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.good else " open"} '
+        f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.is_good else " open"} '
         f"{_data_attributes(run, past)}>"
         f'<summary>{outcome_badge(run.outcome)}<span class="name">{html_text(name)}</span>'
         f'<span class="quiet">{html_text(extra if name != extra else "")}</span>{marks}'
@@ -64,7 +64,7 @@ def run_element(
 
 def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
     """Return the HTML attributes (`data-…`) by which the script of the page filters and sorts runs."""
-    known = [one.outcome.good for one in past if one is not None]
+    known = [one.outcome.is_good for one in past if one is not None]
     values = {
         "status": run.outcome.value,
         "tags": " ".join(run.tags),
@@ -74,7 +74,7 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
         "simulated": f"{run.result.simulated:.3f}",
         "wall": f"{run.wall:.3f}",
         "margin": "" if (margin := smallest_margin(run)) is None else f"{margin:.4f}",
-        "changed": "1" if known and known[-1] != run.outcome.good else "",
+        "changed": "1" if known and known[-1] != run.outcome.is_good else "",
     }
     return " ".join(f'data-{name}="{html_text(value)}"' for name, value in values.items() if value)
 

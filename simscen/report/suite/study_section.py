@@ -82,7 +82,7 @@ def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
 def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], folder: str) -> str:
     """Return a plot of the smallest margin of a criterion against the parameter at `path`; "" without points."""
     points = []
-    for run in sorted(runs, key=lambda run: (run.outcome.good, run.key))[:MAX_POINTS]:
+    for run in sorted(runs, key=lambda run: (run.outcome.is_good, run.key))[:MAX_POINTS]:
         value = si_number(study.values.get(run.key, {}).get(path))
         margins = [
             finding.margin

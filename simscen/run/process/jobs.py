@@ -34,7 +34,7 @@ class ReplayMode(str, Enum):
 
     def includes(self, outcome: Outcome) -> bool:
         """Return whether a run with this outcome gets a replay page."""
-        return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.good)
+        return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.is_good)
 
 
 @dataclass(frozen=True)

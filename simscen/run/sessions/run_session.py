@@ -104,7 +104,7 @@ def run_session(
 
     def report(job: Job, run: RunFinished) -> None:
         nonlocal all_good
-        all_good = all_good and run.outcome.good
+        all_good = all_good and run.outcome.is_good
         positions[job.number] = len(results)
         results.append(run)
         listen(run)
@@ -129,7 +129,7 @@ def run_session(
                     run = compare_twins(finished_run(job, end), twin)
                     if options.against is not None:
                         run = compare_with_session(run, options.against)
-                    if options.keep_logs is KeptLogs.FAILED and run.outcome.good:
+                    if options.keep_logs is KeptLogs.FAILED and run.outcome.is_good:
                         run = delete_log(run)
                     report(job, run)
     except Interrupted as interrupted:
