@@ -85,13 +85,13 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
     """
     simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
     try:
-        rest = _rest(simulation)
-        return rest, tuple(_trial(simulation, body, name, legs) for name, legs in _trials(body).items())
+        rest = _measure_rest(simulation)
+        return rest, tuple(_run_trial(simulation, body, name, legs) for name, legs in _legs_by_trial(body).items())
     finally:
         simulation.close()
 
 
-def _trials(body: RobotBody) -> dict[str, list[_TrialLeg]]:
+def _legs_by_trial(body: RobotBody) -> dict[str, list[_TrialLeg]]:
     """Return the legs of each trial by its name."""
     radius = 0.0
     if isinstance(body.drive, Ackermann):
@@ -105,14 +105,14 @@ def _trials(body: RobotBody) -> dict[str, list[_TrialLeg]]:
     return trials | ({"sideways": [_TrialLeg(0.0, LINE_LENGTH_M)]} if robot_model(body).holonomic else {})
 
 
-def _rest(simulation: SingleRobotSimulation) -> RestingState:
+def _measure_rest(simulation: SingleRobotSimulation) -> RestingState:
     begin = simulation.base_pose()
     simulation.step(REST_TICKS)
     end = simulation.base_pose()
     return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
-def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
+def _run_trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
     simulation.place_robot(Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING_TICKS)
     motion, level = kinematics_of(body.drive), simulation.base_pose()

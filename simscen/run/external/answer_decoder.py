@@ -100,13 +100,13 @@ def decode_answer(
     if odometry:
         dead_reckoned = odometry[-1].pose
     return Answer(
-        command=_decode_last(messages, topics.COMMAND.name, _twist),
+        command=_decode_last(messages, topics.COMMAND.name, _decode_command),
         plan=_path(messages, topics.PLAN.name, tick, time),
         local_plan=_path(messages, topics.LOCAL_PLAN.name, tick, time),
         belief=_belief(messages, correction, dead_reckoned),
         correction=correction,
-        events=tuple(_decode_all(messages, topics.EVENTS.name, _event_data)),
-        lines=tuple(_decode_all(messages, topics.ROSOUT.name, _log_line)),
+        events=tuple(_decode_all(messages, topics.EVENTS.name, _decode_event)),
+        lines=tuple(_decode_all(messages, topics.ROSOUT.name, _decode_log_line)),
         costmaps=tuple(_costmaps(messages)),
         odometry=odometry,
     )
@@ -115,23 +115,23 @@ def decode_answer(
 def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
     """Return the pose estimate in an answer, or None; see `decode_answer` for the arguments."""
     name = topics.BELIEF.name
-    message = _decode_last(messages, name, _belief_pose)
+    message = _decode_last(messages, name, _decode_belief_pose)
     if message is None:
         return None
-    exact = _decode_last(messages, name + EXACT_SUFFIX, _pose2d)
+    exact = _decode_last(messages, name + EXACT_SUFFIX, _decode_pose2d)
     pose = exact if exact is not None else _to_pose2(message)
     if correction is None:
         correction = pose if dead_reckoned is None else pose.compose(dead_reckoned.inverse())
-    covariance = _decode_message(name, _covariance, messages[name][-1])
-    particles = _decode_last(messages, topics.PARTICLES.name, _particles)
-    exact_particles = _decode_last(messages, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _table(data, 4))
+    covariance = _decode_message(name, _decode_covariance, messages[name][-1])
+    particles = _decode_last(messages, topics.PARTICLES.name, _decode_particles)
+    exact_particles = _decode_last(messages, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _decode_table(data, 4))
     cloud = exact_particles if exact_particles is not None else particles
     return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
 
 
 def _correction(messages: MessagesByTopic) -> Pose2 | None:
     """Return the pose of the odom frame in the map frame, or None."""
-    exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _pose2d)
+    exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _decode_pose2d)
     if exact is not None:
         return exact
     links = [
@@ -146,7 +146,7 @@ def _correction(messages: MessagesByTopic) -> Pose2 | None:
 def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
     """Yield the readings of the stack's odometry filter. `now` is the current tick."""
     name = topics.FILTERED_ODOMETRY.name
-    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, ODOMETRY_COLUMNS))
+    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, ODOMETRY_COLUMNS))
     if exact is not None:
         rows = [(row[0], row[1:4], row[4:7], row[7:10], row[10:]) for row in exact.tolist()]
     else:
@@ -178,7 +178,7 @@ def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> It
 def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
     """Return the last path on the topic `name`, or None. A path without a stamp gets the tick `tick`."""
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
-    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, 3))
+    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, 3))
     if message is None and exact is None:
         return None
     plan_tick = tick if message is None else time.tick(message.stamp)
@@ -192,10 +192,10 @@ def _costmaps(messages: MessagesByTopic) -> Iterator[CostGrid]:
     """Yield the last global costmap and the last local costmap, if there are any."""
     for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
         if messages.get(topic):
-            yield _decode_message(topic, partial(_costmap, name), messages[topic][-1])
+            yield _decode_message(topic, partial(_decode_costmap, name), messages[topic][-1])
 
 
-def _costmap(name: str, data: bytes) -> CostGrid:
+def _decode_costmap(name: str, data: bytes) -> CostGrid:
     message = read(topics.MAP.type, data)
     if message.frame not in (frame_names.MAP, frame_names.ODOM):
         raise ProtocolViolation(
@@ -213,14 +213,14 @@ def _costmap(name: str, data: bytes) -> CostGrid:
     return CostGrid(name, message.frame, OccupancyGrid(cells, message.resolution, Pose2(*message.origin)))
 
 
-def _twist(data: bytes) -> Twist:
+def _decode_command(data: bytes) -> Twist:
     command = Twist(*decode_checked(decode.twist, data).values)
     if not all(map(math.isfinite, command)):
         raise ProtocolViolation(f"a command that is not finite: {', '.join(f'{value:g}' for value in command)}")
     return command
 
 
-def _belief_pose(data: bytes) -> StampedPose:
+def _decode_belief_pose(data: bytes) -> StampedPose:
     """Return the estimated pose in a PoseWithCovarianceStamped, which must be in the map frame."""
     message = decode_checked(decode.pose_with_covariance_stamped, data)
     if message.frame not in (frame_names.MAP, ""):
@@ -232,7 +232,7 @@ def _belief_pose(data: bytes) -> StampedPose:
     return message
 
 
-def _covariance(data: bytes) -> Array:
+def _decode_covariance(data: bytes) -> Array:
     """Return the covariance (3, 3) of x, y, and yaw in a PoseWithCovarianceStamped."""
     reader = Reader(data)
     reader.take("iI")
@@ -247,7 +247,7 @@ def _to_pose2(message: StampedPose) -> Pose2:
     return Pose2(x, y, yaw)
 
 
-def _particles(data: bytes) -> Array:
+def _decode_particles(data: bytes) -> Array:
     """Return the particles (n, 4) in a ParticleCloud: x, y, yaw, and weight."""
     reader = Reader(data)
     reader.take("iI")
@@ -263,14 +263,14 @@ def _particles(data: bytes) -> Array:
     return np.column_stack((to_planar(poses[:, :7]), poses[:, 7]))
 
 
-def _pose2d(data: bytes) -> Pose2:
+def _decode_pose2d(data: bytes) -> Pose2:
     pose = Pose2(*read(POSE2D, data))
     if not all(map(math.isfinite, pose)):
         raise ProtocolViolation("a pose that is not finite")
     return pose
 
 
-def _table(data: bytes, width: int) -> Array:
+def _decode_table(data: bytes, width: int) -> Array:
     """Return the numbers in a Float64MultiArray as rows (n, width)."""
     numbers = np.array(read(FLOAT64_ARRAY, data), dtype=np.float64)
     if len(numbers) % width:
@@ -278,12 +278,12 @@ def _table(data: bytes, width: int) -> Array:
     return numbers.reshape(-1, width)
 
 
-def _event_data(data: bytes) -> dict[str, Any]:
+def _decode_event(data: bytes) -> dict[str, Any]:
     """Return the event in a String message with JSON."""
     return wire.from_json(MessageReader(data).string().encode())
 
 
-def _log_line(data: bytes) -> LogLine:
+def _decode_log_line(data: bytes) -> LogLine:
     return decode.log_line(MessageReader(data))
 
 
@@ -294,6 +294,7 @@ def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes]
 
 
 def _decode_all(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> list[T]:
+    """Decode all messages on the topic `name`. Raises ProtocolViolation."""
     return [_decode_message(name, decoder, data) for data in messages.get(name, ())]
 
 

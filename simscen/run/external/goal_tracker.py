@@ -44,7 +44,7 @@ class GoalTracker:
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Replace the current goal by `goal`, which the stack must accept next."""
-        self._drop()
+        self._drop_goal()
         self._events += self._task.preempt(tick, goal)
 
     def process(self, tick: int, report: dict[str, Any]) -> None:
@@ -56,7 +56,7 @@ class GoalTracker:
             raise ProtocolViolation(f"an event of tick {report['tick']} at tick {tick}")
         match kind:
             case "goal.accepted":
-                self._accept(tick, name)
+                self._accept_goal(tick, name)
             case "goal.reached":
                 self._require_current(kind, name)
                 self._events += self._task.record_reached(tick)
@@ -70,7 +70,7 @@ class GoalTracker:
                 code, message = _to_error_code(data.get("error_code")), str(data.get("message", ""))[:MAX_TEXT_LENGTH]
                 self._events += self._task.record_failed(tick, code, message)
             case "goal.canceled":
-                self._cancel(tick, name)
+                self._cancel_goal(tick, name)
             case _ if kind in _UNRESTRICTED_KINDS:
                 self._events.append(Event(tick, EventKind(kind), name[:MAX_TEXT_LENGTH], _checked_data(data)))
             case _:
@@ -85,7 +85,7 @@ class GoalTracker:
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
-        self._drop()
+        self._drop_goal()
         self._events += self._task.record_failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
         return True
 
@@ -94,12 +94,13 @@ class GoalTracker:
         events, self._events = tuple(self._events), []
         return events
 
-    def _drop(self) -> None:
+    def _drop_goal(self) -> None:
         """Drop the current goal, so that a later `goal.canceled` for it is ignored."""
         if self._task.goal is not None:
             self._dropped.add(self._task.goal.name)
 
-    def _accept(self, tick: int, name: str) -> None:
+    def _accept_goal(self, tick: int, name: str) -> None:
+        """Process the acceptance of a goal. Raises ProtocolViolation if it is not the next goal."""
         if self._task.goal is not None:
             raise ProtocolViolation(f"goal.accepted, but goal `{self._task.goal.name}` is active")
         self.advance(tick)
@@ -118,7 +119,8 @@ class GoalTracker:
             active = "no goal is active" if goal is None else f"the current goal is `{goal.name}`"
             raise ProtocolViolation(f"{kind} `{name[:60]}`, but {active}")
 
-    def _cancel(self, tick: int, name: str) -> None:
+    def _cancel_goal(self, tick: int, name: str) -> None:
+        """Process the cancellation of a goal. Ignores goals that were dropped before."""
         goal = self._task.goal
         if name in self._dropped and (goal is None or goal.name != name):
             self._dropped.discard(name)

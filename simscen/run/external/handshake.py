@@ -70,22 +70,22 @@ def hello_content(
         "answer_limit": answer_limit,
         "mode": parameters.mode,
         "robot_name": parameters.robot_name,
-        "robot": _robot(surroundings.robot),
-        "map": _grid(surroundings.map),
-        "keepout": [_polygon(area) for area in surroundings.keepout],
-        "speed_zones": [{"polygon": _polygon(area), "speed_limit": v} for area, v in surroundings.speed_zones],
-        "keepout_mask": _grid(masks.keepout),
+        "robot": _robot_data(surroundings.robot),
+        "map": _grid_data(surroundings.map),
+        "keepout": [_polygon_data(area) for area in surroundings.keepout],
+        "speed_zones": [{"polygon": _polygon_data(area), "speed_limit": v} for area, v in surroundings.speed_zones],
+        "keepout_mask": _grid_data(masks.keepout),
         "speed_mask": masks.speed
         and {
-            **(_grid(masks.speed.grid) or {}),
+            **(_grid_data(masks.speed.grid) or {}),
             "percent": masks.speed.percent,
             "base": masks.speed.base,
             "multiplier": masks.speed.multiplier,
         },
         "zone_masks": zone_masks,
         "lidars": list(surroundings.lidars),
-        "sensors": {name: _sensor(name, parameters) for name in parameters.sensors},
-        "says": [_topic(topic, topic_table.numbers[name], sensor_of) for name, topic in topic_table.sent.items()],
+        "sensors": {name: _sensor_data(name, parameters) for name in parameters.sensors},
+        "says": [_topic_data(topic, topic_table.numbers[name], sensor_of) for name, topic in topic_table.sent.items()],
         "hears": [
             {"topic": name, "type": topic_table.accepted[name].type, "number": number}
             for number, name in topic_table.accepted_by_number.items()
@@ -112,9 +112,9 @@ def goal_data(goal: Goal) -> dict[str, Any]:
     return {"name": goal.name, "x": x, "y": y, "yaw": yaw, **tolerances, **drive}
 
 
-def _robot(robot: RobotModel) -> dict[str, Any]:
+def _robot_data(robot: RobotModel) -> dict[str, Any]:
     return {
-        "footprint": _polygon(robot.footprint),
+        "footprint": _polygon_data(robot.footprint),
         "radius": robot.radius,
         "max_linear": robot.max_linear,
         "max_reverse": robot.max_reverse,
@@ -128,12 +128,12 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     }
 
 
-def _sensor(name: str, parameters: RunParameters) -> dict[str, Any]:
+def _sensor_data(name: str, parameters: RunParameters) -> dict[str, Any]:
     mount = parameters.mounts.get(name)
     return {"says": parameters.sensors[name], "rate": parameters.rates.get(name), "mount": mount and list(mount)}
 
 
-def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, Any]:
+def _topic_data(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, Any]:
     sensor = sensor_of.get(topic.name.removesuffix(EXACT_SUFFIX))
     return {
         "topic": topic.name,
@@ -144,7 +144,7 @@ def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, An
     }
 
 
-def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
+def _grid_data(grid: OccupancyGrid | None) -> dict[str, Any] | None:
     """Return the exact resolution (m), size (cells), and origin of a grid, without its cells; None if grid is None."""
     if grid is None:
         return None
@@ -152,7 +152,7 @@ def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
     return {"resolution": grid.resolution, "width": width, "height": height, "origin": [float(v) for v in grid.origin]}
 
 
-def _polygon(corners: Any) -> list[list[float]]:
+def _polygon_data(corners: Any) -> list[list[float]]:
     return [[float(x), float(y)] for x, y in corners]
 
 
@@ -213,14 +213,19 @@ class Welcome:
                 f"available: {', '.join(topic_table.sent)}"
             )
         return cls(
-            _text(content, "name"), _text(content, "version"), tuple(topics), step == "beat", _about(content),
-            _seconds(content, "first_answer_limit"), _seconds(content, "first_answer_until"),
-        )  # fmt: skip
+            name=_checked_text(content, "name"),
+            version=_checked_text(content, "version"),
+            topics=tuple(topics),
+            every_beat=step == "beat",
+            about=_checked_about(content),
+            first_answer_limit=_checked_seconds(content, "first_answer_limit"),
+            first_answer_until=_checked_seconds(content, "first_answer_until"),
+        )
 
     def with_bye(self, body: bytes) -> "Welcome":
         """Return a copy with the `about` of a BYE frame added. Ignores an invalid frame."""
         try:
-            return replace(self, about=self.about | _about(wire.from_json(body)))
+            return replace(self, about=self.about | _checked_about(wire.from_json(body)))
         except (ProtocolViolation, wire.Malformed):
             return self
 
@@ -231,21 +236,21 @@ class Welcome:
         return {"name": self.name, "version": self.version, "protocol": str(wire.PROTOCOL), **about}
 
 
-def _text(content: dict[str, Any], key: str) -> str:
+def _checked_text(content: dict[str, Any], key: str) -> str:
     text = content.get(key, "")
     if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH:
         raise ProtocolViolation(f"`{key}` is not a text of at most {MAX_NAME_LENGTH} characters")
     return text
 
 
-def _seconds(content: dict[str, Any], key: str) -> float:
+def _checked_seconds(content: dict[str, Any], key: str) -> float:
     seconds = content.get(key, 0.0)
     if not isinstance(seconds, int | float) or not 0 <= seconds <= MAX_FIRST_ANSWER_S:
         raise ProtocolViolation(f"`{key}` is not a number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
     return float(seconds)
 
 
-def _about(content: dict[str, Any]) -> dict[str, Any]:
+def _checked_about(content: dict[str, Any]) -> dict[str, Any]:
     about = content.get("about", {})
     if not isinstance(about, dict) or len(str(about)) > MAX_ABOUT_LENGTH:
         raise ProtocolViolation(f"`about` is not an object of at most {MAX_ABOUT_LENGTH} characters")

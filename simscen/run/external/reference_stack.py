@@ -58,7 +58,7 @@ class ReferenceStackPeer(Peer):
             stack = self._stack or self._start_stack(step)
             for kind, content in self._requests:
                 if kind == wire.PREEMPT:
-                    stack.preempt(content["tick"], _goal(Goal.from_content(content["goal"])))
+                    stack.preempt(content["tick"], _to_core_goal(Goal.from_content(content["goal"])))
                 else:
                     stack.cancel(content["tick"])
             self._requests.clear()
@@ -73,16 +73,16 @@ class ReferenceStackPeer(Peer):
 
     def _start_stack(self, step: Step) -> Stack:
         hello, grids = self.hello, {m.topic: m.content for m in step.messages if m.type == topics.MAP.type}
-        speed = _grid(hello["speed_mask"], grids.get(SPEED_MASK.name))
+        speed = _to_grid(hello["speed_mask"], grids.get(SPEED_MASK.name))
         limits = hello["speed_mask"]
         surroundings = Surroundings(
-            robot=RobotModel(**{**self.robot, "footprint": _polygon(self.robot["footprint"])}),
-            map=_grid(hello["map"], grids.get(topics.MAP.name)),
+            robot=RobotModel(**{**self.robot, "footprint": _to_polygon(self.robot["footprint"])}),
+            map=_to_grid(hello["map"], grids.get(topics.MAP.name)),
             tick_rate=hello["tick_rate"],
-            keepout=tuple(map(_polygon, hello["keepout"])),
-            speed_zones=tuple((_polygon(zone["polygon"]), zone["speed_limit"]) for zone in hello["speed_zones"]),
+            keepout=tuple(map(_to_polygon, hello["keepout"])),
+            speed_zones=tuple((_to_polygon(zone["polygon"]), zone["speed_limit"]) for zone in hello["speed_zones"]),
             masks=FilterMasks(
-                _grid(hello["keepout_mask"], grids.get(KEEPOUT_MASK.name)),
+                _to_grid(hello["keepout_mask"], grids.get(KEEPOUT_MASK.name)),
                 speed if speed is None else SpeedLimits(speed, limits["percent"], limits["base"], limits["multiplier"]),
             ),
             lidars=tuple(hello["lidars"]),
@@ -100,7 +100,7 @@ class ReferenceStackPeer(Peer):
         pose, std = estimate["pose"], estimate["std"]
         self._stack.start(
             Estimate(None if pose is None else Pose2(*pose), (std[0], std[1], std[2])),
-            tuple(_goal(Goal.from_content(goal)) for goal in task["goals"]),
+            tuple(_to_core_goal(Goal.from_content(goal)) for goal in task["goals"]),
         )
         return self._stack
 
@@ -152,16 +152,16 @@ class ReferenceStackPeer(Peer):
             step.publish(topics.BELIEF.name + EXACT_SUFFIX, messages.pose2d(*belief.pose))
             step.publish(topics.TF.name + EXACT_SUFFIX, messages.pose2d(*belief.map_from_odom))
             if len(belief.particles):
-                step.publish(topics.PARTICLES.name + EXACT_SUFFIX, _numbers(belief.particles))
+                step.publish(topics.PARTICLES.name + EXACT_SUFFIX, _encode_table(belief.particles))
         if decision.plan is not None:
             stamp = self._time.stamp(decision.plan.tick)
             step.publish(topics.PLAN.name, messages.path(stamp, []))
-            step.publish(topics.PLAN.name + EXACT_SUFFIX, _numbers(decision.plan.points))
+            step.publish(topics.PLAN.name + EXACT_SUFFIX, _encode_table(decision.plan.points))
         elif self._had_plan and stack.plan is None:
             step.publish(topics.PLAN.name, messages.path(step.stamp, []))
         self._had_plan = stack.plan is not None
         if decision.local_plan is not None:
-            step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _numbers(decision.local_plan.points))
+            step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _encode_table(decision.local_plan.points))
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
             step.publish(topic.name, encode_arrays.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
@@ -170,7 +170,7 @@ class ReferenceStackPeer(Peer):
                 (odom.tick, *odom.pose, *odom.twist, *odom.twist_variance, *odom.pose_covariance)
                 for odom in decision.odometry
             ]
-            step.publish(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, _numbers(np.array(rows)))
+            step.publish(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, _encode_table(np.array(rows)))
         for event in decision.events:
             if event.kind is EventKind.GOAL_ACCEPTED:
                 self._goal_index = event.data["index"]
@@ -181,12 +181,12 @@ class ReferenceStackPeer(Peer):
                 step.publish(EVENTS, messages.string(json.dumps(report)))
 
 
-def _goal(goal: Goal) -> CoreGoal:
+def _to_core_goal(goal: Goal) -> CoreGoal:
     pose = Pose2(goal.x, goal.y, goal.yaw)
     return CoreGoal(goal.name, pose, goal.xy_tolerance, goal.yaw_tolerance, goal.timeout, goal.via, goal.wait)
 
 
-def _grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> OccupancyGrid | None:
+def _to_grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> OccupancyGrid | None:
     """Return a grid with the cells of a message, and with the exact resolution and origin in HELLO (`facts`)."""
     if facts is None or grid is None:
         return None
@@ -194,11 +194,11 @@ def _grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> 
     return OccupancyGrid(cells, facts["resolution"], Pose2(*facts["origin"]))
 
 
-def _polygon(corners: list[list[float]]) -> tuple[tuple[float, float], ...]:
+def _to_polygon(corners: list[list[float]]) -> tuple[tuple[float, float], ...]:
     return tuple((x, y) for x, y in corners)
 
 
-def _numbers(table: Array) -> bytes:
+def _encode_table(table: Array) -> bytes:
     return messages.float64_array(array("d", np.ascontiguousarray(table, dtype=np.float64).tobytes()))
 
 

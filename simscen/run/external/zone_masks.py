@@ -64,13 +64,13 @@ class ZoneMasks:
 
     def changed_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
         """Yield the masks with the enabled `zones` that have changed since the last call; at first, all masks."""
-        for topic, grid in self._masks(zones):
+        for topic, grid in self._draw_masks(zones):
             before = self._drawn.get(topic)
             if before is None or not np.array_equal(before.cells, grid.cells):
                 self._drawn[topic] = grid
                 yield topic, grid
 
-    def _masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
+    def _draw_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
         if self._keepout is not None:
             cells = _cells_of(zones.masks.keepout, self._keepout)
             for polygon in zones.keepout:

@@ -55,15 +55,15 @@ class Director:
         for index, (step, trigger) in enumerate(self._steps):
             situation = self._situations.get(index)
             for _ in range(0 if situation is None or trigger.is_exhausted else trigger.count_firings(situation)):
-                self._perform(index, step)
+                self._perform_step(index, step)
                 self._observe_next_step(index)
         if self._ends:
-            self._end_faults()
+            self._end_due_faults()
         for index, trigger in enumerate(self._starts):
             if not trigger.is_exhausted and trigger.count_firings(self._stage) and index not in self._ends:
                 self._begin_fault(index)
 
-    def _perform(self, index: int, step: SequenceStep) -> None:
+    def _perform_step(self, index: int, step: SequenceStep) -> None:
         kinds: list[Value] = [action.kind for action in step.actions]
         self._stage.record_world_event(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": index, "actions": kinds}))
         effects = [action.perform(self._stage) for action in step.actions]
@@ -85,7 +85,7 @@ class Director:
         data: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind, "affects": kind}
         self._stage.record_event(Event(0, EventKind.FAULT_STARTED, entry.label, data))
 
-    def _end_faults(self) -> None:
+    def _end_due_faults(self) -> None:
         for index, end in sorted(self._ends.items()):
             if end is not None and self._stage.tick >= end:
                 del self._ends[index]

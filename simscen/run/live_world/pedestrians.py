@@ -129,11 +129,11 @@ class PedestrianSimulation:
             path = MotionPath((0.0, step_s), (before[name], pose))
             self._simulation.follow(name, path, crowd.top_speed(name))
         for action in actions:
-            event = self._event(action)
+            event = self._to_event(action)
             for listener in self.listeners:
                 listener(event)
 
-    def _event(self, action: PedestrianAction) -> Event:
+    def _to_event(self, action: PedestrianAction) -> Event:
         data: dict[str, Value] = {"behavior": self._behaviors[action.name], "robot": action.about}
         if action.what == "reached":
             data = {"goal": int(action.about)}

@@ -227,7 +227,7 @@ class NodeRunner:
 
         `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here.
         """
-        jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._job)
+        jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._unpack_job)
         for update in self._supervisor.run(jobs, [_installed_plugin(entry) for entry in plugins]):
             job = update.job
             match update:
@@ -240,7 +240,7 @@ class NodeRunner:
                     shutil.rmtree(job.folder, ignore_errors=True)
                     yield JobEnded(job.number, end)
 
-    def _job(self, packed: PackedJob) -> Job:
+    def _unpack_job(self, packed: PackedJob) -> Job:
         return self._unpacker.unpack(packed, self._folder / f"run-{packed.number}")
 
 

@@ -24,7 +24,7 @@ MAX_RECOVER_BYTES = 64 << 20
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
     """Return the result of a run whose worker process has ended; an error if the worker did not finish the run."""
-    failure = _with_log(_failure(end), job.folder)
+    failure = _with_recovered_log(_failure_at_end(end), job.folder)
     output = output_tail(end.output)
     result = (
         _read_result(job, output)
@@ -34,7 +34,7 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
     return RunFinished(
         result,
         wall=end.wall if isinstance(end, ProcessEnd) else 0.0,
-        artifacts=_artifacts(job.folder),
+        artifacts=_existing_artifacts(job.folder),
         again=repeat_command(job.scenario, job.key.seed),
         file=display_path(job.scenario.file),
         tags=tuple(job.scenario.spec.tags),
@@ -69,7 +69,7 @@ def _read_result(job: Job, output: str) -> RunResult:
         return error_result(job.key, job.scenario.path, failure, job.scenario.stack)
 
 
-def _artifacts(folder: Path) -> Artifacts:
+def _existing_artifacts(folder: Path) -> Artifacts:
     def path(name: str) -> str:
         return str(folder / name) if (folder / name).exists() else ""
 
@@ -87,21 +87,21 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
+def _failure_at_end(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
     """Return the failure of a run whose process has ended, or None if the run was finished."""
     if isinstance(end, ForkServerDeath):
         when = "while it prepared this one" if end.was_preparing else "while this run was active"
         kind = "timeout" if end.timed_out else "crashed"
         return RunFailure(
-            kind, f"the process that prepares runs {end.description} {when}{_place(end)}", output_tail(end.output)
+            kind, f"the process that prepares runs {end.description} {when}{_crash_place(end)}", output_tail(end.output)
         )
     peak = f"peak memory {end.peak_bytes / 2**20:.0f} MiB of {MAX_MEMORY_BYTES / 2**20:.0f} MiB"
     if end.killed_for == "timeout":
-        return _worker_failure(end, f"stopped after {end.wall:.0f} s of wall time{_place(end)}", "timeout")
+        return _worker_failure(end, f"stopped after {end.wall:.0f} s of wall time{_crash_place(end)}", "timeout")
     if end.signal == signal.SIGKILL:
         return _worker_failure(end, f"killed (SIGKILL; possibly out of memory; {peak})")
     if end.signal is not None:
-        return _worker_failure(end, f"crashed: {signal.Signals(end.signal).name}{_place(end)} ({peak})")
+        return _worker_failure(end, f"crashed: {signal.Signals(end.signal).name}{_crash_place(end)} ({peak})")
     if end.code != 0:
         return _worker_failure(end, f"exited {end.code} ({peak})")
     if end.final_message is None:
@@ -115,7 +115,7 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
     return None
 
 
-def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
+def _with_recovered_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
     """Recover the partial log of a failed run, and return the failure with the name of the log in its message."""
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
@@ -137,7 +137,7 @@ def _worker_failure(end: ProcessEnd, message: str, kind: str = "crashed") -> Run
     return RunFailure(kind, message, output_tail(end.output))
 
 
-def _place(end: ProcessEnd | ForkServerDeath) -> str:
+def _crash_place(end: ProcessEnd | ForkServerDeath) -> str:
     """Return ", in FRAME" with the innermost Python frame if the process wrote its traceback, else ""."""
     place = innermost_frame(end.output)
     return f", in {place}" if place else ""
