@@ -40,7 +40,7 @@ def at_most(
     detail: Sequence[str] = (),
 ) -> Finding:
     """Return a finding that passes if `value` <= `limit`. Raises InvalidTrace if `value` is nan."""
-    return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
+    return _bound_finding(what, value, limit, unit, limit - value, "≤", at, context, detail)
 
 
 def at_least(
@@ -54,7 +54,7 @@ def at_least(
     detail: Sequence[str] = (),
 ) -> Finding:
     """Return a finding that passes if `value` >= `limit`. Raises InvalidTrace if `value` is nan."""
-    return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
+    return _bound_finding(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
 def counted(
@@ -112,7 +112,7 @@ def format_quantity(value: float, unit: str, digits: int) -> str:
     return f"{value:.{digits}f} {unit}".rstrip()
 
 
-def _bound(
+def _bound_finding(
     what: str,
     value: float,
     limit: float,

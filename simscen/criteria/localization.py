@@ -152,15 +152,15 @@ class RelocalizedWithin(Spec, Criterion):
         happened = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, str(self.after))
-            return [undecided("relocalized_within", because, self._limit, detail)]
+            return [undecided("relocalized_within", because, self._limit_text, detail)]
         return [self._judge_start(trace, span.start, error) for span in happened]
 
     @property
-    def _limit(self) -> str:
-        return f"≤ {self.time:.2f} s {self._context}"
+    def _limit_text(self) -> str:
+        return f"≤ {self.time:.2f} s {self._context_text}"
 
     @property
-    def _context(self) -> str:
+    def _context_text(self) -> str:
         return f"after {self.after}" if self.after is not None else "after the start"
 
     def _judge_start(self, trace: Trace, start: int, error: Samples) -> Finding:
@@ -169,7 +169,7 @@ class RelocalizedWithin(Spec, Criterion):
         ticks, errors = error.ticks[later], error.values[later]
         is_localized = (errors[:, 0] <= self.tolerance) & (errors[:, 1] <= self.yaw_tolerance)
         if is_localized[ticks <= start + self.time * trace.tick_rate].all():
-            return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
+            return undecided("relocalized_within", f"the robot was never lost {self._context_text}", self._limit_text)
         # Only samples after the loss count as relocalization.
         lost = int(np.argmin(is_localized))
         found, lasted = first_sustained(
@@ -182,12 +182,12 @@ class RelocalizedWithin(Spec, Criterion):
             because = (
                 f"the run was over at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)}), the belief {state}"
             )
-            return undecided("relocalized_within", because, self._limit)
+            return undecided("relocalized_within", because, self._limit_text)
         detail = [f"the position error was at most {errors[:, 0].max():.2f} m, and {errors[-1, 0]:.2f} m at the end"]
         if found is None:
             detail.append("the robot never relocalized")
         return at_most(
-            "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context, detail=detail
+            "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context_text, detail=detail
         )
 
 

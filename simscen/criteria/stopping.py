@@ -71,15 +71,15 @@ class StoppedWithin(Spec, Criterion):
         happened = spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, self.after)
-            return [undecided("stopped_within", because, self._limit, detail)]
+            return [undecided("stopped_within", because, self._limit_text, detail)]
         is_standing = self._standing_samples(trace)
         if all(_stood_before(trace, is_standing, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
-            return [undecided("stopped_within", because, self._limit)]
+            return [undecided("stopped_within", because, self._limit_text)]
         return [finding for span in happened for finding in self._judge_span(trace, span, is_standing)]
 
     @property
-    def _limit(self) -> str:
+    def _limit_text(self) -> str:
         return f"≤ {self.time:.2f} s after {self.after}"
 
     def _standing_samples(self, trace: Trace) -> Flags:
@@ -100,7 +100,7 @@ class StoppedWithin(Spec, Criterion):
             over = f"`{self.after}`" if span.has_end_event and stop is None else f"the run ({end_reason(trace)})"
             state = "still moving" if stop is None else "at rest too briefly"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
-            return [undecided("stopped_within", because, self._limit)]
+            return [undecided("stopped_within", because, self._limit_text)]
         detail = _describe_motion(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
         found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)

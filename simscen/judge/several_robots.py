@@ -54,7 +54,7 @@ def combine_robots(
         metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
         undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
         events=_events(traces),
-        disturbances=(*_disturbances(first, "event"), *_faults(results)),
+        disturbances=(*_disturbances_of_kind(first, "event"), *_faults_with_robot_names(results)),
         error=_prefixed_failure(errors[0][0], errors[0][1]) if errors else None,
         reason="" if expected is None else expected.reason,
     )
@@ -99,15 +99,15 @@ def _is_world_event(event: Event) -> bool:
     return str(event.kind).startswith(WORLD_EVENT_PREFIXES)
 
 
-def _disturbances(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
+def _disturbances_of_kind(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
     return [one for one in result.disturbances if one.disturbance.kind == kind]
 
 
-def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
+def _faults_with_robot_names(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
     return [
         replace(one, disturbance=replace(one.disturbance, name=f"{name}/{one.disturbance.name}"))
         for name, result in results.items()
-        for one in _disturbances(result, "fault")
+        for one in _disturbances_of_kind(result, "fault")
     ]
 
 

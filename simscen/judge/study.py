@@ -144,11 +144,11 @@ def _labels(values: Sequence[Any]) -> list[str]:
     for start in range(0, len(order), size):
         part = order[start : start + size]
         for index in part:
-            labels[index] = f"{_short(values[part[0]])} … {_short(values[part[-1]])}"
+            labels[index] = f"{_rounded_text(values[part[0]])} … {_rounded_text(values[part[-1]])}"
     return labels
 
 
-def _short(value: Any) -> str:
+def _rounded_text(value: Any) -> str:
     """Return a number or quantity with three significant digits."""
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     return f"{value:.3g}" if match is None else f"{float(match[1]):.3g} {match[2]}"
@@ -248,7 +248,7 @@ def study_data(study: Study) -> dict[str, Any]:
         "passed": study.passed,
         "failed": study.failed,
         "errors": study.errors,
-        "interval": _pair(study.limits),
+        "interval": _limits_data(study.limits),
         "claim": None
         if claim is None
         else {
@@ -262,7 +262,7 @@ def study_data(study: Study) -> dict[str, Any]:
             "runs": claim.runs,
             "max_runs": claim.max_runs,
             "errors": claim.errors,
-            "limits": _pair(claim.limits),
+            "limits": _limits_data(claim.limits),
         },
         "rates": [
             {
@@ -270,7 +270,7 @@ def study_data(study: Study) -> dict[str, Any]:
                 "value": row.value,
                 "passed": row.passed,
                 "runs": row.runs,
-                "interval": _pair(row.limits),
+                "interval": _limits_data(row.limits),
             }
             for row in study.rates
         ],
@@ -298,5 +298,5 @@ def study_data(study: Study) -> dict[str, Any]:
     }
 
 
-def _pair(limits: tuple[float, float] | None) -> list[float] | None:
+def _limits_data(limits: tuple[float, float] | None) -> list[float] | None:
     return None if limits is None else list(limits)

@@ -145,52 +145,52 @@ def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Ite
     if len(scenarios) > 1:
         scenarios = {ALL_SCENARIOS: list(completed), **scenarios}
     for scenario, own in scenarios.items():
-        passed = [(_passed(one), _passed(two)) for one, two in own]
+        passed = [(_passed_as_number(one), _passed_as_number(two)) for one, two in own]
         yield PairedSample(scenario, PASS_RATE, "", passed, higher_is_better=True)
     for name in names:
-        direction = _kind(name) in HIGHER_IS_BETTER if _kind(name) in COMPARED_METRICS else None
+        direction = _without_robot(name) in HIGHER_IS_BETTER if _without_robot(name) in COMPARED_METRICS else None
         for scenario, own in _by_scenario(_comparable(name, completed, same_arrival)).items():
-            yield PairedSample(scenario, name, _unit(name), _values(name, own), direction)
+            yield PairedSample(scenario, name, _metric_unit(name), _paired_values(name, own), direction)
 
 
-def _passed(run: RunResult) -> float:
+def _passed_as_number(run: RunResult) -> float:
     return float(_own_outcome(run) is Outcome.PASSED)
 
 
 def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
     """Return the pairs in which a metric can be compared: `completed` or `same_arrival`, see METRICS_OF_ALL_PAIRS."""
-    return completed if _kind(name) in METRICS_OF_ALL_PAIRS else same_arrival
+    return completed if _without_robot(name) in METRICS_OF_ALL_PAIRS else same_arrival
 
 
-def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
+def _paired_values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
     """Return the values of a metric in the pairs in which both runs have the metric."""
     both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
     return [(one, two) for one, two in both if one is not None and two is not None]
 
 
-def _kind(name: str) -> str:
+def _without_robot(name: str) -> str:
     """Return the name of a metric without the robot: `a/collisions` becomes `collisions`."""
     return name.rpartition("/")[2]
 
 
-def _unit(name: str) -> str:
-    return METRICS[_kind(name)].unit if _kind(name) in METRICS else ""
+def _metric_unit(name: str) -> str:
+    return METRICS[_without_robot(name)].unit if _without_robot(name) in METRICS else ""
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
     """Return the names of the COMPARED_METRICS of the runs, grouped by robot."""
-    names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED_METRICS}
-    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_kind(name))))
+    names = {name for pair in pairs for run in pair for name in run.metrics if _without_robot(name) in COMPARED_METRICS}
+    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_without_robot(name))))
 
 
 def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
     """Return the names of metrics of plugins."""
-    return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
+    return sorted({name for pair in pairs for run in pair for name in run.metrics if _without_robot(name) not in METRICS})
 
 
 def _arrived(run: RunResult) -> set[str]:
     """Return the names of the robots that reached their last goals. A single robot has the name ""."""
-    times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
+    times = {name: value for name, value in run.metrics.items() if _without_robot(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
 
@@ -217,14 +217,14 @@ def _first_violation(run: RunResult) -> str:
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
     """Return the difference of a metric; None if no pair has the metric."""
-    known = _values(name, pairs)
+    known = _paired_values(name, pairs)
     if not known:
         return None
     differences = [two - one for one, two in known]
     lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
     return MetricDifference(
         metric=name,
-        unit=_unit(name),
+        unit=_metric_unit(name),
         pairs=len(known),
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),

@@ -66,12 +66,12 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
-        (_NAVIGATION_METRICS, lambda: _navigation(trace, case, path().length)),
+        (_NAVIGATION_METRICS, lambda: _navigation_metrics(trace, case, path().length)),
         (PATH_METRICS, lambda: path_metrics(trace, path())),
-        (_MOTION_METRICS, lambda: _motion(trace, case)),
-        (_CLEARANCE_METRICS, lambda: _clearance(trace)),
+        (_MOTION_METRICS, lambda: _motion_metrics(trace, case)),
+        (_CLEARANCE_METRICS, lambda: _clearance_metrics(trace)),
         (_PEOPLE_METRICS, lambda: person_metrics(trace, case)),
-        (_EVENT_METRICS, lambda: _events(trace)),
+        (_EVENT_METRICS, lambda: _event_metrics(trace)),
         (POSE_METRICS, lambda: pose_metrics(trace)),
     )
     found: Values = {}
@@ -110,7 +110,7 @@ def barn_score(success: bool, seconds: float, reference_length: float) -> float:
     return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
 
 
-def _navigation(trace: Trace, case: Case, length: float) -> Values:
+def _navigation_metrics(trace: Trace, case: Case, length: float) -> Values:
     shortest, unknown_reason = shortest_path_length(trace, case)
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
     found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}
@@ -157,7 +157,7 @@ def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float
     return max(0.0, 1 - remaining / shortest) * shortest / max(shortest, length)
 
 
-def _motion(trace: Trace, case: Case) -> Values:
+def _motion_metrics(trace: Trace, case: Case) -> Values:
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):
         return dict.fromkeys(_MOTION_METRICS, "the true velocity was not recorded")
@@ -167,17 +167,17 @@ def _motion(trace: Trace, case: Case) -> Values:
     return {
         "max_speed": float(speeds.max()),
         "time_not_moving": float(durations[is_standing].sum()),
-        **_compute_or_explain(("mean_jerk", "max_jerk"), lambda: _jerk(trace, case)),
-        **_compute_or_explain(_SMOOTHNESS_METRICS, lambda: _smoothness(trace, speeds)),
+        **_compute_or_explain(("mean_jerk", "max_jerk"), lambda: _jerk_metrics(trace, case)),
+        **_compute_or_explain(_SMOOTHNESS_METRICS, lambda: _smoothness_metrics(trace, speeds)),
     }
 
 
-def _jerk(trace: Trace, case: Case) -> Values:
+def _jerk_metrics(trace: Trace, case: Case) -> Values:
     jerk = read_signal("jerk", trace, case, {})
     return {"mean_jerk": float(jerk.mean()), "max_jerk": float(jerk.max())}
 
 
-def _smoothness(trace: Trace, speeds: Array) -> Values:
+def _smoothness_metrics(trace: Trace, speeds: Array) -> Values:
     if speeds.max() < MIN_MOVING_SPEED_M_S:
         return dict.fromkeys(_SMOOTHNESS_METRICS, "the robot never moved")
     even_speeds, rate = evenly_sampled_speed(trace)
@@ -188,14 +188,14 @@ def _smoothness(trace: Trace, speeds: Array) -> Values:
     }
 
 
-def _clearance(trace: Trace) -> Values:
+def _clearance_metrics(trace: Trace) -> Values:
     distances = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE_M)
     if not len(distances):
         return dict.fromkeys(_CLEARANCE_METRICS, "the clearance was not recorded")
     return {"min_clearance": float(distances.min()), "mean_clearance": float(distances.mean())}
 
 
-def _events(trace: Trace) -> Values:
+def _event_metrics(trace: Trace) -> Values:
     """Return the counts of events, and the time with at least one contact."""
     events = trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED)
     steps = [1 if event.kind == EventKind.COLLISION_STARTED else -1 for event in events]

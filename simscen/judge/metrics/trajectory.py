@@ -107,15 +107,15 @@ def pose_metrics(trace: Trace) -> Values:
         return dict.fromkeys(POSE_METRICS, NO_BELIEF)
     distances, angles = error.values.T
     return {
-        **_statistics("ape_trans", distances),
+        **_error_statistics("ape_trans", distances),
         "ape_trans_final": float(distances[-1]),
-        **_statistics("ape_rot", angles),
+        **_error_statistics("ape_rot", angles),
         **_relative_errors(trace),
         "nees": _nees(trace),
     }
 
 
-def _statistics(name: str, errors: Array) -> Values:
+def _error_statistics(name: str, errors: Array) -> Values:
     return {
         f"{name}_rmse": float(np.sqrt(np.mean(errors**2))),
         f"{name}_mean": float(np.mean(errors)),
@@ -140,8 +140,8 @@ def _relative_errors(trace: Trace) -> Values:
     moved_true, moved_believed = _between(true[i], true[j]), _between(believed[i], believed[j])
     error = _between(moved_true, moved_believed)
     return {
-        **_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1])),
-        **_statistics("rpe_rot", np.abs(wrap_array(error[:, 2]))),
+        **_error_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1])),
+        **_error_statistics("rpe_rot", np.abs(wrap_array(error[:, 2]))),
     }
 
 
