@@ -148,7 +148,7 @@ def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Ite
         passed = [(_passed_as_number(one), _passed_as_number(two)) for one, two in own]
         yield PairedSample(scenario, PASS_RATE, "", passed, higher_is_better=True)
     for name in names:
-        direction = _without_robot(name) in HIGHER_IS_BETTER if _without_robot(name) in COMPARED_METRICS else None
+        direction = _base_name(name) in HIGHER_IS_BETTER if _base_name(name) in COMPARED_METRICS else None
         for scenario, own in _by_scenario(_comparable(name, completed, same_arrival)).items():
             yield PairedSample(scenario, name, _metric_unit(name), _paired_values(name, own), direction)
 
@@ -159,7 +159,7 @@ def _passed_as_number(run: RunResult) -> float:
 
 def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
     """Return the pairs in which a metric can be compared: `completed` or `same_arrival`, see METRICS_OF_ALL_PAIRS."""
-    return completed if _without_robot(name) in METRICS_OF_ALL_PAIRS else same_arrival
+    return completed if _base_name(name) in METRICS_OF_ALL_PAIRS else same_arrival
 
 
 def _paired_values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
@@ -168,29 +168,29 @@ def _paired_values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]
     return [(one, two) for one, two in both if one is not None and two is not None]
 
 
-def _without_robot(name: str) -> str:
+def _base_name(name: str) -> str:
     """Return the name of a metric without the robot: `a/collisions` becomes `collisions`."""
     return name.rpartition("/")[2]
 
 
 def _metric_unit(name: str) -> str:
-    return METRICS[_without_robot(name)].unit if _without_robot(name) in METRICS else ""
+    return METRICS[_base_name(name)].unit if _base_name(name) in METRICS else ""
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
     """Return the names of the COMPARED_METRICS of the runs, grouped by robot."""
-    names = {name for pair in pairs for run in pair for name in run.metrics if _without_robot(name) in COMPARED_METRICS}
-    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_without_robot(name))))
+    names = {name for pair in pairs for run in pair for name in run.metrics if _base_name(name) in COMPARED_METRICS}
+    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_base_name(name))))
 
 
 def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
     """Return the names of metrics of plugins."""
-    return sorted({name for pair in pairs for run in pair for name in run.metrics if _without_robot(name) not in METRICS})
+    return sorted({name for pair in pairs for run in pair for name in run.metrics if _base_name(name) not in METRICS})
 
 
 def _arrived(run: RunResult) -> set[str]:
     """Return the names of the robots that reached their last goals. A single robot has the name ""."""
-    times = {name: value for name, value in run.metrics.items() if _without_robot(name) == "time_to_goal"}
+    times = {name: value for name, value in run.metrics.items() if _base_name(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
 
