@@ -37,7 +37,7 @@ class _ErrorCodeSchema:
 
 
 ErrorCodeValue = Annotated[ErrorCode, PlainValidator(parse_error_code), _ErrorCodeSchema()]
-"""Type of a YAML key whose value is the name or number of an error code."""
+"""Type of the value of a YAML key: the name or number of an error code."""
 
 
 def error_code_name(event: Event) -> str:

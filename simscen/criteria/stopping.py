@@ -180,7 +180,7 @@ def _standstills(poses: Samples, start: int, end: int, radius: float) -> list[tu
     """Divide a drive from tick `start` to `end` into periods, and return the duration and the end of each in ticks.
 
     As in Nav2's progress checker, a period ends when the robot is more than `radius` m away from its position at the
-    begin of the period. The list is empty without samples.
+    start of the period. The list is empty without samples.
     """
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:

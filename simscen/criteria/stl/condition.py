@@ -135,9 +135,9 @@ class Window(Spec):
     within: PositiveDuration | None = None
     """End of the window in s from now. The window begins now."""
     after: PositiveDuration | None = None
-    """Begin of the window in s from now. The window lasts until the end of the run."""
+    """Start of the window in s from now. The window lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """Begin and end of the window in s from now."""
+    """Start and end of the window in s from now."""
 
     @model_validator(mode="after")
     def _check_interval(self) -> Window:
@@ -150,7 +150,7 @@ class Window(Spec):
 
     @property
     def interval(self) -> tuple[float, float | None]:
-        """Begin and end in s from now. An end of None is the end of the run."""
+        """Start and end in s from now. An end of None is the end of the run."""
         if self.between is not None:
             return self.between[0], self.between[1]
         return self.after or 0.0, self.within
@@ -214,7 +214,7 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
     """Return the earliest time in s from now at which a condition can be known to be true.
 
     If `holds` is False, return the earliest time at which it can be known to be false. A window that lasts to the end
-    of the run counts only with its begin.
+    of the run counts only with its start.
     """
     if condition.all is not None or condition.any is not None:
         needs_all = (condition.all is not None) == holds
@@ -234,7 +234,7 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
 def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
     """Return the `decision_horizon` in s of `operator` ("always" or "eventually") with the condition `part`.
 
-    It is the end of the window if the whole window decides, and the begin of the window if one sample can decide.
+    It is the end of the window if the whole window decides, and the start of the window if one sample can decide.
     """
     begin, end = window.interval
     needs_whole_window = (operator == "always") == holds

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """Criterion whose condition must be true at the start of the run. Its temporal operators cover later times."""
+    """Criterion that a condition is true at the start of the run. Temporal operators in it cover later times."""
 
     @abstractmethod
     def all_comparisons(self) -> list[Condition]:
@@ -100,7 +100,7 @@ class TemporalCriterion(Criterion):
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, with_hint: bool) -> Finding:
-    """Return the inconclusive finding for a `whenever` whose premise was never true.
+    """Return the inconclusive finding for a `whenever` if its premise was never true.
 
     If `with_hint`, the finding mentions the key `required`.
     """

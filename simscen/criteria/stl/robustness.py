@@ -79,7 +79,7 @@ class Robustness:
         return ()
 
     def untested_responses(self) -> Iterator[ResponseRobustness]:
-        """Yield each `whenever` in the condition whose required premise was never certainly true."""
+        """Yield each `whenever` in the condition if its premise is required, but was never certainly true."""
         for part in self.parts():
             yield from part.untested_responses()
 
@@ -206,7 +206,7 @@ class ResponseRobustness(Robustness):
         return (self.premise, self.response)
 
     def untested_responses(self) -> Iterator[ResponseRobustness]:
-        """Yield this `whenever` and each nested one whose required premise was never certainly true."""
+        """Yield this `whenever`, and each nested one, if its premise is required, but was never certainly true."""
         if self.required and not self.was_tested:
             yield self
         yield from super().untested_responses()
