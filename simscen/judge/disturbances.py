@@ -146,10 +146,10 @@ def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> Distur
 
 
 def _never_began(trace: Trace) -> str:
-    """Return the text for a disturbance whose trigger never fired."""
+    """Return the text for a disturbance if its trigger never fired."""
     return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
 
 
 def _too_late(trace: Trace) -> str:
-    """Return the text for a disturbance whose trigger fired only at the end of the run."""
+    """Return the text for a disturbance if its trigger fired only at the end of the run."""
     return f"it began only when the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"

@@ -153,7 +153,7 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Kinds of faults whose odometry error remains after the end of the fault."""
+"""Kinds of faults that leave an error in the odometry after their end."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
 """Kinds of targets of these faults."""
 LOST_DISTANCE_M = 0.5

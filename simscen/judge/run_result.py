@@ -77,6 +77,6 @@ def judge_run(
 
 
 def _judging_failure(verdicts: tuple[Verdict, ...]) -> RunFailure:
-    """Return the failure of a run whose criteria raised exceptions, or that has no criteria."""
+    """Return the failure of a run without criteria, or with criteria that raised exceptions."""
     broken = [f"{v.id}: {v.tightest.measured}" for v in verdicts if v.status is Status.ERROR and v.tightest]
     return RunFailure("invalid", "; ".join(broken) or "no criterion judged this run")

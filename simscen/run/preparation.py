@@ -100,7 +100,7 @@ def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
 
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
-    """Return the cell size in m of the world's map. Cells are larger in a large world whose map no robot uses."""
+    """Return the cell size in m of the world's map. They are larger if the world is large and no robot uses the map."""
     is_used = any(view.map is None for view in loaded.robot_views.values())
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 

@@ -212,7 +212,7 @@ def _definition(loaded: LoadedScenario) -> dict[str, Any]:
 
 
 def _without_stack_parameters(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario or robot without the parameters of its stack, except those that all types of stacks have."""
+    """Return a scenario or robot, of its stack only with the parameters that all types of stacks have."""
     stack = entry.get("stack")
     keys = StackBase.model_fields.keys() - {"controller_frequency"}
     common = {key: stack[key] for key in sorted(keys) if key in stack} if isinstance(stack, Mapping) else {}
@@ -239,7 +239,7 @@ def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def _chosen_stacks(loaded: LoadedScenario) -> dict[str, object]:
-    """Return the stack of each robot whose stack was chosen on the command line or in the user's configuration."""
+    """Return the stacks that were chosen on the command line or in the user's configuration, by robot."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.external_command is None else {"runs": loaded.external_command.digest}),

@@ -57,7 +57,7 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """Cache with one file for each entry, whose name is the key. Concurrent sessions can share the folder.
+    """Cache with one file for each entry, named after its key. Concurrent sessions can share the folder.
 
     Without a `folder`, the cache is disabled. `max_bytes` limits the total size of all entries.
     """

@@ -58,7 +58,7 @@ class FakeStage:
         return self
 
     def region(self, name: str) -> Polygon:
-        """Return the corners of a region; without an entry in `regions`, those of a square of 2 m at the origin."""
+        """Return the corners of a region; without an entry in `regions`, a square of 2 m at the origin."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
     def object(self, name: str) -> Pose2 | None:

@@ -21,7 +21,7 @@ COMPARED_METRICS = (
 )
 """Metrics that are compared, in the order of the table. Metrics of plugins follow."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
-"""Compared metrics of which higher values are better. Lower values of the other COMPARED_METRICS are better."""
+"""Metrics for which a higher value is better. For all other COMPARED_METRICS, a lower value is better."""
 METRICS_OF_ALL_PAIRS = frozenset({"collisions"})
 """Metrics that are compared in all pairs of runs. Others need pairs in which the same robots reach their last goals."""
 ALL_SCENARIOS = "all scenarios"

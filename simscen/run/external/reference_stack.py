@@ -203,7 +203,7 @@ def _encode_table(table: Array) -> bytes:
 
 
 def main() -> None:
-    """Serve the stack whose section is given on the command line."""
+    """Serve the stack that the argument STACK specifies."""
     section = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
     ReferenceStackPeer(StackSpec.model_validate(section, by_alias=True, by_name=False)).serve()
 

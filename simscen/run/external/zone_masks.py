@@ -151,7 +151,7 @@ def _cells_of(mask: OccupancyGrid | None, grid: OccupancyGrid) -> npt.NDArray[np
 
 
 def _cells_inside(grid: OccupancyGrid, polygon: Polygon) -> Cells:
-    """Return the rows and columns of the cells whose centers are inside a polygon."""
+    """Return the rows and columns of the cells with centers inside a polygon."""
     corners = grid.cell_of(np.array(polygon))
     low = np.maximum(corners.min(axis=0), 0)
     high = np.minimum(corners.max(axis=0) + 1, grid.shape)

@@ -161,7 +161,7 @@ _PR_SET_CHILD_SUBREAPER = 36
 
 
 def adopt_orphans() -> None:
-    """Make this process the parent of all descendants whose parent exits (PR_SET_CHILD_SUBREAPER)."""
+    """Make this process the new parent of descendants when their parent exits (PR_SET_CHILD_SUBREAPER)."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 

@@ -36,7 +36,7 @@ from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import RegisteredType
 
 MAX_ATTEMPTS = 2
-"""Largest number of attempts at a job whose runner or node is lost."""
+"""Largest number of attempts at a job if its runner or node is lost."""
 QUEUED_JOBS_PER_WORKER = 2
 """Number of jobs in the queue for each worker."""
 NODE_SEARCH_PERIOD_S = 5.0

@@ -23,7 +23,7 @@ MAX_RECOVER_BYTES = 64 << 20
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
-    """Return the result of a run whose worker process has ended; an error if the worker did not finish the run."""
+    """Return the result of a run after its worker process has ended; an error if the run was not finished."""
     failure = _with_recovered_log(_failure_at_end(end), job.folder)
     output = output_tail(end.output)
     result = (
@@ -88,7 +88,7 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
 
 
 def _failure_at_end(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
-    """Return the failure of a run whose process has ended, or None if the run was finished."""
+    """Return the failure of a run from the end of its process, or None if the run was finished."""
     if isinstance(end, ForkServerDeath):
         when = "while it prepared this one" if end.was_preparing else "while this run was active"
         kind = "timeout" if end.timed_out else "crashed"

@@ -1,1 +1,1 @@
-"""Contracts: for each kind of plug-in, a class whose methods check the rules of the protocol on one component."""
+"""Contracts: a class for each kind of plug-in. Each of its methods checks one rule of the protocol on a component."""

@@ -32,7 +32,7 @@ class BehaviorContract(ComponentContract):
     role = "behavior"
 
     def view(self, half_width: float = 4.0) -> CostmapView:
-        """Return the costmap of a square room around the origin, whose sides are 2 · `half_width` m long."""
+        """Return the costmap of a square room around the origin with sides of 2 · `half_width` m."""
         inner, outer, edge = half_width, half_width + 0.2, half_width + 1.0
         walls = [(-outer, -outer, outer, -inner), (-outer, inner, outer, outer)]
         walls += [(-outer, -inner, -inner, inner), (inner, -inner, outer, inner)]
