@@ -142,7 +142,7 @@ class CommandLink:
 
 
 class LocalizerWithFaults:
-    """Wrapper of the localizer `inner`. `disturb` changes each published belief (pose estimate), but not its state."""
+    """Wrapper of the localizer `inner`: `disturb` changes the published beliefs (pose estimates), not its state."""
 
     def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
         self._inner, self._disturb = inner, disturb

@@ -73,7 +73,7 @@ class Director:
         )
 
     def _observe_next_step(self, index: int) -> None:
-        """Evaluate the trigger of the next step of the same sequence, if there is one, from now on."""
+        """From now on, evaluate the trigger of the next step of the same sequence, if there is one."""
         if index + 1 < len(self._steps) and self._steps[index + 1][0].after == index:
             self._situations[index + 1] = cast(Situation, RelativeSituation(self._stage))
 
@@ -163,7 +163,7 @@ class RelativeSituation:
     """Situation as seen by a step of a sequence: time, distance, and events count from the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Count from the situation `now` on. `others` has this object for each robot by name (None: create them)."""
+        """Start counting at the situation `now`. `others` are the views of all robots by name (None: create them)."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
