@@ -123,7 +123,7 @@ def install_folder(folder: Path, site: Path) -> Path:
 
 def clear_package_caches() -> None:
     """Clear the caches of installed packages."""
-    for known in (registry._installed_entries, registry._load, choice.with_installed_choices):
+    for known in (registry._all_installed_types, registry._load, choice.with_installed_choices):
         known.cache_clear()
 
 

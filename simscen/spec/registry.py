@@ -125,7 +125,7 @@ def shipped_types(group: str) -> tuple[RegisteredType, ...]:
 
 def installed_types(group: str) -> tuple[RegisteredType, ...]:
     """Return the types that installed packages add to a group, sorted by name, including unusable ones."""
-    return tuple(entry for entry in _installed_entries() if entry.group == group)
+    return tuple(entry for entry in _all_installed_types() if entry.group == group)
 
 
 def installed_specs(group: str) -> dict[str, type[BaseModel]]:
@@ -152,7 +152,7 @@ def find_type(group: str, name: str) -> RegisteredType | None:
 
 def unknown_groups() -> tuple[RegisteredType, ...]:
     """Return the entry points of installed packages in groups `simscen.…` that do not exist."""
-    return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
+    return tuple(entry for entry in _all_installed_types() if entry.group not in GROUPS)
 
 
 def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
@@ -162,7 +162,7 @@ def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
         return ()
     same_package = [
         entry
-        for entry in _installed_entries()
+        for entry in _all_installed_types()
         if not entry.problem and entry.value.partition(".")[0].partition(":")[0] == package
     ]
     return tuple(entry for entry in same_package if _has_spec(entry, spec))
@@ -177,13 +177,13 @@ def _has_spec(entry: RegisteredType, spec: type) -> bool:
 
 
 @cache
-def _installed_entries() -> tuple[RegisteredType, ...]:
+def _all_installed_types() -> tuple[RegisteredType, ...]:
     """Return all types of installed packages, sorted by group, name, and package."""
-    found = sorted(set(_read_entries()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
-    return tuple(replace(entry, problem=entry.problem or _entry_problem(entry, found)) for entry in found)
+    found = sorted(set(_read_installed_types()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
+    return tuple(replace(entry, problem=entry.problem or _type_problem(entry, found)) for entry in found)
 
 
-def _read_entries() -> Iterator[RegisteredType]:
+def _read_installed_types() -> Iterator[RegisteredType]:
     """Yield the types of all packages on the search path. Later packages of the same name are ignored."""
     from importlib.metadata import distributions
 
@@ -229,7 +229,7 @@ def search_path() -> list[str]:
     return [folder for folder in sys.path if folder not in implicit - explicit]
 
 
-def _entry_problem(entry: RegisteredType, all_entries: list[RegisteredType]) -> str:
+def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str:
     """Return the reason why a type cannot be used, found without importing its package; "" if there is none."""
     group = GROUPS.get(entry.group)
     if group is None:
@@ -240,7 +240,7 @@ def _entry_problem(entry: RegisteredType, all_entries: list[RegisteredType]) -> 
         return f"the name `{entry.name}` is reserved"
     if any(own.name == entry.name for own in shipped_types(entry.group)):
         return "simscen ships a type with the same name, which takes precedence"
-    others = [other for other in all_entries if (other.group, other.name) == (entry.group, entry.name)]
+    others = [other for other in installed if (other.group, other.name) == (entry.group, entry.name)]
     if len(others) > 1:
         return "added by " + " and by ".join(f"{other.origin} ({other.value})" for other in others)
     if not _ADDRESS_PATTERN.fullmatch(entry.value):

@@ -32,7 +32,7 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
 
 def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
     """Return the valid values of the key `type` in the mapping at `loc`."""
-    return [str(value) for kind in models_at(model, loc) for value in _literal_types(kind)]
+    return [str(value) for kind in models_at(model, loc) for value in _type_values(kind)]
 
 
 def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
@@ -41,7 +41,7 @@ def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -
     if not loc or loc[-1] not in own:
         return []
     having = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
-    return [name for kind in having for name in map(str, _literal_types(kind)) if name not in own]
+    return [name for kind in having for name in map(str, _type_values(kind)) if name not in own]
 
 
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
@@ -108,11 +108,11 @@ def _tags(option: Any) -> set[str]:
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
     unwrapped = _unwrapped(option)
     if _is_model(unwrapped):
-        tags |= {unwrapped.__name__, *(str(value) for value in _literal_types(unwrapped))}
+        tags |= {unwrapped.__name__, *(str(value) for value in _type_values(unwrapped))}
     return tags
 
 
-def _literal_types(model: type[BaseModel]) -> tuple[Any, ...]:
+def _type_values(model: type[BaseModel]) -> tuple[Any, ...]:
     """Return the valid values of the key `type` of a model; () if it has no such key."""
     field = model.model_fields.get("type")
     return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()

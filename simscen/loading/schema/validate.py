@@ -58,7 +58,7 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
 def _supported_mapping(tree: Node) -> MappingNode | Problem:
     """Return the tree; or a problem if it is not a mapping, or is written for another version of the language."""
     if isinstance(tree, MappingNode):
-        return _wrong_version(tree) or tree
+        return _version_problem(tree) or tree
     return Problem(*tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
 
@@ -76,7 +76,7 @@ def _problems(
 ) -> list[Problem]:
     """Return the problems of empty values, the problems `missing`, and the problems for pydantic's `errors`."""
     empty = [_empty_value_problem(model, tree, keys) for keys in _empty_values(tree)]
-    return _without_duplicates([*empty, *missing, *(_translate(model, tree, error) for error in errors)])
+    return _without_duplicates([*empty, *missing, *(_problem_for_error(model, tree, error) for error in errors)])
 
 
 def _is_missing_key(error: dict[str, Any]) -> bool:
@@ -85,7 +85,7 @@ def _is_missing_key(error: dict[str, Any]) -> bool:
     return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
 
 
-def _wrong_version(tree: MappingNode) -> Problem | None:
+def _version_problem(tree: MappingNode) -> Problem | None:
     """Return a problem if the file is written for another version of the language; None if not, or if unknown."""
     version = child(tree, "simscen")
     if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
@@ -96,16 +96,16 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
     return Problem(*version.position, "SC009", message)
 
 
-def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
+def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
     """Return the problem for a validation error of pydantic."""
     loc: Keys = error["loc"]
     kind: str = error["type"]
     if kind == "extra_forbidden":
-        return _unknown_key(model, tree, loc)
+        return _unknown_key_problem(model, tree, loc)
     if kind == "missing":
-        return _missing_key(tree, loc)
+        return _missing_key_problem(tree, loc)
     if kind.startswith("union_tag"):
-        return _wrong_type(model, tree, loc, error)
+        return _type_key_problem(model, tree, loc, error)
     if loc and loc[-1] == "[key]":
         name = ScalarNode(tree.position, str(loc[-2]))
         return Problem(
@@ -123,7 +123,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     return Problem(*value_position(tree, loc), *message)
 
 
-def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
     """Return the problem of the unknown key at the end of `loc`."""
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
@@ -147,7 +147,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
     return Problem(*key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 
-def _missing_key(tree: Node, loc: Keys) -> Problem:
+def _missing_key_problem(tree: Node, loc: Keys) -> Problem:
     """Return the problem of the missing key, or the missing item of a list, at the end of `loc`."""
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
@@ -156,7 +156,7 @@ def _missing_key(tree: Node, loc: Keys) -> Problem:
     return Problem(*key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
-def _wrong_type(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, Any]) -> Problem:
+def _type_key_problem(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, Any]) -> Problem:
     """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):

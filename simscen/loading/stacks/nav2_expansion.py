@@ -88,7 +88,7 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     library.add({display_name: parameters.text}, {display_name: file})
     profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
-    translations = [_with_valid_frequency(one, clock) for one in translate(parameters.nodes, _known_parameters())]
+    translations = [_with_valid_frequency(each, clock) for each in translate(parameters.nodes, _known_parameters())]
     merged = profile
     for translation in translations:
         if translation.keys:
@@ -108,23 +108,27 @@ def _clock(scenario: MappingNode) -> Clock:
         return Clock()  # validation reports the error
 
 
-def _with_valid_frequency(one: Translation, clock: Clock) -> Translation:
+def _with_valid_frequency(translation: Translation, clock: Clock) -> Translation:
     """Return the translation. A controller frequency is replaced by the nearest one with a period of whole ticks."""
-    if one.keys != ("controller_frequency",) or not isinstance(one.value, int | float) or one.value <= 0:
-        return one
+    if (
+        translation.keys != ("controller_frequency",)
+        or not isinstance(translation.value, int | float)
+        or translation.value <= 0
+    ):
+        return translation
     try:
-        clock.period(one.value)
+        clock.period(translation.value)
     except ValueError as error:
         hint = "the nearest is used; write `stack: {controller_frequency: …}` in the scenario for another one"
-        return replace(one, value=clock.nearest_rate(one.value), note=str(error), hint=hint)
-    return one
+        return replace(translation, value=clock.nearest_rate(translation.value), note=str(error), hint=hint)
+    return translation
 
 
-def _translated_tree(one: Translation, parameters: Nav2Parameters) -> MappingNode:
+def _translated_tree(translation: Translation, parameters: Nav2Parameters) -> MappingNode:
     """Return the YAML tree of a section `stack` with one parameter. All nodes have the position of the parameter."""
-    position = parameters.positions[one.node, one.parameter]
-    node: Node = _parameter_node(one.value, position)
-    for key in reversed(one.keys):
+    position = parameters.positions[translation.node, translation.parameter]
+    node: Node = _parameter_node(translation.value, position)
+    for key in reversed(translation.keys):
         node = MappingNode(position, {key: Entry(position, node)})
     assert isinstance(node, MappingNode)
     return node

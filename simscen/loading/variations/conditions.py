@@ -90,7 +90,7 @@ def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
             paths[path] = None
             parts = []
         case ast.Name() | ast.Attribute() | ast.Subscript():
-            paths[_path(node, text)] = None
+            paths[_path_text(node, text)] = None
             parts = []
         case _:
             raise ConditionError(f"`{ast.unparse(node)}` cannot be used in a condition")
@@ -98,7 +98,7 @@ def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
         _collect_paths(part, text, paths)
 
 
-def _path(node: ast.expr, text: str) -> str:
+def _path_text(node: ast.expr, text: str) -> str:
     """Return the text of a path such as `goals[0].pose.x`. Raises ConditionError if the expression is not a path.
 
     `text` is the whole condition, for the message.
@@ -107,11 +107,11 @@ def _path(node: ast.expr, text: str) -> str:
         case ast.Name(id=name):
             return name
         case ast.Attribute(value=owner, attr=name):
-            return f"{_path(owner, text)}.{name}"
+            return f"{_path_text(owner, text)}.{name}"
         case ast.Subscript(value=owner, slice=ast.Constant(value=int(index))) if index >= 0:
-            return f"{_path(owner, text)}[{index}]"
+            return f"{_path_text(owner, text)}[{index}]"
         case ast.Subscript(value=owner, slice=ast.Constant(value=str(name))):
-            return f'{_path(owner, text)}["{name}"]'
+            return f'{_path_text(owner, text)}["{name}"]'
     raise ConditionError(f"`{ast.unparse(node)}` in `{text}` is not a path")
 
 
@@ -140,7 +140,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
             return si_number(values[path])
         case ast.Call(func=ast.Name(id=name), args=parts):
             return _FUNCTIONS[name](*[_evaluate(part, values) for part in parts])
-    return si_number(values[_path(node, "")])
+    return si_number(values[_path_text(node, "")])
 
 
 def _evaluate_boolean(node: ast.expr, values: Mapping[str, Any]) -> bool:

@@ -149,7 +149,7 @@ class VariationSpace:
         all_targets = list(self.targets.values())
         named_targets = [target for target in all_targets if target.keys[0] not in _DESCRIPTIVE_KEYS] or all_targets
         keys = short_names([target for target in named_targets if target.path in differ] or named_targets)
-        names = [_name(options, keys, number) for number, options in zip(numbers, chosen, strict=True)]
+        names = [_variation_name(options, keys, number) for number, options in zip(numbers, chosen, strict=True)]
         is_named = [len(options) == 1 and bool(options[0].name) for options in chosen]
         return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
 
@@ -185,14 +185,14 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
     position = tree.entries[VARIATIONS].value.position
     try:
         if numbers is not None:
-            return [one for number in numbers if (one := _numbered(space, number)) is not None]
+            return [one for number in numbers if (one := _variation_or_none(space, number)) is not None]
         if problem := _too_many_problem(space, position):
             return [problem]
         found = space.named_variations()
     except ConditionError as error:
-        return [Problem(*_require_position(tree), "SC016", str(error), "")]
+        return [Problem(*_position_of_require(tree), "SC016", str(error), "")]
     if not found and space.count:
-        return [Problem(*_require_position(tree), "SC016", "no variation meets the conditions", "")]
+        return [Problem(*_position_of_require(tree), "SC016", "no variation meets the conditions", "")]
     return found or [Variation("", space.tree)]
 
 
@@ -223,7 +223,7 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
     return builder.problems or VariationSpace(own, found, builder.targets, is_random)
 
 
-def _numbered(space: VariationSpace, number: int) -> Variation | None:
+def _variation_or_none(space: VariationSpace, number: int) -> Variation | None:
     """Return the variation with this number; None if it is unknown or does not meet the conditions."""
     try:
         return space.variation(number)
@@ -241,7 +241,7 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
             *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
         )
     sizes = (sum(max(map(_option_size, typical_options(axis))) for axis in block.axes) for block in space.blocks)
-    values = _size(space.tree) + max(sizes, default=0)
+    values = _node_size(space.tree) + max(sizes, default=0)
     if space.count * values > MAX_TOTAL_VALUES:
         message = (
             f"{space.count} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
@@ -250,7 +250,7 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
     return None
 
 
-def _require_position(tree: MappingNode) -> Position:
+def _position_of_require(tree: MappingNode) -> Position:
     """Return the position of the first `require` in `variations`; of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
     for block in value.items if isinstance(value, SequenceNode) else [value]:
@@ -259,7 +259,7 @@ def _require_position(tree: MappingNode) -> Position:
     return value.position
 
 
-def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
+def _variation_name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
     """Return the name of a variation with these options. `keys` are the short names of the paths in the name."""
     parts = []
     for option in options:
@@ -273,10 +273,10 @@ def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
 
 def _option_size(option: Option) -> int:
     """Return the number of keys and values in the changes of an option."""
-    return sum(_size(change.value) for change in option.changes)
+    return sum(_node_size(change.value) for change in option.changes)
 
 
-def _size(node: Node) -> int:
+def _node_size(node: Node) -> int:
     """Return the number of keys and values of a node, including itself."""
     return sum(1 for _ in _positions(node))
 

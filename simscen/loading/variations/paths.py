@@ -127,7 +127,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
             count = f"{len(items.items)} item{'' if len(items.items) == 1 else 's'}"
             raise PathError(f"{quoted(path)} leads to nothing: `{holder}` has {count}", "the first item is [0]")
         return [int(part)]
-    matches = [index for index, item in enumerate(items.items) if part in _names(item)]
+    matches = [index for index, item in enumerate(items.items) if part in _item_names(item)]
     if len(matches) > 1 and rest:
         matches = [index for index in matches if child(items.items[index], rest[0]) is not None] or matches
     kinds = [
@@ -142,7 +142,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
             f"{quoted(path)} is ambiguous: {len(found)} items of `{holder}` are called {quoted(part)}", hint
         )
     if not found:
-        known = [name for item in items.items for name in _names(item)]
+        known = [name for item in items.items for name in _item_names(item)]
         if keys[0] in KEYS_BY_KIND:
             known += [
                 key for item in items.items if isinstance(item, MappingNode) for key in item.entries if key != "id"
@@ -154,7 +154,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
     return [found[0]]
 
 
-def _names(item: Node) -> list[str]:
+def _item_names(item: Node) -> list[str]:
     """Return the names of an item of a list. A text is its own name."""
     if isinstance(item, ScalarNode):
         return [item.value] if isinstance(item.value, str) else []

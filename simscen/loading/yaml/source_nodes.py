@@ -113,4 +113,5 @@ class _Composer:
 
 
 def _index(mark: Any) -> int:
+    """Return the index in the text of a mark of PyYAML."""
     return int(mark.index)
