@@ -38,7 +38,6 @@ class Clock:
 
 
 NS_PER_SECOND = 1_000_000_000
-"""Nanoseconds per second."""
 
 Stamp = tuple[int, int]
 """Time as in builtin_interfaces/Time: seconds since the start of the run, and nanoseconds of the current second."""

@@ -66,7 +66,6 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
 
 
 def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
-    """Return the types sorted by group and name."""
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 

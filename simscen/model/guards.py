@@ -1,4 +1,4 @@
-"""Specifications of safety components: velocity smoother, collision monitor, and motion prediction."""
+"""Specifications of the velocity smoother, the collision monitor, and motion prediction."""
 
 from typing import Annotated
 

@@ -149,9 +149,8 @@ class Component(Spec):
     component: ClassVar[str]
     """Address `package.module:Class` of the class of the object, or of a function that returns the object.
 
-    The class or function is called with two arguments: the specification, and a setting with facts about the run. The
-    setting is a simscen.stack.setting.Setting for a stack and its parts, and a simscen.sensors.sensor.SensorSetting for
-    a sensor.
+    It is called with the specification and a setting (facts about the run): simscen.stack.setting.Setting for a stack
+    and its parts, simscen.sensors.sensor.SensorSetting for a sensor.
     """
 
     @classmethod

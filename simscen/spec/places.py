@@ -162,7 +162,6 @@ class PlaceShorthand:
         return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _union_tag)
 
     def _as_mapping(self, place: str) -> dict[str, str]:
-        """Return the mapping `{key: place}`."""
         return {self.key: place}
 
 

@@ -174,5 +174,4 @@ def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _with_article(noun: str) -> str:
-    """Return the noun with "a" or "an"."""
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"

@@ -141,5 +141,4 @@ def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
 
 
 def _has_errors(problems: Iterable[Problem]) -> bool:
-    """Return whether a problem is an error."""
     return any(problem.severity == "error" for problem in problems)

@@ -56,7 +56,6 @@ def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
 
 
 def _scalars(tree: Node) -> Iterator[ScalarNode]:
-    """Yield all scalars in a YAML tree."""
     return (node for _, node in nodes_with_keys(tree) if isinstance(node, ScalarNode))
 
 

@@ -136,5 +136,4 @@ def _unwrapped(kind: Any) -> Any:
 
 
 def _is_model(kind: Any) -> bool:
-    """Return whether a type is a pydantic model."""
     return isinstance(kind, type) and issubclass(kind, BaseModel)

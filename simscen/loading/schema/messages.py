@@ -159,7 +159,6 @@ def short_value(node: Node) -> str:
 
 
 def _number(value: Any) -> str:
-    """Return a bound as text."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

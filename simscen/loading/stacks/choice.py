@@ -20,7 +20,7 @@ SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
 COMMON_STACK_KEYS = ("controller_frequency",)
 """Keys under `stack` that are valid for all types of stacks."""
 GOAL_CHECKER = "goal_checker"
-"""Key under `stack` of the goal checker, which contains the goal tolerances."""
+"""Key under `stack` with the goal tolerances."""
 TOLERANCES = ("xy_goal_tolerance", "yaw_goal_tolerance")
 """Keys of the goal tolerances under `goal_checker`."""
 EXTERNAL = "external"

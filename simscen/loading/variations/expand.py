@@ -169,7 +169,6 @@ class VariationSpace:
         raise IndexError(number)
 
     def _build(self, name: str, options: Sequence[Option]) -> Variation:
-        """Return the variation with these options."""
         return Variation.with_changes(name, self.tree, [change for option in options for change in option.changes])
 
 

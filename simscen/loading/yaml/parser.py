@@ -46,7 +46,7 @@ def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple
 
 @dataclass(frozen=True)
 class _Anchor:
-    """Node with an anchor. Its values and levels count again at each alias, so that aliases cannot evade the limits."""
+    """Node with an anchor. Its values and levels count again at each alias."""
 
     node: Node
     value_count: int

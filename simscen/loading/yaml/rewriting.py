@@ -96,7 +96,6 @@ def _joined_lines(lines: Sequence[str]) -> str:
 
 
 def _indented(text: str, columns: int) -> str:
-    """Return the text with all lines indented by this number of columns."""
     return "".join(f"{' ' * columns}{line}\n" for line in text.splitlines())
 
 

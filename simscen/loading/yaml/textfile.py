@@ -82,7 +82,6 @@ def _decode(raw: bytes, display_name: str) -> str | Problem:
 
 
 def _normalize_line_breaks(text: str) -> str:
-    """Return the text with line breaks as \\n."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
