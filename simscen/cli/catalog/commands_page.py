@@ -27,6 +27,39 @@ EXIT_CODES = {
     Exit.TERMINATED: "Interrupted by SIGTERM.",
 }
 """Meaning of each exit code."""
+_EXAMPLES = {
+    "run": 'simscen run scenarios/ -k "faults and not slip" --junit junit.xml',
+    "study": "simscen study crossing.study.yaml --runs 200",
+    "validate": "simscen validate scenarios/ --picture pictures",
+    "list": "simscen list scenarios/ --tag smoke",
+    "judge": "simscen judge logs/monday.mcap --scenario limits.yaml --truth /mocap",
+    "report": "simscen report simscen-out/latest --parquet tables",
+    "merge": "simscen merge out/shard-1 out/shard-2 --out out/all",
+    "falsify": "simscen falsify crossing.study.yaml --failures 3",
+    "shrink": "simscen shrink simscen-out/latest/runs/crossing/seed-7",
+    "compare": "simscen compare out/main out/branch --fail-on flip",
+    "plot": "simscen plot run.mcap --out run.png",
+    "replay": "simscen replay run.mcap --against other/run.mcap --open",
+    "localize": "simscen localize drive.log --map building.yaml --robot turtlebot",
+    "log recover": "simscen log recover run.partial.mcap",
+    "log layout": "simscen log layout run.mcap --out layout.json",
+    "new": "simscen new --from-log incident.mcap --map office.yaml --verify",
+    "edit": "simscen edit --new --map office.yaml",
+    "explain": "simscen explain stopped_within",
+    "schema": "simscen schema --write schemas",
+    "completion": "simscen completion zsh",
+    "world inspect": "simscen world inspect shop.world --png shop.png",
+    "world export": "simscen world export hall.world.yaml --map hall.yaml",
+    "world convert": "simscen world convert shop.world shop.world.yaml --world-path models",
+    "robot check": "simscen robot check husky.robot.yaml --picture husky.png",
+    "ros2": "simscen ros2 nav2 --params nav2_params.yaml",
+    "bench": "simscen bench --compare before.json",
+    "bench suite": "simscen bench suite scenarios/ --most 100",
+    "bench compare": "simscen bench compare before.json after.json",
+    "bench nav": 'simscen bench nav --only "narrow fields" --fields 16',
+    "bench localization": "simscen bench localization --only amcl --buildings 3",
+}
+"""Example of a command line by the name of the command, such as "world export"."""
 _TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}
 _MARKUP = re.compile(r"[*<]")
 """Characters that Markdown would interpret."""
@@ -76,7 +109,9 @@ def command_section(command: str, function: Callable[..., Any]) -> str:
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
     table = "\n".join([*head, *rows]) if rows else "No arguments or options."
-    return f"## `simscen {command}`\n\n{_escape_markdown(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
+    summary, *rest = _escape_markdown(inspect.cleandoc(function.__doc__ or "")).split("\n\n")
+    example = [f"```console\n$ {_EXAMPLES[command]}\n```"] if command in _EXAMPLES else []
+    return "\n\n".join([f"## `simscen {command}`", summary, *example, *rest, f"{table}\n"])
 
 
 def exit_code_section() -> str:
