@@ -18,7 +18,7 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.frames import FrameNames
 from simscen.ros2.nav2.parameter_rules import PublishedNames
-from simscen.ros2.options import AdapterError
+from simscen.ros2.options import AdapterError, TopicNames
 
 SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
 """Environment variable with the file descriptor of the socket to the simulation; set only during a run."""
@@ -125,11 +125,13 @@ def command(
     """
     try:
         base_frames = FrameNames(frame or [], base_frame).base_frames
+        topics = TopicNames(namespace, remap or [])
     except AdapterError as error:
         raise UsageError(str(error)) from error
     parameters = _read_parameters(params) if params is not None else None
     if SOCKET_VARIABLE not in os.environ:
-        _check_parameters(what, parameters, base_frames)
+        names = PublishedNames([topics("/scan")], topics("/odom"), base_frames, topics.namespace)
+        _check_parameters(what, parameters, names)
         return
     options = {
         **{"launch": launch, "domain": domain, "namespace": namespace, "remap": remap or [], "without": without or []},
@@ -157,20 +159,18 @@ def _read_parameters(params: Path) -> Nav2Parameters:
     return parameters
 
 
-def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, base_frames: list[str]) -> None:
-    """Check Nav2 parameters. Raises UsageError without parameters, and InvalidInput if Nav2 cannot work with them.
-
-    `base_frames` are the names of the base frame.
-    """
+def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, names: PublishedNames) -> None:
+    """Check Nav2 parameters. Raises UsageError without parameters, and InvalidInput if Nav2 cannot work with them."""
     if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
-    problems = parameters.problems(PublishedNames(["/scan"], "/odom", base_frames))
+    problems = parameters.problems(names)
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(problems)
     if problems:
         print_text(as_text(problems), sys.stderr)
-    print_text(f"{parameters.display_name}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(base_frames)}")
+    available = f"{', '.join(names.scans)}, {names.odometry}, and {' or '.join(names.base_frames)}"
+    print_text(f"{parameters.display_name}: Nav2 can work with simscen's {available}")
 
 
 def _find_python() -> str:

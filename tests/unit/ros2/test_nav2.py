@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.core.errors import UsageError
+from simscen.core.errors import InvalidInput, UsageError
 from simscen.ros2.nav2.parameter_rules import ParameterProblem, PublishedNames, check, relevant_parameters
 
 PUBLISHED = PublishedNames(["/scan", "/rear/scan"], "/odom", ["base_link"])
@@ -102,10 +102,7 @@ def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
     file.write_text(text)
     try:
         done = CliRunner().invoke(app, ["ros2", "nav2", "--params", str(file), *options], catch_exceptions=False)
-    except Exception as error:
-        from simscen.core.errors import InvalidInput
-
-        assert isinstance(error, InvalidInput)
+    except InvalidInput as error:
         return 2, "\n".join(f"{p.line}:{p.col} {p.code} {p.message}" for p in error.problems)
     return done.exit_code, done.output
 
@@ -161,6 +158,15 @@ def test_another_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
     assert called(tmp_path, FITS, "--frame", "base_link:=chassis")[0] == 2
 
 
+def test_check_of_a_file_uses_the_given_topic_names(tmp_path: Path) -> None:
+    text = FITS.replace("/scan", "/front/scan")
+    assert called(tmp_path, text)[0] == 2
+    assert called(tmp_path, text, "--remap", "/scan:=/front/scan")[0] == 0
+    assert called(tmp_path, FITS.replace("/scan", "scan"), "--namespace", "robot1")[0] == 0
+    with pytest.raises(UsageError, match="not of the form /from:=/to"):
+        called(tmp_path, FITS, "--remap", "scan")
+
+
 @pytest.mark.parametrize(
     ("rename", "message"),
     [
@@ -182,8 +188,6 @@ def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_call_outside_a_run_is_a_usage_error() -> None:
-    from simscen.core.errors import UsageError
-
     with pytest.raises(UsageError, match="no run to connect to"):
         CliRunner().invoke(app, ["ros2", "--launch", "node"], catch_exceptions=False)
 
