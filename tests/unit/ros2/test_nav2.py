@@ -159,7 +159,7 @@ def test_another_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
 
 
 def test_check_of_a_file_uses_the_given_topic_names(tmp_path: Path) -> None:
-    text = FITS.replace("/scan", "/front/scan")
+    text = FITS.replace("topic: /scan", "topic: scan").replace("topic: scan", "topic: /front/scan")
     assert called(tmp_path, text)[0] == 2
     assert called(tmp_path, text, "--remap", "/scan:=/front/scan")[0] == 0
     assert called(tmp_path, FITS.replace("/scan", "scan"), "--namespace", "robot1")[0] == 0
