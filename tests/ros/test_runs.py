@@ -86,7 +86,8 @@ def test_the_scenario_selects_the_action(with_interfaces, run, tmp_path: Path, m
     ]
 
 
-@pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("repeats", [2, 20])
 def test_concurrent_lockstep_runs_have_equal_logs(ros, run, repeats: int) -> None:
     """Two parallel runs must not receive each other's messages."""
     with ThreadPoolExecutor(2) as pool:
@@ -109,6 +110,7 @@ def test_paced_runs_are_marked(ros, run) -> None:
     assert (told["sync"], told["factor"]) == ("paced", 4.0)
 
 
+@pytest.mark.slow
 def test_killing_a_node_is_an_error_of_its_run_only(ros, run, alive, tmp_path: Path) -> None:
     (tmp_path / "other.scenario.yaml").write_text((tmp_path / "short.scenario.yaml").read_text())
     tag = f"run{os.getpid()}"
