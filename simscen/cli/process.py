@@ -44,7 +44,7 @@ def require_working_directory() -> None:
 
 
 def report_lost_output(error: OSError) -> Exit:
-    """Report on stderr that stdout cannot be written, discard all further output, and return INCOMPLETE."""
+    """Discard further output on stdout, report the loss on stderr, and return INCOMPLETE."""
     discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
@@ -56,7 +56,8 @@ def report_lost_output(error: OSError) -> Exit:
 def flush_output(code: Exit | int) -> Exit | int:
     """Flush stdout and stderr, and return the final exit code of the process.
 
-    If output was lost, the exit code is at least INCOMPLETE. A closed pipe changes only a `code` of 0.
+    If output was lost, the exit code is at least INCOMPLETE. If the reader has closed the pipe, a `code` of 0 becomes
+    INCOMPLETE, and other codes stay.
     """
     try:
         sys.stdout.flush()

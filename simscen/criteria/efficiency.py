@@ -95,7 +95,10 @@ class TimeToGoal(Spec, Criterion):
         return missed(what, "never reached", expected, (trace, tick), [detail])
 
     def _judge_without_start(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
-        """Return the finding for a goal without a recorded acceptance: failed if the run has no report on the goal."""
+        """Return the finding for a goal without a recorded acceptance.
+
+        It is failed if the log is complete and has no result of the goal, otherwise inconclusive.
+        """
         expected = f"to be there within {self.max:.2f} s"
         if outcome.end is None and has_ended(trace):
             return missed(
@@ -107,16 +110,18 @@ class TimeToGoal(Spec, Criterion):
 class PathLength(Spec, Criterion):
     """The robot drove no farther than allowed.
 
-    What is measured: the length of the robot's true path in the plane, in moves of at least 1 cm, over the whole run;
-        and the ratio of this length to the length of the shortest path. The shortest path is for a disc with the
-        robot's inscribed radius, from the start through all goals. Goals that are expected to fail are left out.
+    What is measured: the length of the robot's true path in the plane over the whole run, and the ratio of this length
+        to the length of the shortest path. The path has a point whenever the robot is 1 cm from the last point, so that
+        jitter does not count. Teleportation does not count. The shortest path is for a disc with the robot's inscribed
+        radius, from the start through all goals. Goals that are expected to fail are left out.
     When it fails: the path is longer than `max`, or longer than `max_ratio` times the shortest path.
     Why this: detours and search patterns cost energy and time although every goal is reached.
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" for the ratio. SPL (Anderson 2018) is the
         inverse of the ratio, averaged over many runs.
 
-    The ratio is inconclusive if an event sends a goal, because the shortest path is then unknown. It is also
-    inconclusive if a goal was not reached, unless the path is already too long.
+    The ratio is inconclusive if the shortest path is unknown or has no length: an event sends a goal, several goals
+    have one name, or no path is known. It is also inconclusive if a goal was not reached, unless the path is already
+    too long.
 
     Example: `path_length: {max_ratio: 1.4}`
     """

@@ -58,8 +58,8 @@ class Speed(Spec, Criterion):
     tolerance: NonNegativeSpeed = 0.05
     """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
-    """Time that the robot has for slowing down after it enters a lower limit or a zone is enabled. It may also
-    accelerate this long before it leaves a limit."""
+    """Time for slowing down after the robot enters cells of the mask with a lower limit, or after a zone is enabled. It
+    may also accelerate this long before it leaves such cells. There is no such time in the region `in`."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> Speed:

@@ -24,11 +24,11 @@ REFERENCE_REFLECTIVITY = 0.9
 
 
 class Glass(Spec, Fault):
-    """Beams pass through the named objects and measure the surfaces behind: glass doors and walls.
+    """Beams pass through the named objects, such as glass doors, and measure the surfaces behind them.
 
-    A laser beam passes through a pane unless it is nearly perpendicular (Foster, Sun, Park and Kuipers, VisAGGE:
-    Visible angle grid for glass environments, 2013). The robot still collides with the objects, and its map still shows
-    them.
+    A real beam is reflected if it is nearly perpendicular to the pane (Foster, Sun, Park and Kuipers, VisAGGE: Visible
+    angle grid for glass environments, 2013); this fault ignores the angle. The robot still collides with the objects,
+    and its map still shows them.
 
     Example: `{sensor: lidar, glass: {of: [east wall]}}`
     """

@@ -76,7 +76,7 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
-    """Return the mapping of a robot under `robots`, with the `stack` of the scenario of this robot alone."""
+    """Return a robot's mapping under `robots`, with the `stack` of its single-robot scenario."""
     assert isinstance(robot, MappingNode)
     return MappingNode(
         robot.position, robot.entries | {key: entry for key, entry in robot_scenario.entries.items() if key == STACK}
@@ -96,12 +96,12 @@ def _items(node: Node | None) -> tuple[Node, ...]:
 
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a scenario with missing or mutually exclusive keys `robot`, `robots`, and `pass`."""
+    """Return problems of a scenario: missing `robot` or criteria, and keys that exclude `robots`."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a criteria file with missing or mutually exclusive keys `robots` and `pass`."""
+    """Return problems of a criteria file: missing criteria, and keys that exclude `robots`."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
 
 

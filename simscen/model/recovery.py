@@ -103,7 +103,8 @@ class Retrace(BehaviorSpec):
 
 
 class ClearCostmap(BehaviorSpec):
-    """Remove all obstacles from the costmaps, except obstacles in current sensor readings."""
+    """Remove the obstacles that sensors have seen from the costmaps, except those in current readings. The map
+    remains."""
 
     component: ClassVar[str] = "simscen.stack.behaviors:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"

@@ -23,7 +23,8 @@ LOST_RANGE_RATIO = 1.5
 CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
 """Maximum speed of curious pedestrians, and distance to the robot at which they stop."""
 SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
-"""Maximum speed of scared pedestrians, and their repulsive force times their gap to the robot (HuNavSim: 20 x 0.2)."""
+"""Maximum speed of scared pedestrians, and factor k of the force k / d that drives them away from the robot. d is the
+distance from their body to the center of the robot (HuNavSim: 20 x 0.2)."""
 THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
 """Maximum speed of threatening pedestrians, distance in front of the robot at which they stand, and distance within
 which they look at the robot."""

@@ -32,7 +32,7 @@ def open_log(path: Path) -> IO[bytes]:
 
 
 def attached_result(path: Path) -> dict[str, Any] | None:
-    """Return the result.json that is attached to a log, or None if the log or the attachment does not exist."""
+    """Return the result.json that is attached to a log; None if it is missing or cannot be read."""
     try:
         with open_log(path) as stream:
             attachments = make_reader(stream).iter_attachments()

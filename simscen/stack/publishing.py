@@ -117,7 +117,7 @@ REPORT_AFTER_S = 1.0
 
 
 class StandstillReporter:
-    """Reports by events that a component holds the robot (keeps it from driving): after REPORT_AFTER_S, and the end."""
+    """Reports by an event that a component has kept the robot from driving for REPORT_AFTER_S, and when this ends."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""

@@ -21,10 +21,10 @@ CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
 DRIFT_VARIANCE_PER_M = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
-"""Factor on the weights of all learned values at each correction."""
+"""Factor on the weight of a learned value each time it is updated."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
-"""Ratio of true standard deviations (longitudinal, lateral, yaw) to standard deviations of the particles that is
-assumed at first, for residuals as large as `sigma_hit`. PRIOR_WEIGHT is its weight as a number of corrections."""
+"""Initial ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, if the RMS of
+the residuals is `sigma_hit`. PRIOR_WEIGHT is its weight as a number of corrections."""
 EXPECTED_WEIGHT = 0.05
 """Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections."""
 DEGREES_OF_FREEDOM = 6.0
@@ -48,9 +48,9 @@ class CovarianceEstimator:
     - The residuals of the beams that the map explains. The ratio of pose errors to residuals is learned from the
       scatter.
 
-    The mean of both ratios is divided by the share of the beams that the map explains. Because this ratio is only
-    estimated, the errors have a Student's t-distribution with DEGREES_OF_FREEDOM. Between corrections, the covariance
-    grows by the errors of odometry that scan matching has observed.
+    The mean of both ratios is divided by the share of the beams that the map explains. The result is only an estimate,
+    so it is multiplied by the standard deviation of Student's t-distribution with DEGREES_OF_FREEDOM. Between
+    corrections, the covariance grows by the errors of odometry that scan matching has observed.
     """
 
     def __init__(self) -> None:
@@ -144,7 +144,8 @@ class CovarianceEstimator:
         self._weights = np.append(self._weights[recent], weight)
 
     def _mean_residuals(self) -> tuple[float, float]:
-        """Return the share of explained beams in recent scans, and the RMS of their residuals in `sigma_hit`."""
+        """Return the share of explained beams in recent scans, and the RMS of their residuals divided by
+        `sigma_hit`."""
         if not self._residuals:
             return 1.0, 1.0
         explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))

@@ -76,7 +76,7 @@ class ScanMemory:
             self._scans.popleft()
 
     def view_from(self, base: Pose2) -> View:
-        """Return all stored scans (at least one) in the base frame of a robot at `base`."""
+        """Return all stored scans in the base frame of a robot at `base`. The memory must not be empty."""
         points = np.concatenate([stored.points for stored in self._scans], axis=1)
         points -= complex(base.x, base.y)
         points *= cmath.rect(1.0, -base.yaw)

@@ -153,7 +153,8 @@ class FollowedPath:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Return the first point (x, y) after the nearest one that is `reach` m away from a pose, or the last point."""
+        """Return the first path point (x, y) from the nearest one on that is `reach` m away from a pose; else the
+        last."""
         nearest = self.nearest(pose)
         beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= reach
         number = nearest + int(beyond.argmax()) if beyond.any() else -1
@@ -190,8 +191,8 @@ class FollowedPath:
     ) -> tuple[Callable[[float], complex], float, float]:
         """Return a function from the time in s to the position (x + iy) at the commanded speed.
 
-        Also return the maximum speed in m/s, and the maximum distance in m from the positions in `rollouts`, which are
-        integrated in time steps.
+        Also return the maximum speed in m/s, and an upper bound in m of the deviation from the positions of `rollouts`,
+        which are integrated in time steps.
         """
         nearest, now, then = self.nearest(pose), twist.vx, command.vx
         rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration

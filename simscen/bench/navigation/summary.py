@@ -20,7 +20,7 @@ TIME_LIMIT_REACHED = "time limit"
 """Value of `RunResult.ended` of a run that reached its time limit."""
 
 
-class DriveOutcome(str, Enum):
+class TrialOutcome(str, Enum):
     """Outcome of a trial. FAILED is any failure other than a collision or timeout. ERROR is an aborted run."""
 
     SUCCESS = "success"
@@ -44,15 +44,15 @@ class Trial:
     top_speed: float | None = None
 
     @property
-    def drive_outcome(self) -> DriveOutcome:
+    def outcome(self) -> TrialOutcome:
         """Outcome of the run. A run with a collision and a timeout counts as COLLISION."""
         if self.run.outcome is Outcome.ERROR:
-            return DriveOutcome.ERROR
+            return TrialOutcome.ERROR
         if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
-            return DriveOutcome.COLLISION
+            return TrialOutcome.COLLISION
         if self.run.outcome is Outcome.PASSED:
-            return DriveOutcome.SUCCESS
-        return DriveOutcome.TIMEOUT if self.run.result.ended == TIME_LIMIT_REACHED else DriveOutcome.FAILED
+            return TrialOutcome.SUCCESS
+        return TrialOutcome.TIMEOUT if self.run.result.ended == TIME_LIMIT_REACHED else TrialOutcome.FAILED
 
     @property
     def score(self) -> float | None:
@@ -61,7 +61,7 @@ class Trial:
             return None
         seconds = self.metric("time_to_goal")
         return barn_score(
-            self.drive_outcome is DriveOutcome.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length
+            self.outcome is TrialOutcome.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length
         )
 
     @property
@@ -70,7 +70,7 @@ class Trial:
 
         SCT is the time for the shortest path at top speed divided by the time to the goal; 0 without success.
         """
-        if self.drive_outcome is not DriveOutcome.SUCCESS:
+        if self.outcome is not TrialOutcome.SUCCESS:
             return 0.0
         seconds, length = self.metric("time_to_goal"), self.metric("shortest_length")
         if seconds is None or length is None or self.top_speed is None:
@@ -89,7 +89,7 @@ class ExperimentSummary:
 
     case:             name of the experiment
     runs:             number of runs
-    success, collisions, timeouts, failed, errors: fraction of the runs with each DriveOutcome
+    success, collisions, timeouts, failed, errors: fraction of the runs with each TrialOutcome
     success_interval: interval of `success`; None with fewer than five worlds
     seconds:          mean time to the goal in s, over successful runs
     score:            mean BARN score
@@ -113,19 +113,19 @@ class ExperimentSummary:
 
 def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
     """Return the summary of the trials of an experiment."""
-    outcomes = [trial.drive_outcome for trial in trials]
+    outcomes = [trial.outcome for trial in trials]
     sct_values = [trial.sct for trial in trials]
-    successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
+    successful = [trial for trial in trials if trial.outcome is TrialOutcome.SUCCESS]
     arrived = [trial for trial in successful if trial.metric("time_to_goal") is not None]
     return ExperimentSummary(
         case=experiment,
         runs=len(trials),
-        success=_rate(outcomes, DriveOutcome.SUCCESS),
+        success=_rate(outcomes, TrialOutcome.SUCCESS),
         success_interval=success_interval(trials),
-        collisions=_rate(outcomes, DriveOutcome.COLLISION),
-        timeouts=_rate(outcomes, DriveOutcome.TIMEOUT),
-        failed=_rate(outcomes, DriveOutcome.FAILED),
-        errors=_rate(outcomes, DriveOutcome.ERROR),
+        collisions=_rate(outcomes, TrialOutcome.COLLISION),
+        timeouts=_rate(outcomes, TrialOutcome.TIMEOUT),
+        failed=_rate(outcomes, TrialOutcome.FAILED),
+        errors=_rate(outcomes, TrialOutcome.ERROR),
         seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
         path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
@@ -136,11 +136,11 @@ def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
 def success_interval(trials: Sequence[Trial]) -> Interval | None:
     """Return the interval of the success rate; None with fewer than five worlds."""
     return ClusteredMean.from_pairs(
-        (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
+        (trial.world, float(trial.outcome is TrialOutcome.SUCCESS)) for trial in trials
     ).rate_interval()
 
 
-def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
+def _rate(outcomes: Sequence[TrialOutcome], outcome: TrialOutcome) -> float:
     """Return the fraction of `outcomes` that are `outcome`."""
     return outcomes.count(outcome) / len(outcomes) if outcomes else 0.0
 
@@ -211,12 +211,12 @@ class ClusteredMean:
 
 
 TrialPair = tuple[Trial, Trial]
-"""Trials of the reference stack and of the compared stack, in the same drive and with the same seed."""
+"""Trials of the baseline stack and of the compared stack, in the same drive and with the same seed."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean over trial pairs of the compared stack's value minus the reference stack's value.
+    """Mean over trial pairs of the compared stack's value minus the baseline stack's value.
 
     `interval` is the confidence interval of this mean; None with fewer than five worlds.
     """
@@ -226,13 +226,13 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class DriveComparison:
+class ExperimentComparison:
     """Comparison of two stacks in one experiment. The names of the fields are keys of the JSON output.
 
     case:    name of the experiment
     pairs:   number of trial pairs without an aborted run
     better:  number of pairs in which only the compared stack succeeded
-    worse:   number of pairs in which only the reference stack succeeded
+    worse:   number of pairs in which only the baseline stack succeeded
     success: difference of the success rates
     seconds: difference of the times to the goal, over pairs in which both succeeded; None without such pairs
     sct:     difference of the SCT; None if no pair has two values
@@ -249,15 +249,15 @@ class DriveComparison:
     score: Difference | None
 
 
-def compare_drives(experiment: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
+def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequence[Trial]) -> ExperimentComparison:
     """Compare the trials of two stacks. Raises ValueError if drives, seeds, or their order differ."""
-    pairs = list(zip(reference, other, strict=True))
+    pairs = list(zip(baseline, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")
-    completed = [pair for pair in pairs if DriveOutcome.ERROR not in (pair[0].drive_outcome, pair[1].drive_outcome)]
+    completed = [pair for pair in pairs if TrialOutcome.ERROR not in (pair[0].outcome, pair[1].outcome)]
     both_succeeded = [pair for pair in completed if all(map(_has_succeeded, pair))]
     success = _difference(completed, lambda trial: float(_has_succeeded(trial)), is_rate=True)
-    return DriveComparison(
+    return ExperimentComparison(
         case=experiment,
         pairs=len(completed),
         better=sum(_has_succeeded(second) > _has_succeeded(first) for first, second in completed),
@@ -270,7 +270,7 @@ def compare_drives(experiment: str, reference: Sequence[Trial], other: Sequence[
 
 
 def _has_succeeded(trial: Trial) -> bool:
-    return trial.drive_outcome is DriveOutcome.SUCCESS
+    return trial.outcome is TrialOutcome.SUCCESS
 
 
 def _difference(

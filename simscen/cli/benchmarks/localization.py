@@ -25,7 +25,8 @@ def command(
     buildings: Annotated[int, typer.Option(min=1, max=1000, help="Number of generated buildings.")] = 10,
     first: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of the first building.")] = 1,
     only: Annotated[
-        list[str] | None, typer.Option(help="Select sets of parameters by a part of their name; repeatable.")
+        list[str] | None,
+        typer.Option(help="Select sets of parameters by a part of their name; repeatable. Not with --sparse."),
     ] = None,
     workers: Annotated[
         int | None,
@@ -45,8 +46,9 @@ def command(
     evaluated with several sets of parameters, including Nav2's and simscen's defaults. Intervals are by bootstrap over
     buildings. Lost robots are listed on standard error. Takes a few minutes on two cores.
 
-    With --sparse, the scans are 1 m or 0.5 rad apart, as in many public data sets. Each cell of the table then shows
-    the number of lost runs, the median error, and the error at the end.
+    With --sparse, variants of AMCL are compared on logs with scans 1 m or 0.5 rad apart, as in many public data sets.
+    The table has a row for each kind of log and a column for each variant. Each cell shows the number of lost runs, the
+    median error, and the error at the end. --only cannot be used.
     """
     from simscen.bench.localization.campaign import PARAMETER_SETS, run_buildings, summarize
 
@@ -146,7 +148,10 @@ def _interval_text(interval: "Interval", number_format: str = ".3f") -> str:
 
 
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
-    """Return two lines for each circumstance: the ANEES, and the 95 % bounds of a consistent localizer."""
+    """Return the name of the parameter set, and two lines for each circumstance.
+
+    The lines have the ANEES of all samples and at fixed times, each with the 95 % bounds of a consistent localizer.
+    """
     from simscen.bench.localization.campaign import CHECK_TIMES_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:

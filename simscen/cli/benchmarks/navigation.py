@@ -73,7 +73,7 @@ def command(
 
     Exit code 0: all runs were completed; 3: a run could not be completed.
     """
-    from simscen.bench.navigation.summary import compare_drives
+    from simscen.bench.navigation.summary import compare_experiment
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
     from simscen.cli.benchmarks.navigation_runs import completed_trials, execute_experiments, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
@@ -106,7 +106,7 @@ def command(
     ]
     compared = zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
     pairs = [
-        compare_drives(experiment.name, before, after)
+        compare_experiment(experiment.name, before, after)
         for experiment, before, after in compared
         if completed_trials(before) and completed_trials(after)
     ]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
-from simscen.bench.navigation.summary import Difference, DriveComparison, ExperimentSummary
+from simscen.bench.navigation.summary import Difference, ExperimentComparison, ExperimentSummary
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, stack_rows, wrap_lines
 
@@ -29,7 +29,9 @@ TABLE_HEAD = (
 )
 
 
-def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
+def as_text(
+    rows: Sequence[ExperimentResult], pairs: Sequence[ExperimentComparison] = (), columns: int | None = None
+) -> str:
     """Return the table of results, the table of comparisons, and the published figures of BARN.
 
     `pairs` are the comparisons of the experiments without and with --stack. `columns` is the width of the terminal in
@@ -49,13 +51,13 @@ def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] =
     return "\n".join(wrap_lines(lines, columns))
 
 
-def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = ()) -> str:
+def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[ExperimentComparison] = ()) -> str:
     """Return results, comparisons, and the published figures of BARN as JSON."""
     data = {"experiments": [asdict(row) for row in rows], "dwa_published": PUBLISHED_DWA_RESULTS}
     return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
 
 
-def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
+def _comparison_lines(pairs: Sequence[ExperimentComparison], columns: int | None) -> list[str]:
     """Return a table with one line per comparison; if it is too wide, lines of cells with their headings instead."""
     changes = [_comparison_cells(pair) for pair in pairs]
     lines = align_columns([COMPARISON_HEAD, *changes])
@@ -64,7 +66,7 @@ def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> 
     return [COMPARISON_HEAD[0], *(line for row in changes for line in label_cells(COMPARISON_HEAD, row, columns))]
 
 
-def _comparison_cells(pair: DriveComparison) -> tuple[str, ...]:
+def _comparison_cells(pair: ExperimentComparison) -> tuple[str, ...]:
     """Return the cells of one comparison in the columns of COMPARISON_HEAD."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
     changes = (_difference_text(difference, form) for difference, form in forms)

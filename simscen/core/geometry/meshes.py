@@ -132,8 +132,8 @@ def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
 def drivable_solids(mesh: TriangleMesh, max_step: float) -> SolidIndices:
     """Return the indices of the solids onto which a robot can drive if its wheels climb steps of `max_step` m.
 
-    The robot can drive from the floor, or from another drivable solid, onto a solid with upward faces at most
-    `max_step` m away. Distances are between bounding boxes.
+    A solid is drivable if its upward faces begin at most `max_step` m above z = 0, or are at most `max_step` m away
+    along each axis from those of a drivable solid. The bounding boxes of the upward faces are compared.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

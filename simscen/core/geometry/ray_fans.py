@@ -1,4 +1,4 @@
-"""Interface of ray casters, fans of rays such as the beams of a lidar, and ray buffers for the ray tracer Embree.
+"""Rays: interface of ray casters, fans of rays such as the beams of a lidar, and buffers for the ray tracer Embree.
 
 Embree casts rays in packets of 16 (`RTCRayHit16`).
 """
@@ -22,16 +22,16 @@ PACKET_SIZE = 16
 _ROWS = 21
 """Number of rows of a packet. Each row contains one value of all 16 rays.
 
-Rows: start (3), minimum distance, direction (3), time, maximum distance, mask, id, flags, and 9 values of the hit.
+Rows: start (3), minimum length, direction (3), time, maximum length, mask, id, flags, and 9 values of the hit.
 """
 _LENGTH_ROW, _MASK_ROW, _HIT_ID_ROW = 8, 9, 17
-"""Row of the maximum distance, row of the mask, and first row of the ids of the hit geometry."""
+"""Row of the maximum length, row of the mask, and first row of the ids of the hit geometry."""
 _PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
 """Alignment of packets, and size of values, in bytes."""
 _ALL_BITS = 0xFFFFFFFF
 """Mask of a ray that hits all geometries, and id of the hit geometry if nothing was hit."""
 MIN_DIRECTION_COMPONENT = 2e-18
-"""Magnitude below which components of directions are set to 0, because Embree then misses hits."""
+"""Components of directions with a smaller magnitude are set to 0, because Embree misses hits with such tiny values."""
 
 
 class RayPackets:
@@ -68,7 +68,10 @@ class RayPackets:
         self.lengths[:] = padded.reshape(-1, PACKET_SIZE)
 
     def distances(self) -> Float32Array:
-        """Return the distance (n,) of the hit of each ray in m, after Embree has cast the rays."""
+        """Return the distance (n,) of the hit of each ray in m, or its maximum length without a hit.
+
+        Call this after Embree has cast the rays.
+        """
         return self.lengths.flatten()[: self._count]
 
 
@@ -117,9 +120,9 @@ class RayFan:
         self.rays.lengths[:] = reach
 
     def rays_towards(self, x: float, y: float, min_dot: float) -> list[slice]:
-        """Return the index ranges of the rays towards (x, y), given in the frame of the fan.
+        """Return slices of the rays whose direction has a dot product of at least `min_dot` with (x, y).
 
-        The dot product of their direction and (x, y) is at least `min_dot`. The ranges can be slightly too long.
+        (x, y) is in the frame of the fan. The slices can contain a few more rays at their ends.
         """
         far = math.hypot(x, y)
         if min_dot > far:

@@ -82,7 +82,10 @@ def is_present(trace: Trace, name: str) -> Array:
 
 
 def distance_remaining(query: SignalQuery) -> Array:
-    """Return the length of the rest of the newest plan; before the first plan, the distance to the goal."""
+    """Return the length of the newest plan from the point nearest to the believed position.
+
+    Before the first plan, return the true distance to the goal.
+    """
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")

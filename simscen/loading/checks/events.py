@@ -1,6 +1,6 @@
 """Checks for events and faults with triggers that never fire, or fire less often than specified.
 
-A step is an event, or a step of the sequence (`then`) of an event.
+Here, a step is an event, or one of the entries of its sequence (`then`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -58,7 +58,7 @@ def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC050")
 def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find steps of a sequence that can only happen after the time limit, or that wait for an earlier step."""
+    """Find steps of a sequence that can only happen after the time limit, or that wait again for an earlier step."""
     run = possible_run(loaded)
     limit, earliest = loaded.spec.time_limit, dict[int, float]()
     for number, step in enumerate(run.steps):
@@ -90,7 +90,7 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return the run with all events, faults, and marks that can happen in the scenario.
+    """Return which events, faults, and marks (of the action `mark`) can happen in the scenario.
 
     This is a fixed-point iteration: it starts with nothing, and repeatedly adds what the possible events enable.
     """
@@ -102,7 +102,7 @@ def possible_run(loaded: LoadedScenario) -> "PossibleRun":
 
 @dataclass(frozen=True)
 class PossibleRun:
-    """Run in which the events, faults, and marks with the names `possible` can happen.
+    """Analysis that assumes that the events, faults, and marks with the names `possible` can happen.
 
     The methods `_why_never_KIND`, such as `_why_never_goal`, take the specification of a condition of this kind. They
     return the reason why the condition can never be true, or None.
@@ -118,7 +118,7 @@ class PossibleRun:
 
     @property
     def triggers(self) -> Iterator[tuple[Keys, Trigger | None, str, bool]]:
-        """The keys of the trigger, the trigger, the name, and `required` of each reachable step, then of each fault."""
+        """(keys of the trigger, trigger, name, `required`) of each reachable step, and then of each fault."""
         for step in self.steps:
             if self.is_reachable(step):
                 yield (*step.keys, "when"), step.when, step.name, step.required
@@ -181,11 +181,11 @@ class PossibleRun:
         return ((*keys, condition.kind), reason) if reason else None
 
     def _why_parts_never_true(self, conditions: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
-        """Return the reason for each condition in the list at `keys` why it is never true; None if it can be true."""
+        """For each condition in the list at `keys`, return the reason why it is never true; None if it can be true."""
         return [self._why_never_true(condition, (*keys, k)) for k, condition in enumerate(conditions)]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether an action of a possible step can have the effect of an action of one of these kinds."""
+        """Return whether a possible step has an action of one of these kinds, or an action of a plug-in."""
         return any(
             action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
         )

@@ -18,7 +18,8 @@ from simscen.triggers.base import Trigger
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 """Descriptions for messages of fault targets other than sensors, by kind of the target."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Kinds of faults that repeat a measurement. They only work before faults that delay messages."""
+"""Kinds of faults that simulate a measurement again, in a changed world or from another pose. They must be listed
+before faults that delay messages."""
 
 
 class ListedFault(NamedTuple):
@@ -122,7 +123,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 @NAMES.check("SC032")
 def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that repeat the measurement, but are listed after a fault that delays the messages."""
+    """Find faults that simulate the measurement again, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, target in _listed_faults(loaded):

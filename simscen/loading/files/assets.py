@@ -59,7 +59,7 @@ class Assets:
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
-        """Load the world in an SDF file, the YAML file of a ROS map, or a `*.world.yaml`."""
+        """Load the world in a `*.world.yaml`, the YAML file of a ROS map, or an SDF file, which is parsed later."""
         if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         name = self.library.sandbox.display_name(path)
@@ -108,15 +108,15 @@ class Assets:
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
             path = self._find_file(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
-        bundled_files = shipped_robots()
-        if written in bundled_files:
-            return self._load_cached(partial(self.robot_file, bundled=True), bundled_files[written])
-        hint = f"{suggestion(written, bundled_files)} (or the path of a *.robot.yaml or .urdf file)"
+        shipped_files = shipped_robots()
+        if written in shipped_files:
+            return self._load_cached(partial(self.robot_file, is_shipped=True), shipped_files[written])
+        hint = f"{suggestion(written, shipped_files)} (or the path of a *.robot.yaml or .urdf file)"
         self._add_problem(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
-    def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
-        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file. `bundled` robots ship with simscen."""
+    def robot_file(self, path: Path, is_shipped: bool = False) -> LoadedRobot | None:
+        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file. `is_shipped`: whether it ships with simscen."""
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
             text = read_text(path, self.library.sandbox.display_name(path))
@@ -137,7 +137,7 @@ class Assets:
             return None
         mapping = tree if isinstance(tree, MappingNode) else None
         found = {package: folder for package, folder in packages.items() if folder is not None}
-        return LoadedRobot(name, path, spec, urdf, bundled, mapping, found)
+        return LoadedRobot(name, path, spec, urdf, is_shipped, mapping, found)
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
         """Return `load(path)`; from the cache if the file has been loaded without problems before."""
@@ -237,8 +237,7 @@ def shipped_robots() -> dict[str, Path]:
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
     """Load the filter masks of the criteria under `pass`. Return them by path as written. Add problems to `assets`.
 
-    It is a problem if one path leads to two files. This can happen with `pass+` if a scenario extends a file in another
-    folder.
+    A scenario that extends a file in another folder (`pass+`) can name two masks by the same path. This is a problem.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):

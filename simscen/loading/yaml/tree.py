@@ -1,4 +1,4 @@
-"""Tree of a YAML file with the positions of its keys and values, and functions to search and change it.
+"""Tree of a YAML file with the positions of its keys and values, and functions to search it and make changed copies.
 
 Trees are immutable. A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of
 union members between them. Functions with a `loc` skip parts that do not exist in the tree, such as tags.

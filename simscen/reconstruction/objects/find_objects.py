@@ -21,8 +21,8 @@ from simscen.reconstruction.static_world import StaticWorld, offset_poses
 MIN_DISPLACEMENT_M = 0.4
 """Minimum displacement of a moving object."""
 MIN_FREED_FRACTION = 0.5
-"""An object has moved if more than this fraction of its first hits is free later, or of its farthest hits was free
-before."""
+"""An object has moved only if beams pass through more than this fraction of its first points later, or passed through
+more than this fraction of its points at its farthest position before."""
 SEEN_FREE_FRACTION = 0.6
 """Minimum fraction of an object's points through which beams pass while the object is absent."""
 COMPARED_CLUSTERS = 5
@@ -84,7 +84,7 @@ def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> 
 
 
 def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
-    """Return whether an object moved, and not only its visible part. `usable` are indices of usable scans."""
+    """Return whether an object moved, and not only its visible side. `usable` are the indices of valid scans."""
     shape = fit_shape(track.clusters, is_moving=True)
     centers = shape.poses[:, :2]
     start = np.median(centers[:COMPARED_CLUSTERS], axis=0)

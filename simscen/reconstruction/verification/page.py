@@ -131,7 +131,7 @@ def _legend(has_objects: bool, has_incidents: bool) -> Iterator[str]:
 
 
 def _charts(verified: Verification) -> Iterator[str]:
-    """Yield charts of the distance between both robots, and of the smallest range of each scan in both drives."""
+    """Yield charts of the distance between the robots of log and run, and of each scan's smallest range in both."""
     yield "<h2>Timing and clearance</h2>"
     yield '<div class="pair">'
     times = common_times(verified.drive, verified.repeated)
@@ -153,7 +153,7 @@ def _charts(verified: Verification) -> Iterator[str]:
 
 
 def _figure(label: str, series: Sequence[Series]) -> str:
-    """Return a chart in m with a caption."""
+    """Return a chart of values in m, with a caption."""
     return f"<figure><figcaption>{escape(label)}</figcaption>{chart(label, series, 'm')}</figure>"
 
 

@@ -18,7 +18,8 @@ from simscen.core.records.trace import Trace
 class Scene:
     """Finished run to draw: the world and the data of one robot.
 
-    With several robots, there is a scene for each robot, and a common scene that contains them in `robots`.
+    With several robots, there is a scene for each robot and a common scene. All of them contain the scenes of all
+    robots in `robots`. `trace` and `case` of the common scene are those of the first robot.
 
     Attributes:
         trace: Recorded run of the robot.
@@ -54,7 +55,10 @@ class Scene:
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """Return the common scene of several robots. `robots` has the trace and the case of each robot by name."""
+    """Return the common scene: `scene` with a scene for each robot. Without robots, return `scene`.
+
+    `robots` has the trace and the case of each robot by name.
+    """
     parts = {name: replace(scene, trace=trace, case=case, robot_name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 

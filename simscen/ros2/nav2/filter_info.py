@@ -21,7 +21,7 @@ KEEPOUT, SPEED_PERCENT, SPEED_ABSOLUTE = 0, 1, 2
 
 
 class FilterInfo:
-    """CostmapFilterInfo messages. `masks` is the value `zone_masks` of the frame HELLO of the stack protocol."""
+    """CostmapFilterInfo messages. `masks` is the value `zone_masks` of the first message, HELLO."""
 
     def __init__(self, masks: Sequence[Mapping[str, Any]]) -> None:
         self._masks: Dict[str, Mapping[str, Any]] = {MASKS[mask["topic"]]: mask for mask in masks}

@@ -1,6 +1,7 @@
 """Measures the distance from a robot to the static world, and finds the static solids that enclose a point.
 
-The static mesh is split into parts. A separate PyBullet client measures the distance to each part near the robot.
+A part is a solid of the static mesh, or one tile of a solid with many faces. A separate PyBullet client measures the
+distance to each part near the robot.
 """
 
 import itertools
@@ -36,9 +37,9 @@ SOLID_TOLERANCE_M = 0.05
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]
-"""Bound, index, and bounding rectangle (left, low, right, high) in m of a part of the static mesh.
+"""Sort key, index, and bounding rectangle (left, low, right, high) in m of a part of the static mesh.
 
-The bound minus the distance that the robot has moved since the start is a lower bound of the distance to the part in m.
+The sort key minus `_travel` is a lower bound in m of the present distance to the part.
 """
 
 
@@ -159,12 +160,12 @@ class StaticDistance:
     def _encloses(self, solid: int, point: Vector) -> bool:
         """Return whether a solid encloses a point."""
         parts, vertices = self._parts, self._mesh.vertices
-        tiles = parts.parts_of_solid(solid)
-        if len(tiles) > 1:
-            low, high = parts.low[tiles.start : tiles.stop], parts.high[tiles.start : tiles.stop]
+        own_parts = parts.parts_of_solid(solid)
+        if len(own_parts) > 1:
+            low, high = parts.low[own_parts.start : own_parts.stop], parts.high[own_parts.start : own_parts.stop]
             tilt = max(LINE_TILT) * max(high[:, 2].max() - point[2], point[2] - low[:, 2].min())
             is_on_line = ((low[:, :2] - tilt <= point[:2]) & (point[:2] <= high[:, :2] + tilt)).all(axis=1)
-            on_line = [parts.faces(tile) for tile, on in zip(tiles, is_on_line.tolist(), strict=True) if on]
+            on_line = [parts.faces(part) for part, on in zip(own_parts, is_on_line.tolist(), strict=True) if on]
             faces = np.concatenate([np.empty(0, np.int64), *on_line])
             is_enclosed = encloses_along_line(vertices[self._mesh.faces[faces]], point)
             if is_enclosed is not None:

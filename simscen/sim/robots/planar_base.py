@@ -28,6 +28,7 @@ class PlanarBase:
     """Hull on three joints from the world: along x, along y, and about z. It stays at z = 0 and cannot tip."""
 
     ground_links: Mapping[int, float]
+    """Always empty, because the base does not touch the ground."""
 
     def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.DEFAULT_VISUAL) -> None:
         """Place the base at `pose`; the renderer shows `visual_shape`."""

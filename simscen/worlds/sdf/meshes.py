@@ -74,7 +74,7 @@ class MeshRequest:
 
 
 class MeshReader:
-    """Reads the meshes that the elements of one world refer to. Equal meshes are the same object."""
+    """Reads the meshes that the elements of one world refer to. Elements with equal content share one `Mesh`."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report

@@ -3,24 +3,24 @@ from dataclasses import replace
 import pytest
 from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
 
-from simscen.bench.navigation.summary import DriveOutcome, Trial, summarize
+from simscen.bench.navigation.summary import Trial, TrialOutcome, summarize
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 
 
 @pytest.mark.parametrize(
-    ("finished", "drive_outcome"),
+    ("finished", "outcome"),
     [
-        (ARRIVED, DriveOutcome.SUCCESS),
-        (HIT, DriveOutcome.COLLISION),
-        (run(Outcome.FAILED, collided=True, ended="time limit"), DriveOutcome.COLLISION),
-        (LATE, DriveOutcome.TIMEOUT),
-        (GAVE_UP, DriveOutcome.FAILED),
-        (run(Outcome.ERROR), DriveOutcome.ERROR),
+        (ARRIVED, TrialOutcome.SUCCESS),
+        (HIT, TrialOutcome.COLLISION),
+        (run(Outcome.FAILED, collided=True, ended="time limit"), TrialOutcome.COLLISION),
+        (LATE, TrialOutcome.TIMEOUT),
+        (GAVE_UP, TrialOutcome.FAILED),
+        (run(Outcome.ERROR), TrialOutcome.ERROR),
     ],
 )
-def test_run_has_exactly_one_outcome(finished: RunFinished, drive_outcome: DriveOutcome) -> None:
-    assert Trial(finished).drive_outcome is drive_outcome
+def test_run_has_exactly_one_outcome(finished: RunFinished, outcome: TrialOutcome) -> None:
+    assert Trial(finished).outcome is outcome
 
 
 def test_rates_are_over_all_runs_and_times_over_successful_runs() -> None:

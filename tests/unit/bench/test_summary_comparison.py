@@ -1,7 +1,7 @@
 import pytest
 from finishedruns import ARRIVED, HIT, run
 
-from simscen.bench.navigation.summary import Trial, compare_drives, success_interval, summarize
+from simscen.bench.navigation.summary import Trial, compare_experiment, success_interval, summarize
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.statistics import wilson_interval
@@ -43,7 +43,7 @@ def test_one_world_has_no_interval() -> None:
 def test_stacks_are_compared_on_drives_that_both_completed() -> None:
     before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
     after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
-    said = compare_drives("fields", before, after)
+    said = compare_experiment("fields", before, after)
     assert (said.pairs, said.better, said.worse) == (5, 1, 1)
     assert said.success.mean == 0.0
     assert said.seconds is not None and said.seconds.mean == 4.0  # of the two drives in which both arrived
@@ -54,7 +54,7 @@ def test_stacks_are_compared_on_drives_that_both_completed() -> None:
 def test_the_interval_of_a_difference_is_that_of_the_binomial_distribution_by_hand() -> None:
     before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((HIT, ARRIVED, ARRIVED, HIT, HIT))]
     after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, ARRIVED, HIT, HIT))]
-    said = compare_drives("fields", before, after).success
+    said = compare_experiment("fields", before, after).success
     # The one world that differs is drawn k times of five, k ~ B(5, 1/5): P(k <= 2) = 0.942, P(k <= 3) = 0.993.
     assert (said.mean, said.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
 
@@ -63,7 +63,7 @@ def test_difference_equals_that_of_the_rates_in_the_table() -> None:
     worlds = ("a", "a", "a", "b", "c", "d", "e", "f")
     before = [Trial(ARRIVED, 10.0, world) for world in worlds]
     after = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]
-    said = compare_drives("maps", before, after)
+    said = compare_experiment("maps", before, after)
     assert said.success.mean == pytest.approx(summarize("", after).success - summarize("", before).success)
     one, two = summarize("", before).score, summarize("", after).score
     assert said.score is not None and one is not None and two is not None
@@ -74,9 +74,9 @@ def test_difference_equals_that_of_the_rates_in_the_table() -> None:
 def test_stacks_that_never_differ_may_still_differ_in_other_worlds(runs: RunFinished) -> None:
     same = [Trial(runs, world=f"{n}") for n in range(10)]
     most = 1.0 - wilson_interval(10, 10)[0]
-    assert compare_drives("fields", same, same).success.interval == pytest.approx((-most, most))
+    assert compare_experiment("fields", same, same).success.interval == pytest.approx((-most, most))
 
 
 def test_runs_of_other_drives_are_not_compared() -> None:
     with pytest.raises(ValueError, match="not of the same drives"):
-        compare_drives("fields", [Trial(ARRIVED, world="a")], [Trial(ARRIVED, world="b")])
+        compare_experiment("fields", [Trial(ARRIVED, world="a")], [Trial(ARRIVED, world="b")])

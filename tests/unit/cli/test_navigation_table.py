@@ -2,7 +2,7 @@ import json
 from dataclasses import replace
 
 from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, ParameterSetResults, SuccessRate
-from simscen.bench.navigation.summary import Difference, DriveComparison, ExperimentSummary
+from simscen.bench.navigation.summary import Difference, ExperimentComparison, ExperimentSummary
 from simscen.cli.benchmarks.localization import COLUMN_NAMES
 from simscen.cli.benchmarks.localization import as_text as localization
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
@@ -25,7 +25,7 @@ BARN                           30       0      3  -0.100 (-0.200 … +0.000)    
 
 BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success 0.850, collisions 0.056, \
 timeouts 0.094, score 0.159"""
-SLOWER = DriveComparison(
+SLOWER = ExperimentComparison(
     "BARN",
     30,
     0,

@@ -92,7 +92,10 @@ def _parse_parameters(text: str) -> list[Parameter]:
 
 
 def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tuple[Macro, Scope, MacroScope]:
-    """Return the macro `name` or `namespace.name`, and the scopes in which it is defined. Raises ExpansionError."""
+    """Return the macro `name` or `namespace.name`, and the scopes that its body sees. Raises ExpansionError.
+
+    These are the scopes of the namespace, or without a namespace those of the call.
+    """
     *spaces, name = qualified_name.split(".")
     for space in spaces:
         owner, inner = scope.find_scope(space), macros.find_namespace(space)
