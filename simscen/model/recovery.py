@@ -150,9 +150,9 @@ class Recovery(Spec):
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
     """Whether `clear_costmap`, and each retry after a planner error, clears the entire global costmap, as in Nav2. With
-    false, only the area of the local costmap is cleared, so that known dead ends are kept. After planner errors, the
-    entire global costmap is then cleared at the first retry, and again at increasing intervals (10 s, 20 s, 40 s, …).
-    """
+    false, only the area of the local costmap is cleared, so that known dead ends are kept, with one exception: after
+    planner errors, the first retry clears the entire global costmap, and later retries do so at increasing intervals
+    (10 s, 20 s, 40 s, …)."""
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
