@@ -21,9 +21,9 @@ def test_files_of_the_guide_are_merged_as_documented(tmp_path: Path) -> None:
     assert tree is not None
     assert tree.plain == {
         "stack": {"controller": {"desired_linear_vel": 0.2}},
-        "goals": [{"pose": "shelf"}],
+        "goals": [{"pose": "packing"}],
         "world": "../worlds/warehouse.world.yaml",
-        "robot": {"model": "amr", "pose": "dock"},
+        "robot": {"model": "amr", "pose": "charger"},
         "simscen": 1,
         "tags": ["nightly"],
         "pass": [{"collisions": {"max": 0}}, {"goals_reached": {}}],
