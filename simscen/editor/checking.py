@@ -57,7 +57,7 @@ class TextChecks:
         if isinstance(loaded, list):
             return loaded
         checked = [
-            VariationProblems(scenario.variation, scenario.set_by, self._variation_problems(scenario))
+            VariationProblems(scenario.variation, scenario.varied_paths, self._variation_problems(scenario))
             for scenario in loaded
         ]
         return merge_problems(checked)

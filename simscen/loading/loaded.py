@@ -121,7 +121,7 @@ class LoadedScenario:
     """Name of the variation; "" for a file without variations."""
     varied_values: Mapping[str, Any] = field(default_factory=dict, repr=False)
     """Values of the variation, by dotted path."""
-    set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
+    varied_paths: Mapping[Position, str] = field(default_factory=dict, repr=False)
     """Dotted path of each value of the variation, by position of the value in a file."""
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
     """Views by name of the robot; {} for a scenario of one robot."""

@@ -81,7 +81,10 @@ def try_variations(
     tried = [(variation, _load_variation(variation, library, file, choice)) for variation in variations]
     if any(isinstance(found, list) for _, found in tried):
         return merge_problems(
-            [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]
+            [
+                VariationProblems(one.name, one.varied_paths, found if isinstance(found, list) else ())
+                for one, found in tried
+            ]
         )
     return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
 
@@ -193,7 +196,7 @@ def _load_variation(
         return loaded
     notes = (*loaded.notes, *library.with_source(expanded_tree.notes), *(choice.notes if choice is not None else ()))
     return replace(loaded, notes=notes).with_changes(
-        choice=choice, variation=variation.name, set_by=variation.set_by, varied_values=variation.values
+        choice=choice, variation=variation.name, varied_paths=variation.varied_paths, varied_values=variation.values
     )
 
 

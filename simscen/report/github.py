@@ -125,7 +125,7 @@ def _picture_lines(runs: list[RunFinished], folder: str, pictures_url: str) -> l
 
 
 def _reason_cell(run: RunFinished) -> str:
-    """Return a table cell with one line per violated criterion, or with the tightest margin if the run passed."""
+    """Return a table cell: the error, violated criteria, why a failure does not count, or the tightest margin."""
     if run.outcome is Outcome.ERROR:
         return markdown_cell(error_summary(run))
     if excuse := reason_without_failure(run):

@@ -13,7 +13,7 @@ from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Disconnected
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.nav2.filter_info import MASKS, FilterInfo
+from simscen.ros2.nav2.filter_info import MASK_TOPICS, FilterInfo
 from simscen.ros2.nav2.report import ROSOUT
 from simscen.ros2.options import AdapterError, BringUpAborted, Domain, Options, claim_domain, ros_environment
 
@@ -21,7 +21,7 @@ EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
 """Nav2 actions that a scenario can request for its goals."""
-PROTOCOL_TOPICS = {published: topic for topic, published in MASKS.items()}
+PROTOCOL_TOPICS = {published: topic for topic, published in MASK_TOPICS.items()}
 """Topics of zone masks in the stack protocol, by the topics on which the adapter publishes them."""
 READY_MARGIN_S = 15.0
 """Wall time that the first answer may take in addition to `--ready`."""
@@ -71,7 +71,7 @@ class Hello(NamedTuple):
             raise AdapterError(f"simscen ros2 requires version {wire.PROTOCOL} of the stack protocol")
         return cls(
             {
-                topic["number"]: (MASKS.get(topic["topic"], topic["topic"]), topic["type"])
+                topic["number"]: (MASK_TOPICS.get(topic["topic"], topic["topic"]), topic["type"])
                 for topic in hello["says"]
                 if _is_robot_topic(topic)
             },
@@ -250,7 +250,7 @@ class AdapterRun:
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:
     """Return whether a real robot would have this topic, unlike ground truth and simscen's own topics."""
     name: str = topic["topic"]
-    if name in MASKS.values():  # masks without zones; the adapter publishes those with zones under these names
+    if name in MASK_TOPICS.values():  # masks without zones; the adapter publishes those with zones under these names
         return False
     return not name.startswith(("/simscen", "/ground_truth")) and not topic.get("exact", False) and name != "/clock"
 

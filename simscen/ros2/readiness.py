@@ -62,7 +62,7 @@ class Readiness:
         found += self._unused_sensors()
         found += self._user_transforms.missing() if self._user_transforms is not None else []
         if self._options.nav2:
-            found += self._nav2.missing_nodes()
+            found += self._nav2.node_problems()
             found += [] if found else self._nav2.wrong_parameters()
         return busy + found + self._nodes_on_wall_time() + self._inactive_nodes()
 

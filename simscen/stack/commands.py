@@ -17,7 +17,10 @@ class VelocitySmoother:
     """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Take the limits: the lower ones of specification and robot. `period` is the controller period in s."""
+        """Take the speed limits of the specification, and the lower acceleration limits of specification and robot.
+
+        `period` is the controller period in s.
+        """
         self._enabled = spec.enabled
         acceleration = min(spec.max_accel or robot.linear_acceleration, robot.linear_acceleration)
         deceleration = min(spec.max_decel or robot.linear_deceleration, robot.linear_deceleration)

@@ -126,7 +126,7 @@ def signal_description(signal: Signal) -> str:
 def signal_example(name: str, signal: Signal) -> str:
     """Return a YAML example of a condition with this signal."""
     arguments = "".join(
-        f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
+        f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.alternative_arguments[:1], *signal.optional_arguments)
     )
     bound = "" if signal.is_boolean else f', op: "<=", value: 1.5 {signal.unit}'.rstrip()
     return f"{{signal: {name}{arguments}{bound}}}"
@@ -145,7 +145,9 @@ _EXAMPLE_ARGUMENTS = {
 
 def _arguments_sentence(signal: Signal) -> str:
     needed = (
-        f" Needs {' or '.join(f'`{key}`' for key in signal.required_arguments)}." if signal.required_arguments else ""
+        f" Needs {' or '.join(f'`{key}`' for key in signal.alternative_arguments)}."
+        if signal.alternative_arguments
+        else ""
     )
     return needed + "".join(f" Optional argument: `{key}`." for key in signal.optional_arguments)
 
@@ -175,7 +177,7 @@ def signals_page() -> str:
 
 
 def _arguments_text(signal: Signal) -> str:
-    names = [f"`{key}`" for key in signal.required_arguments] + [f"(`{key}`)" for key in signal.optional_arguments]
+    names = [f"`{key}`" for key in signal.alternative_arguments] + [f"(`{key}`)" for key in signal.optional_arguments]
     return " or ".join(names)
 
 

@@ -60,7 +60,7 @@ class FileChecker:
         checked = [self.check_variation(one) for one in loaded]
         problems = merge_problems(
             [
-                VariationProblems(one.variation, one.set_by, found)
+                VariationProblems(one.variation, one.varied_paths, found)
                 for one, (_, found) in zip(loaded, checked, strict=True)
             ]
         )

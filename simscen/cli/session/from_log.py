@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FromLogOptions:
-    """Options of `simscen new --from-log`. A standard topic is the default topic of a kind of message, such as /scan.
+    """Options of `simscen new --from-log`.
 
     log:     recorded drive: an MCAP file or a rosbag2 folder
     out:     scenario file to write
     map:     map of the robot; None for the map in the log
     world:   world file; None for a world made from the log
     robot:   robot model or file; "" for the robot in the log
-    truth:   topic of the true pose, or "none"; None to find the topic
-    topics:  entries NAME=TOPIC for standard topics that have another name in the log
-    root:    root folder of the recorded scenario; None if unknown
+    truth:   topic of the true pose; "none" to ignore it; None for the topic of simscen's own logs
+    topics:  entries NAME=TOPIC for messages whose topic in the log is not the default, such as scan=/front/scan
+    root:    folder of the files that the recorded scenario refers to; None for the working folder
     """
 
     log: Path

@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Arguments of `simscen run`. Each field has the name of an option; `options` are options for the runs."""
+    """Arguments of `simscen run`. `selection` and `options` group options; other fields are named after theirs."""
 
     paths: Sequence[Path]
     selection: Selection = field(default_factory=Selection)

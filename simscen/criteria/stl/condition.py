@@ -178,11 +178,11 @@ def _dimension_of(value: Any) -> str:
 def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
     """Raise ValueError if the keys of a comparison do not suit its signal, or if the result is always the same."""
     arguments = condition.arguments
-    unknown = [key for key in arguments if key not in (*signal.required_arguments, *signal.optional_arguments)]
+    unknown = [key for key in arguments if key not in (*signal.alternative_arguments, *signal.optional_arguments)]
     if unknown:
         raise ValueError(f"`{name}` takes no `{unknown[0]}`")
-    if signal.required_arguments and len(arguments) != 1:
-        raise ValueError(f"`{name}` needs exactly one of: {', '.join(signal.required_arguments)}")
+    if signal.alternative_arguments and len(arguments) != 1:
+        raise ValueError(f"`{name}` needs exactly one of: {', '.join(signal.alternative_arguments)}")
     if signal.is_boolean:
         plain = condition.op is None and condition.value is None
         if condition.scale is not None or not (plain or (condition.op == ">=" and condition.value == 1)):

@@ -45,7 +45,7 @@ class Signal:
         evidence: Kinds of information that a log must contain for this signal, besides the truth.
         minimum: Smallest possible value.
         maximum: Greatest possible value.
-        required_arguments: Keys of arguments of which exactly one must be given; empty if none is needed.
+        alternative_arguments: Keys of arguments of which exactly one must be given; empty if none is needed.
         optional_arguments: Keys of arguments that may be given.
     """
 
@@ -55,7 +55,7 @@ class Signal:
     evidence: Set[Evidence] = frozenset()
     minimum: float = 0.0
     maximum: float = math.inf
-    required_arguments: tuple[str, ...] = ()
+    alternative_arguments: tuple[str, ...] = ()
     optional_arguments: tuple[str, ...] = ()
 
     @property
@@ -148,7 +148,7 @@ SIGNALS: dict[SignalName, Signal] = {
         "length",
         distances.distance_to,
         {Evidence.ALIGNMENT},
-        required_arguments=("object", "point", "goal"),
+        alternative_arguments=("object", "point", "goal"),
     ),
     "person_distance": Signal(
         "True gap between the robot's footprint and the body of the nearest pedestrian; infinite while there is none.",
@@ -223,7 +223,7 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.in_region,
         {Evidence.ALIGNMENT},
         maximum=1.0,
-        required_arguments=("region",),
+        alternative_arguments=("region",),
     ),
     "in_collision": Signal(
         "The robot touches something, or the named object.",
@@ -255,7 +255,7 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.is_active,
         {Evidence.DISTURBANCES},
         maximum=1.0,
-        required_arguments=("fault",),
+        alternative_arguments=("fault",),
     ),
     "event_active": Signal(
         "The event has begun and not ended; one without an end lasts to the end of the run.",
@@ -263,7 +263,7 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.is_active,
         {Evidence.DISTURBANCES},
         maximum=1.0,
-        required_arguments=("event",),
+        alternative_arguments=("event",),
     ),
     "started": Signal(
         "The fault or event has just begun: true at the one sample after each start.",
@@ -271,7 +271,7 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.has_just_started,
         {Evidence.DISTURBANCES},
         maximum=1.0,
-        required_arguments=("fault", "event"),
+        alternative_arguments=("fault", "event"),
     ),
 }
 """Signals by name, in the order of the reference page."""

@@ -23,7 +23,7 @@ before faults that delay messages."""
 
 
 class ListedFault(NamedTuple):
-    """Fault with its index in `faults` and its target. The target is None if the robot does not have it."""
+    """Fault with its index `number` in `faults` and its target. The target is None if the robot does not have it."""
 
     number: int
     entry: FaultEntry

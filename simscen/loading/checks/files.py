@@ -54,7 +54,7 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
         if isinstance(loaded, list):
             return loaded
         return merge_problems(
-            [VariationProblems(scenario.variation, scenario.set_by, scenario.notes) for scenario in loaded]
+            [VariationProblems(scenario.variation, scenario.varied_paths, scenario.notes) for scenario in loaded]
         )
     library = Library(PathSandbox.around(root, world_path))
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):

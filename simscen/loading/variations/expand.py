@@ -47,7 +47,7 @@ class Variation:
         return cls(name, tree, tuple(changes))
 
     @property
-    def set_by(self) -> Mapping[Position, str]:
+    def varied_paths(self) -> Mapping[Position, str]:
         """Path of the change that set a value, by position of the value or of a part of it."""
         return {
             position: change.target.path

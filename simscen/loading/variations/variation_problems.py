@@ -10,17 +10,18 @@ from simscen.loading.yaml.tree import Position
 
 
 class VariationProblems(NamedTuple):
-    """Problems of one variation. `set_by` contains the path of each new value, by position of the value."""
+    """Problems of one variation. `varied_paths` are the dotted paths of its values, by their positions in files."""
 
     name: str
-    set_by: Mapping[Position, str]
+    varied_paths: Mapping[Position, str]
     problems: Sequence[Problem]
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return each problem once. Its message states which variations have the problem, and the path of the varied value.
+    """Return each problem once. Its message states which variations have the problem.
 
-    A problem that all variations have and that is not at a varied value is unchanged.
+    If the problem is at a varied value, the message also contains the dotted path of the value. A problem that all
+    variations have and that is not at a varied value is unchanged.
     """
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
@@ -38,7 +39,7 @@ def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems
 
     `affected` are the variations with the problem, `variation_count` is the number of all variations.
     """
-    path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
+    path = affected[0].varied_paths.get(Position(problem.path, problem.line, problem.col))
     names = [one.name for one in affected if one.name]
     if not names or (path is None and len(names) == variation_count):
         return problem

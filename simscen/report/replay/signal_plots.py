@@ -62,7 +62,7 @@ def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: P
     without_arguments = [
         SignalPlot(name, {})
         for name, signal in SIGNALS.items()
-        if not signal.required_arguments and name not in _EXCLUDED_SIGNALS
+        if not signal.alternative_arguments and name not in _EXCLUDED_SIGNALS
     ]
     with_arguments = [SignalPlot(name, dict(arguments)) for name, arguments in in_criteria]
     plots = {plot.name: plot for plot in (*without_arguments, *with_arguments)}

@@ -8,7 +8,7 @@ from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 from simscen.ros2.graph import Topic
 from simscen.ros2.messages import find_type
 
-MASKS = {"/keepout_zones": "/keepout_filter_mask", "/speed_zones": "/speed_filter_mask"}
+MASK_TOPICS = {"/keepout_zones": "/keepout_filter_mask", "/speed_zones": "/speed_filter_mask"}
 """Topics on which the adapter publishes masks, by their topics in the stack protocol."""
 INFO_TYPE = "nav2_msgs/msg/CostmapFilterInfo"
 INFO_TOPICS = {
@@ -24,7 +24,7 @@ class FilterInfo:
     """CostmapFilterInfo messages. `masks` is the value `zone_masks` of the first message, HELLO."""
 
     def __init__(self, masks: Sequence[Mapping[str, Any]]) -> None:
-        self._masks: Dict[str, Mapping[str, Any]] = {MASKS[mask["topic"]]: mask for mask in masks}
+        self._masks: Dict[str, Mapping[str, Any]] = {MASK_TOPICS[mask["topic"]]: mask for mask in masks}
 
     @property
     def topics(self) -> List[Topic]:
@@ -34,7 +34,7 @@ class FilterInfo:
         return [Topic(INFO_TOPICS[mask], INFO_TYPE) for mask in self._masks]
 
     def messages(self, names: Callable[[str], str]) -> List[Tuple[str, bytes]]:
-        """Return topics and serialized messages. `names` maps topics of the stack protocol to names in the graph."""
+        """Return topics and serialized messages. `names` maps a topic to its name in the graph."""
         from rclpy.serialization import serialize_message
 
         found = []

@@ -48,7 +48,7 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
     }
     case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
     of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}
-    wanted = {key: of[key] for key in SIGNALS[name].required_arguments[:1]}
+    wanted = {key: of[key] for key in SIGNALS[name].alternative_arguments[:1]}
     values = read_signal(name, synthetic_trace(words), synthetic_case(case), wanted)
     assert values.shape == (161,)
     assert np.isfinite(values).all()
