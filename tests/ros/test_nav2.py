@@ -32,7 +32,7 @@ def test_nav2_runs_after_a_warm_up_and_paced(with_interfaces, run, words: list[s
 
 
 @pytest.mark.slow
-def test_a_bringup_may_take_longer_than_the_limits_of_a_stack_if_ready_says_so(with_interfaces, run) -> None:
+def test_ready_option_extends_the_time_for_the_bringup(with_interfaces, run) -> None:
     launch = with_interfaces.node("nav2_like", *ACTION, slow=35.0)
     ended = run("nav2", "--ready", "90", "--launch", launch, scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said

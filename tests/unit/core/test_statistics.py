@@ -33,7 +33,7 @@ def test_the_interval_is_scipys_percentile_bootstrap(n: int) -> None:
     assert own == pytest.approx(tuple(theirs.confidence_interval), abs=0.08 * spread)
 
 
-def test_the_interval_holds_the_true_mean_about_as_often_as_it_says() -> None:
+def test_interval_covers_the_true_mean_at_its_confidence() -> None:
     """Of 40 pairs; a percentile bootstrap is known to be a little too narrow."""
     draws = rng(3).normal(0.4, 1.0, (300, 40))
     intervals = [bootstrap_mean_interval(row.tolist(), rng(k)) for k, row in enumerate(draws)]

@@ -63,6 +63,6 @@ def test_keyword_expression_executes_no_code() -> None:
         ("goal", ("fault",), "none of 3 scenarios matches -k `goal` and --tag fault"),
     ],
 )
-def test_an_empty_selection_says_why(keyword: str, tags: tuple[str, ...], message: str) -> None:
+def test_empty_selection_is_explained(keyword: str, tags: tuple[str, ...], message: str) -> None:
     with pytest.raises(NothingSelected, match=message):
         select(ALL, keyword, tags)

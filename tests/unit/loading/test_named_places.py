@@ -62,7 +62,7 @@ def test_a_goal_after_a_place_takes_no_name_that_another_has(load, scenario: str
     assert names == ["desk", "desk-2", "desk-3", "goal-5", "goal-5-2"]
 
 
-def test_the_estimate_may_be_a_place_or_unknown(load, scenario: str) -> None:
+def test_initial_estimate_can_be_a_place_or_unknown(load, scenario: str) -> None:
     told = load(scenario.replace("pose: start", "pose: start, initial_estimate: desk")).spec.robot.initial_estimate
     assert told.pose == (5, 3, 0)
     assert told.std == (0.5, 0.5, 0.2618)
@@ -84,7 +84,7 @@ def test_unknown_place_is_reported_with_a_suggestion(told, scenario: str, text: 
     assert told(scenario.replace("goals: [{pose: desk}]", text)) == [f"{place} SC030 did you mean `desk`?"]
 
 
-def test_things_of_a_world_stand_at_its_places(write: Write, tmp_path: Path) -> None:
+def test_objects_of_a_world_can_be_at_its_places(write: Write, tmp_path: Path) -> None:
     text = """\
 simscen: 1
 walls: [{points: [west, east, [4, 0]]}]
@@ -100,7 +100,7 @@ places: {west: {x: 0, y: 2, yaw: 1}, east: {x: 4, y: 2}}
     assert spec.doors[0].points == [[0, 2], [0, 1]]
 
 
-def test_a_world_that_names_no_place_of_its_own_is_wrong_there(told, write: Write, scenario: str) -> None:
+def test_unknown_place_in_a_world_is_reported_in_the_world_file(told, write: Write, scenario: str) -> None:
     world = (write("x", "").parent / "room.world.yaml").read_text()
     write("room.world.yaml", world.replace("pose: {x: 3, y: 2}", "pose: dusk"))
     assert told(scenario) == ["5:44 SC030 did you mean `desk`?"]

@@ -44,7 +44,7 @@ def parsed(text: str) -> MappingNode:
     return tree
 
 
-def test_parts_of_each_depth_can_be_left_out_but_not_what_fails() -> None:
+def test_parts_of_any_depth_are_removable_except_the_cause_of_failure() -> None:
     tree = parsed(TEXT)
     assert removable_parts(tree, 1) == [("goals",), ("events",)]
     assert ("goals", 0) in removable_parts(tree, 2)
@@ -52,7 +52,7 @@ def test_parts_of_each_depth_can_be_left_out_but_not_what_fails() -> None:
     assert not any(keys[0] in ("pass", "simscen") for depth in (1, 2, 3) for keys in removable_parts(tree, depth))
 
 
-def test_parts_are_left_out_with_what_becomes_empty() -> None:
+def test_removing_parts_also_removes_empty_parents() -> None:
     tree = parsed(TEXT)
     left = without_parts(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
     assert left.plain["goals"] == [{"pose": "kitchen", "timeout": "100 s"}]

@@ -41,7 +41,7 @@ def test_places_of_values_and_keys_are_known(write: Write, scenario: str, tmp_pa
     assert (problem.place, problem.source) == ("a.scenario.yaml:4:16", "goals: [{pose: desk}]")
 
 
-def test_an_inline_world_is_the_scenarios_own(write: Write, scenario: str, tmp_path: Path) -> None:
+def test_inline_world_belongs_to_the_scenario(write: Write, scenario: str, tmp_path: Path) -> None:
     inline = scenario.replace("room.world.yaml", "{simscen: 1, places: {start: {x: 0, y: 0}, desk: {x: 1, y: 1}}}")
     loaded = _loaded(write("a.scenario.yaml", inline), tmp_path)
     assert loaded.world.path == loaded.file
@@ -63,7 +63,7 @@ def test_a_ros_map_can_be_world_and_map(write: Write, scenario: str, tmp_path: P
     assert loaded.map == loaded.world.map
 
 
-def test_a_world_can_stand_on_a_ros_map(write: Write, scenario: str, tmp_path: Path) -> None:
+def test_world_can_be_based_on_a_ros_map(write: Write, scenario: str, tmp_path: Path) -> None:
     write("maps/map.yaml", MAP)
     write("maps/floor.pgm", "P2 1 1 255 0")
     write("room.world.yaml", "simscen: 1\nmap: maps/map.yaml\nplaces: {start: {x: 0, y: 0}, desk: {x: 1, y: 1}}")

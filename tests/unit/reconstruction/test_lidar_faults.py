@@ -87,7 +87,7 @@ def test_single_beams_that_end_early_are_dust():
     assert (fault.kind, number(fault, "mean_free_path")) == ("dust", pytest.approx(30, rel=0.35))
 
 
-def test_something_that_moves_with_the_lidar_is_a_ghost():
+def test_object_that_moves_with_the_lidar_is_ignored():
     measured = drives.scans()
     ranges = measured.ranges.copy()
     noise = np.random.default_rng(4).normal(0, drives.NOISE_M, (len(ranges), 9))
@@ -115,7 +115,7 @@ def test_a_turned_lidar_is_a_wrong_mount():
     (lambda ranges, times: ranges * 1.05, "scale", "factor", 105.0),
     (lambda ranges, times: ranges + 0.02 * times[:, None], "drift", "range", 2.0),
 ])  # fmt: skip
-def test_systematic_errors_of_ranges_are_told_apart(change, kind, key, value):
+def test_systematic_range_errors_are_distinguished(change, kind, key, value):
     measured = drives.scans()
     changed = drives.with_ranges(measured, change(measured.ranges, measured.times))
     (fault,) = range_error_faults(drives.compared_scans(changed))

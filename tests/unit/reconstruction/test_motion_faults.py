@@ -118,7 +118,7 @@ def test_a_base_that_follows_late_has_a_delay():
     assert (fault.kind, number(fault, "latency")) == ("delay", pytest.approx(310, abs=40))
 
 
-def test_a_base_that_stands_although_it_should_drive_loses_its_commands():
+def test_stationary_base_with_nonzero_commands_loses_commands():
     faults = list(command_faults(with_motion(lambda times: np.where((times > 5) & (times < 7), 0.0, speeds(times)))))
     assert [fault.kind for fault in faults] == ["off"]
     assert faults[0].begin == pytest.approx(4.5, abs=0.2)
@@ -163,7 +163,7 @@ def test_a_speed_that_falls_is_a_low_battery():
     assert [number(fault, key) for key in ("start", "end")] == pytest.approx([0.4, 0.2], abs=0.03)
 
 
-def test_a_belief_that_jumps_and_comes_back_is_a_fault_of_the_localizer():
+def test_temporary_jump_of_the_belief_is_a_localizer_fault():
     plain = drives.drive()
     values = plain.belief.values.copy()
     values[(plain.belief.times >= 4.0) & (plain.belief.times < 6.0), 1] += 0.5

@@ -47,7 +47,7 @@ def test_an_object_that_appears_and_disappears_has_both_times():
     assert thing.disappears == pytest.approx(7.0, abs=0.25)
 
 
-def test_a_person_who_crosses_is_followed_along_the_way():
+def test_crossing_person_is_tracked():
     def walk(time):
         return 5.5, 0.6 + 0.4 * time, 0.0
 

@@ -212,7 +212,7 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
     assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
 
 
-def test_what_the_log_holds_before_the_first_goal_is_left_out(tmp_path):
+def test_log_before_the_first_goal_is_ignored(tmp_path):
     drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)), DriveOptions())
     assert drive.goals[0].sent == 0.0
     assert drive.duration == pytest.approx(drives.DURATION_S, abs=0.2)
@@ -226,7 +226,7 @@ def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
     assert "--topic" in error.value.problems[0].hint
 
 
-def test_a_log_without_scans_says_what_could_not_be_found(tmp_path):
+def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
     without = [said for said in messages() if said.topic != "/scan"]
     bag = logs.write_bag(tmp_path / "bag", without)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())

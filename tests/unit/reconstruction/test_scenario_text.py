@@ -52,7 +52,7 @@ def test_names_with_any_characters_survive(tmp_path):
     assert scenario.spec.goal_names == ["a, b: {c}"]
 
 
-def test_what_is_unknown_stands_at_the_top(tmp_path):
+def test_unknown_values_are_noted_at_the_top(tmp_path):
     _, text = loaded(tmp_path)
     assert text.index("# - the footprint") < text.index("simscen: 1")
 

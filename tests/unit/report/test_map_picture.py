@@ -166,5 +166,5 @@ def test_event_without_a_shape_is_drawn_as_a_default_shape(data):
 @pytest.mark.parametrize(
     ("seconds", "step"), [(0, 1), (3, 1), (10, 1), (11, 2), (31, 5), (94, 10), (101, 20), (450, 50)]
 )
-def test_time_marks_stand_at_round_seconds_and_are_at_most_ten(seconds, step):
+def test_at_most_ten_time_marks_at_round_seconds(seconds, step):
     assert round_time_step(seconds) == step

@@ -100,7 +100,7 @@ def test_quantized_numbers_are_exact_to_half_a_step(step: float) -> None:
     assert np.abs(back[finite] - values[finite]).max() <= step / 2 + 1e-9
 
 
-def test_nonnumeric_values_stay_none() -> None:
+def test_nonnumeric_values_are_none() -> None:
     columns = PackedColumns()
     where = columns.add([1.0, math.nan, 2.0])
     read = Read.__new__(Read)

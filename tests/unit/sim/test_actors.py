@@ -58,7 +58,7 @@ def test_a_cart_pushes_a_crate_along(simulate):
     assert simulation.object_pose("crate").x == pytest.approx(4.4, abs=0.01)
 
 
-def test_a_pushed_crate_comes_to_rest_by_friction(simulate):
+def test_friction_stops_a_pushed_crate(simulate):
     """v²/2µg with the friction of both: 0.6 on the ground's 1.0."""
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), mass=10.0)])
     simulation.push_object("crate", (10.0, 0.0))

@@ -75,7 +75,7 @@ def test_robot_follows_its_plan_at_the_corrected_pose_after_a_jump() -> None:
     assert d.track[-1].y == pytest.approx(0.7, abs=0.03)
 
 
-def test_the_local_costmap_rolls_with_the_robot_and_knows_no_map() -> None:
+def test_local_costmap_rolls_with_the_robot_without_the_map() -> None:
     mapped = Flatland([*CORRIDOR.boxes, (3.0, 0.0, 3.1, 0.3)])
     d = drive(CORRIDOR, START, GOAL, grid=mapped.grid((-0.5, -0.5, 14.5, 2.1))).run(4.0)
     view = costmaps(d).local_costmap.view

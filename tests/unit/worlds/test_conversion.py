@@ -181,7 +181,7 @@ LINE = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))
         (Box((20_000.0, 1.0, 1.0)), "its `box` is not valid: input should be less than or equal to 10000"),
     ],
 )
-def test_a_shape_that_a_world_file_cannot_hold_is_left_out_with_its_reason(shape, reason):
+def test_unsupported_shape_is_omitted_with_a_reason(shape, reason):
     pose = Pose3(z=0.5) if not isinstance(shape, Extrusion) else Pose3()
     solids = (Solid(shape, pose, "plate"), Solid(Box((1, 1, 1)), Pose3(x=5.0, z=0.5), "crate"))
     bodies = (

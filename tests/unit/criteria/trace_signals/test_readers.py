@@ -335,7 +335,7 @@ def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
     assert read_signal("plan_deviation", trace, synthetic_case({}), {}) == pytest.approx(expected, abs=1e-3)
 
 
-def test_events_are_counted_in_whatever_order_they_were_written():
+def test_events_are_counted_in_any_order():
     events = [[1, "recovery.started", "spin"], [2, "recovery.started", "wait"], [3, "recovery.started", "spin"]]
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
     values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), synthetic_case({}), {})

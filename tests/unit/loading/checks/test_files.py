@@ -29,7 +29,7 @@ Write = Callable[[str, str], Path]
         ("a.scenario.yaml", "amcl: {ros__parameters: {alpha1: 0.1}}", "scenario"),
     ],
 )
-def test_a_file_tells_its_kind_by_name_or_keys(write: Write, tmp_path: Path, name: str, text: str, kind: str) -> None:
+def test_kind_of_a_file_is_found_by_name_or_keys(write: Write, tmp_path: Path, name: str, text: str, kind: str) -> None:
     assert file_kind(write(name, text), tmp_path) == kind
 
 

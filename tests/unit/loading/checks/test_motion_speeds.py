@@ -47,7 +47,7 @@ def test_motions_of_the_world_file_are_checked_at_its_line(tmp_path):
     assert [line for line, _ in too_fast(tmp_path, world=f", move: {{{TURN.format(0.004)}}}")] == [7]
 
 
-def test_the_limit_is_a_way_for_each_tick(tmp_path):
+def test_speed_limit_of_scripted_objects_is_a_distance_per_tick(tmp_path):
     event = "move: {name: arm, through: [[6, 4]], speed: 20}"
     assert not too_fast(tmp_path, event=event)
     assert too_fast(tmp_path, event=event, rate=120) == [(13, "make it 1.7 times slower, or raise `physics.tick_rate`")]

@@ -44,7 +44,7 @@ def told(tmp_path: Path, criteria: str, start: float = 1, events: str = "") -> l
         "error_code: {code: FAILED_TO_MAKE_PROGRESS, goal: crate}",
     ],
 )
-def test_a_goal_whose_failure_is_asked_for_may_be_in_the_way(tmp_path, criterion):
+def test_goal_that_is_expected_to_fail_may_be_occupied(tmp_path, criterion):
     assert told(tmp_path, f"{{{criterion}}}") == []
 
 
@@ -60,7 +60,7 @@ def test_a_goal_whose_failure_is_asked_for_may_be_in_the_way(tmp_path, criterion
         "error_code: {code: GOAL_OCCUPIED}, severity: warn}, {collisions: {}",
     ],
 )
-def test_a_goal_whose_failure_is_not_asked_for_may_not(tmp_path, criterion):
+def test_goal_that_is_not_expected_to_fail_must_be_free(tmp_path, criterion):
     canceled = "events: [{when: {time: 1}, do: {cancel_goal: {}}}]" if "CANCELED" in criterion else ""
     assert told(tmp_path, f"{{{criterion}}}", events=canceled) == IN_THE_CRATE
 
@@ -73,7 +73,7 @@ def test_a_bad_start_may_be_asked_for_by_its_code_alone(tmp_path, code):
 
 
 @pytest.mark.parametrize("do", ["{{new_goal: {}}}", "[{{cancel_goal: {{}}}}, {{new_goal: {}}}]"])
-def test_a_goal_that_an_event_sends_is_looked_at_too(tmp_path, do):
+def test_goals_of_events_are_checked(tmp_path, do):
     sent = do.format("{name: detour, pose: {x: 4, y: 4}}")
     events = f"events: [{{when: {{time: 1}}, do: {sent}}}]"
     assert told(tmp_path, "{error_code: {code: NO_VALID_PATH, goal: crate}}", events=events) == [

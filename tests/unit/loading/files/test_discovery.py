@@ -33,7 +33,7 @@ def test_a_folder_is_searched_in_order_and_a_file_may_have_any_name(tmp_path: Pa
     ]  # fmt: skip
 
 
-def test_missing_paths_are_all_told(tmp_path: Path) -> None:
+def test_all_missing_paths_are_reported(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as raised:
         discover([tmp_path / "no", tmp_path, tmp_path / ("x" * 5000)], tmp_path)
     assert [p.message for p in raised.value.problems] == [
@@ -83,13 +83,13 @@ def test_an_archive_without_its_repository_is_known_by_its_project_file(tmp_path
 
 
 @pytest.mark.usefixtures("elsewhere")
-def test_a_folder_called_scenarios_lies_in_its_project(tmp_path: Path) -> None:
+def test_parent_of_a_scenarios_folder_is_the_project(tmp_path: Path) -> None:
     _touch(tmp_path, "p/scenarios/faults/x.yaml", "p/worlds/hall.world.yaml")
     for path in ("p/scenarios/faults/x.yaml", "p/scenarios/faults", "p/scenarios"):
         assert default_root([tmp_path / path]) == tmp_path / "p"
 
 
-def test_the_working_folder_is_the_project_of_what_lies_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_working_folder_is_the_project_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _touch(tmp_path, "p/sim/x.yaml", "p/worlds/hall.world.yaml", "q/x.yaml")
     monkeypatch.chdir(tmp_path / "p")
     assert default_root([Path("sim/x.yaml")]) == tmp_path / "p"
@@ -109,9 +109,7 @@ def test_home_folder_and_its_parents_are_no_project_roots(
     assert default_root([tmp_path / "user/down/x.yaml"]) == tmp_path / "user/down"
 
 
-def test_the_shipped_scenarios_are_valid_wherever_they_are_copied_and_called(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_copied_shipped_scenarios_are_valid_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A Docker image holds them without .git; from there every command ended with SC020 and exit code 2."""
     for name in ("scenarios", "worlds"):
         shutil.copytree(SHIPPED / name, tmp_path / "copy" / name)

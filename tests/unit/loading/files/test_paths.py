@@ -20,7 +20,7 @@ def _refusal(sandbox: PathSandbox, written: str) -> PathProblem:
     return found
 
 
-def test_a_path_is_relative_to_the_file_it_stands_in(sandbox: PathSandbox) -> None:
+def test_path_is_relative_to_the_file_that_contains_it(sandbox: PathSandbox) -> None:
     assert sandbox.find("a.yaml", sandbox.root / "sub") == sandbox.root / "sub/a.yaml"
     assert sandbox.find("../b.yaml", sandbox.root / "sub") == sandbox.root / "b.yaml"
 

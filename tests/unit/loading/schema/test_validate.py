@@ -43,7 +43,7 @@ def test_mistake_in_a_union_member_is_reported_for_that_member() -> None:
     assert _told(ScenarioSpec, text) == [(9, 19, "unknown key `nam` in `events[0].do[1].remove`")]
 
 
-def test_a_type_may_be_left_out_where_there_is_a_default() -> None:
+def test_type_is_optional_if_there_is_a_default() -> None:
     assert _told(ScenarioSpec, SCENARIO + "stack: {controller: {lookahead_dist: 1}}\n") == []
     told = _told(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
     assert told == [(5, 22, "unknown key `sim_time` in `stack.controller`")]

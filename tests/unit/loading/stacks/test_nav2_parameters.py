@@ -128,7 +128,7 @@ def test_missing_forbidden_or_wrong_file_is_reported(tmp_path: Path, named: str,
     assert [(p.code, p.line) for p in wrong.value.problems] == [(code, line)]
 
 
-def test_a_controller_that_is_not_here_leaves_the_usual_one_and_says_so(tmp_path: Path) -> None:
+def test_unknown_controller_is_replaced_by_the_default_with_a_note(tmp_path: Path) -> None:
     params = PARAMS.replace("nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", "mine::Graceful")
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
     assert found.spec.stack.controller.type == "mppi"
@@ -153,7 +153,7 @@ controller_server:
     assert stack.controller.CostCritic.consider_footprint is False
 
 
-def test_each_of_several_robots_may_have_a_file_of_its_own(tmp_path: Path) -> None:
+def test_each_robot_can_have_its_own_file(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(PARAMS)
     file = tmp_path / "two.scenario.yaml"
     file.write_text(

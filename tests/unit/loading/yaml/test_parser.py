@@ -32,7 +32,7 @@ def test_columns_count_characters_not_bytes() -> None:
     assert value_position(_tree("{é机: 1, b: 2}"), ("b",))[1:] == (1, 12)
 
 
-def test_an_empty_value_stands_at_its_key() -> None:
+def test_empty_value_has_the_position_of_its_key() -> None:
     assert value_position(_tree("a:\n  b:\nc: 1\n"), ("a", "b"))[1:] == (2, 3)
 
 
@@ -128,7 +128,7 @@ def test_a_tab_is_named() -> None:
     assert (problem.line, problem.col, problem.message) == (2, 1, "tab character")
 
 
-def test_a_syntax_error_lies_inside_the_file() -> None:
+def test_position_of_a_syntax_error_is_inside_the_file() -> None:
     for text in [
         "a: [1, 2",
         "a: 'x",

@@ -27,7 +27,7 @@ def turned(angle: float, seconds: float, late: int) -> tuple[list[float], list[f
 
 
 @pytest.mark.parametrize(("angle", "late"), [(2.0, 0), (-0.3, 0), (0.004, 0), (-0.3, 1), (0.004, 1)])
-def test_a_base_comes_to_rest_at_the_heading_that_it_turns_to(angle: float, late: int) -> None:
+def test_base_stops_at_its_target_heading(angle: float, late: int) -> None:
     left, rates = turned(angle, 4.0, late)
     assert max(map(abs, rates[-20:])) < 0.01
     assert abs(left[-1]) < 0.01

@@ -46,7 +46,7 @@ def test_a_goal_where_only_the_inscribed_circle_fits_is_moved_to_where_the_hull_
 
 
 @pytest.mark.parametrize("start", [Pose2(8.62, 3.0, 0.0), Pose2(3.0, 0.26, 0.15)])
-def test_a_car_whose_hull_touches_something_is_led_away_from_it(start: Pose2) -> None:
+def test_plan_of_a_car_in_contact_leads_away_from_the_obstacle(start: Pose2) -> None:
     """The nose in a wall, and a flank along one: it was START_OCCUPIED at once."""
     view = hall()
     footprint = Footprint(CAR, view.resolution)

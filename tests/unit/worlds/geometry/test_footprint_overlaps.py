@@ -12,7 +12,7 @@ ROUND = tuple((0.2 * cos(2 * pi * k / 16), 0.2 * sin(2 * pi * k / 16)) for k in 
 
 @pytest.mark.parametrize("ring", [SQUARE, ROUND], ids=["square", "round"])
 @pytest.mark.parametrize("shift", [0, 1, 2, 4])
-def test_polygon_overlaps_itself_whichever_corner_is_first(ring, shift):
+def test_polygon_overlaps_itself_for_any_first_corner(ring, shift):
     assert polygons_overlap(ring, (*ring[shift:], *ring[:shift]))
 
 

@@ -52,7 +52,7 @@ def test_thresholds_are_compared_in_single_precision_and_include_their_own_value
     assert cell_values(spec(free_thresh=1 - 204 / 255))[204] == 0
 
 
-def test_trinary_knows_free_occupied_and_unknown():
+def test_trinary_mode_has_free_occupied_and_unknown_cells():
     table = cell_values(spec())
     assert [int(table[gray]) for gray in (0, 89, 90, 205, 206, 255)] == [100, 100, -1, -1, 0, 0]
     assert [int(v) for v in cell_values(spec(negate=1))[[0, 49, 50, 165, 166, 255]]] == [0, 0, -1, -1, 100, 100]

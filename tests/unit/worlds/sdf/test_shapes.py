@@ -210,7 +210,7 @@ class TestHeightmaps:
     def save(self, folder, pixels, mode="L"):
         Image.fromarray(np.array(pixels, np.uint8 if mode == "L" else np.uint16)).save(folder / "h.png")
 
-    def test_the_brightest_pixel_is_the_full_height_and_the_first_row_lies_north(self, load, tmp_path):
+    def test_white_is_the_maximum_height_and_the_first_row_is_north(self, load, tmp_path):
         self.save(tmp_path, [[0, 50], [0, 0], [100, 0]])
         (solid,) = load(shaped(heightmap())).solids
         assert isinstance(solid.shape, Mesh)
