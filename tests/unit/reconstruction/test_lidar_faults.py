@@ -87,7 +87,7 @@ def test_single_beams_that_end_early_are_dust():
     assert (fault.kind, number(fault, "mean_free_path")) == ("dust", pytest.approx(30, rel=0.35))
 
 
-def test_object_that_moves_with_the_lidar_is_ignored():
+def test_returns_that_move_with_the_lidar_are_a_ghost_fault():
     measured = drives.scans()
     ranges = measured.ranges.copy()
     noise = np.random.default_rng(4).normal(0, drives.NOISE_M, (len(ranges), 9))

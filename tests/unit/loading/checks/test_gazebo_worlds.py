@@ -86,7 +86,7 @@ def test_start_outside_a_world_without_ground_mentions_a_run_without_map(tmp_pat
     assert all("`map: none`" in problem.hint for problem in found)
 
 
-def test_start_on_a_platform_is_an_error_with_the_allowed_area(tmp_path):
+def test_start_on_a_platform_has_a_hint_about_its_height(tmp_path):
     found = errors(load(tmp_path, GROUND + box("tile", 0, (6, 6, 0.1), z=0) + box("wall", 8, (0.2, 6, 1))))
     assert {problem.code for problem in found} == {"SC301"}
     assert all("robots start at z = 0" in problem.hint and "by 0.05 m" in problem.hint for problem in found)
