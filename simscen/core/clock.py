@@ -29,10 +29,7 @@ class Clock:
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:
-        """Return the nearest rate in Hz that has a period of whole ticks.
-
-        The result divides the clock rate, or its period is 1 to 10 whole seconds.
-        """
+        """Return the nearest rate in Hz that divides the clock rate or has a period of 1 to 10 whole seconds."""
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))
 

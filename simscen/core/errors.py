@@ -64,8 +64,8 @@ BROKEN_COMPONENT = "broken-component"
 class RunError(SimscenError):
     """A run could not be completed.
 
-    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, … `tail` is the last output of an
-    external stack. `by_stack` is True if the stack under test is the cause.
+    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, … `tail` is the last output of the
+    process that failed, such as an external stack. `by_stack` is True if the stack under test is the cause.
     """
 
     exit = Exit.INCOMPLETE

@@ -1,4 +1,4 @@
-"""Checks that protect existing files from being overwritten, and a record of the input files that were read."""
+"""Checks of the paths of output files, and a record of the input files that were read."""
 
 import errno
 import os

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action: `what` describes the change, or the reason why nothing `happened`."""
+    """Result of an action: `what` describes the change, or the reason why the requested change has not `happened`.
+
+    If an action was possible only in part, `happened` is False.
+    """
 
     happened: bool
     what: str
@@ -61,7 +64,7 @@ class Situation(Protocol):
         ...
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the newest scan of the lidar `sensor` that the stack received; None if there is none.
+        """Return the tick at which the stack last received a scan of the lidar `sensor`; None if it received none.
 
         If `sensor` is None, scans of all lidars count.
         """
@@ -106,7 +109,7 @@ class Situation(Protocol):
         ...
 
     def object(self, name: str) -> Pose2 | None:
-        """Return the current pose of an object, or None if it does not exist."""
+        """Return the current pose of an object or robot; None if it does not exist."""
         ...
 
 
@@ -122,7 +125,7 @@ class Stage(Situation, Protocol):
         ...
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
-        """Add a pedestrian that walks from the next tick on."""
+        """Add a pedestrian that walks from the next tick on. Replaces a body of the same name."""
         ...
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
@@ -145,7 +148,10 @@ class Stage(Situation, Protocol):
         ...
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path of an object, and the time in s since the path started; None for an object without a path."""
+        """Return the path of a moving object, and the time in s since the path started; None if it follows no path.
+
+        The path of a pedestrian stays at its current pose.
+        """
         ...
 
     def mass(self, name: str) -> float:
@@ -176,11 +182,11 @@ class Stage(Situation, Protocol):
         ...
 
     def send_goal(self, name: str) -> None:
-        """Send the goal with this name to the stack. It preempts the current task."""
+        """Send the goal with this name to the stack. It preempts the current goal."""
         ...
 
     def cancel_goal(self) -> None:
-        """Cancel the current goal as an action client would."""
+        """Cancel the current goal and all later goals, as an action client would."""
         ...
 
     def switch_zone(self, order: ZoneSwitch) -> str:

@@ -118,24 +118,24 @@ class MaskBlocks:
 
 
 def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
-    """Divide a mask into blocks. A block is a run of equal cells in a row that repeats in the following rows."""
+    """Divide a mask into blocks. A block is a strip of equal cells in a row that repeats in the following rows."""
     blocks: list[Block] = []
     first_row: dict[tuple[int, int, int], int] = {}
     for row in range(len(grid.cells) + 1):
         if 0 < row < len(grid.cells) and np.array_equal(grid.cells[row], grid.cells[row - 1]):
             continue
-        runs = _row_runs(grid.cells[row]) if row < len(grid.cells) else []
-        current_runs = set(runs)
-        for run in [run for run in first_row if run not in current_runs]:
-            column, width, value = run
-            blocks.append((column, first_row[run], width, row - first_row.pop(run), value))
-        for run in runs:
-            first_row.setdefault(run, row)
+        strips = _strips(grid.cells[row]) if row < len(grid.cells) else []
+        current_strips = set(strips)
+        for strip in [strip for strip in first_row if strip not in current_strips]:
+            column, width, value = strip
+            blocks.append((column, first_row[strip], width, row - first_row.pop(strip), value))
+        for strip in strips:
+            first_row.setdefault(strip, row)
     return MaskBlocks(float(grid.resolution), grid.origin, tuple(blocks))
 
 
-def _row_runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Return first column, width, and value of each run of equal cells above 0 in a row."""
+def _strips(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
+    """Return first column, width, and value of each strip of equal cells above 0 in a row."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(cells)) + 1, [len(cells)])).tolist()
     return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
 

@@ -50,7 +50,7 @@ class World:
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """World with its `mesh` of all fixed solids, and its `map`: the occupancy grid that robots receive.
+    """World with its `mesh` of all fixed solids, and its `map`: the occupancy grid for robots without their own map.
 
     All runs in a world share these data.
     """
@@ -68,7 +68,7 @@ DISC_CORNERS = 32
 class Patch:
     """Part of the floor with changed friction.
 
-    `friction` is the coefficient for rubber wheels. `until` is the last tick of the change; inf if it never ends.
+    `friction` is the coefficient for rubber wheels. `until` is the tick at which the change ends; inf if it never ends.
     """
 
     outline: Polygon
@@ -99,7 +99,8 @@ class WalkingPedestrian:
 
     `speed` is the preferred speed in m/s. `radius` and `height` of the body are in m. Pedestrians of the same `group`
     stay together. `blind_to` contains the obstacles that the pedestrian ignores. A `behavior` other than regular and
-    impassive is a reaction: it begins within `reacts_within` m of a robot and lasts for `reacts_for` s.
+    impassive is a reaction: it begins within `reacts_within` m of a robot. Except for scared pedestrians, all reactions
+    together last for `reacts_for` s.
     """
 
     name: str

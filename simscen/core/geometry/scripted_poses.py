@@ -21,7 +21,7 @@ class PredictedPoses:
 
     def __init__(self, ticks: range, names: tuple[str, ...], table: Array, all_objects: Mapping[str, Pose3]) -> None:
         self.ticks, self.names, self.table, self.all_objects = ticks, names, table, all_objects
-        self.complete = len(names) == len(all_objects)
+        self.all_objects_move = len(names) == len(all_objects)
         """Whether no object is at rest."""
 
     def at(self, tick: int) -> "PosesAtTick | None":
@@ -43,9 +43,9 @@ class PredictedPoses:
 
     @cached_property
     def all_moved(self) -> list[bool]:
-        """Whether all objects have moved since the previous tick, for each of `ticks`."""
+        """Whether all objects have moved since the previous tick, for each of `ticks`; False for the first one."""
         moved = (self.table[1:] != self.table[:-1]).any(axis=2).all(axis=1)
-        return [False, *(moved & self.complete).tolist()]
+        return [False, *(moved & self.all_objects_move).tolist()]
 
 
 class PosesAtTick(Mapping[str, Pose3]):

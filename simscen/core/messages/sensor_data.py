@@ -98,7 +98,7 @@ class Imu:
 
 @fast_dataclass()
 class Bump:
-    """Reading of a bumper: `pressed` is True while the robot touches something."""
+    """Reading of a bumper, which is `pressed` if the robot touches something."""
 
     sensor: str
     tick: int

@@ -62,17 +62,18 @@ class Case:
     Attributes:
         start: Start pose of the robot.
         goals: Goals of the scenario, in order.
-        shortest: Length in m of the shortest path to each goal from the previous goal or the start, by goal name; inf
-            if there is no path. It is the path of a disc of radius `inscribed_radius` in the static world.
+        shortest: Length in m of the shortest path to each goal from the previous goal that is not in `expected`, or
+            from the start, by goal name; inf if there is no path. It is the path of a disc of radius
+            `inscribed_radius` in the static world.
         regions: Regions of the world by name.
         footprint: Footprint of the robot in the base frame; empty if unknown.
         inscribed_radius: Radius in m of the largest circle around the base that fits in the footprint.
         time_limit: Maximum simulated time of the run in s.
         clearance_range: Measuring range of the clearance in m. Larger clearances are recorded as this value.
-        disturbances: The events of the scenario, followed by its faults.
+        disturbances: The events of the scenario, each followed by the steps of its sequence (`then`), and its faults.
         sent: Goals that events can send during the run.
         passages: Narrow passages on the shortest paths, in driving direction.
-        masks: Filter masks that criteria refer to, by file name.
+        masks: Filter masks that criteria refer to, by the path in the scenario.
         expected: Expected failure of goals, by goal name: "failed" for any failure, or the name of an error code.
     """
 
@@ -128,7 +129,7 @@ class Run:
 
     @property
     def passed(self) -> bool:
-        """Whether all criteria passed; False for a run that could not be completed."""
+        """Whether the outcome is "passed". Criteria with `severity: warn` may have failed."""
         return self.result.outcome is Outcome.PASSED
 
     @property

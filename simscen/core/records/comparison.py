@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OutcomeCounts:
-    """Number of runs by outcome."""
+    """Number of runs by outcome, as if no failure were expected."""
 
     passed: int = 0
     failed: int = 0
@@ -22,8 +22,8 @@ class OutcomeCounts:
 class Flip:
     """Scenario and seed for which only one of two stacks or sessions passed.
 
-    `passed` and `failed` are the names of the stack or session that passed and that failed. `why` is the criterion that
-    failed.
+    `passed` and `failed` are the names of the stack or session that passed and that failed. `why` describes the first
+    violation of the run that failed.
     """
 
     scenario: str

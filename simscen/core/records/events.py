@@ -10,37 +10,37 @@ Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
 
 
 class EventKind(str, Enum):
-    """Kinds of recorded events. The comment beside a kind describes its `Event.name`, then its `Event.data`."""
+    """Kinds of recorded events. The comment beside a kind describes `Event.name` ("" if empty), then `Event.data`."""
 
-    GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
+    GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw, index
     GOAL_REACHED = "goal.reached"  # goal; index
     GOAL_PASSED = "goal.passed"  # goal that is passed without a stop; index
     GOAL_FAILED = "goal.failed"  # goal; index, error_code, error_name, message
     GOAL_CANCELED = "goal.canceled"  # goal; index, preempted_by
     NAVIGATION_ENDED = "navigation.ended"  # result; error_code, error_name
-    PLAN_MADE = "plan.made"  # goal; reason (goal, blocked, …), length
-    PLAN_FAILED = "plan.failed"  # error_code, error_name, message
-    RECOVERY_STARTED = "recovery.started"  # behavior: clear_costmap, spin, wait, …; error_code, error_name
+    PLAN_MADE = "plan.made"  # ""; reason (goal, blocked, …), length
+    PLAN_FAILED = "plan.failed"  # ""; error_code, error_name, message
+    RECOVERY_STARTED = "recovery.started"  # behavior: clear_costmap, spin, wait, …; error_code, error_name, message
     RECOVERY_ENDED = "recovery.ended"  # behavior; outcome
     ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
     ROBOT_RELEASED = "robot.released"  # what it waited for
-    COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_part
-    COLLISION_ENDED = "collision.ended"  # what was hit
-    FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; entry (number of the fault, from 0), sensor, fault
+    COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_caused, …
+    COLLISION_ENDED = "collision.ended"  # what was hit; impulse (N s), ticks (duration)
+    FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; entry (number of the fault, from 0), sensor, fault, …
     FAULT_TOOK_EFFECT = "fault.took_effect"  # label, at the first message or command it changed; entry
     FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
     EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
     EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
-    OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, parts (outlines in its own frame), person
+    OBJECT_SPAWNED = "object.spawned"  # object; its pose, mass, shape, parts (outlines in its own frame), person, …
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
     OBJECT_PLACED = "object.placed"  # object; x, y, yaw; its script has ended
-    OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), duration in seconds
+    OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), seconds (duration; absent for one tick)
     PEDESTRIAN_REACHED = "pedestrian.reached"  # pedestrian; goal (its number, from 1)
     PEDESTRIAN_REACTED = "pedestrian.reacted"  # pedestrian; behavior, robot ("" for a single one)
     PEDESTRIAN_CALMED = "pedestrian.calmed"  # pedestrian; behavior, robot: the reaction is over
-    ROBOT_PLACED = "robot.placed"  # x, y, yaw
-    ROBOT_PUSHED = "robot.pushed"  # impulse (N s), duration in seconds unless it is instantaneous
+    ROBOT_PLACED = "robot.placed"  # ""; x, y, yaw
+    ROBOT_PUSHED = "robot.pushed"  # ""; impulse (N s), seconds (duration; absent for one tick)
     ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
     FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent if permanent)
     MARK = "mark"  # the mark; note
@@ -89,9 +89,9 @@ class Disturbance:
 class DisturbanceOutcome:
     """Outcome of a disturbance.
 
-    `fired` contains the ticks at which the trigger fired. `happened` is True if the disturbance took effect. `effect`
-    describes the change, or the reason for no change. `tick` is the tick of the first change, or of the first attempt
-    if nothing changed; None without an attempt.
+    `fired` contains the ticks at which the trigger fired. `happened` is True if the fault, or each action of the event,
+    took effect at least once. `effect` describes the change, or the reason why it did not happen. `tick` is the tick of
+    the first change, or of the first attempt if the disturbance did not happen; None without an attempt.
     """
 
     disturbance: Disturbance

@@ -92,8 +92,8 @@ class RunFailure:
     """Reason why a run could not be completed.
 
     `kind` is the error type in JUnit, such as crashed, timeout, out-of-memory, invalid, interrupted, not-run, or
-    internal. `tail` is the last output of the worker process. `by_stack` is True if the stack under test crashed, did
-    not answer, or gave an invalid answer.
+    internal. `tail` is the last output of the external stack or of the worker process. `by_stack` is True if the stack
+    under test crashed, did not answer, or gave an invalid answer.
     """
 
     kind: str
@@ -108,7 +108,8 @@ class RunResult:
 
     Attributes:
         path: Scenario file relative to the root, the folder that contains all files of a scenario.
-        verdicts: Verdicts of required disturbances that did not take place, then the verdicts of the criteria.
+        verdicts: Verdicts of required disturbances that did not take place, then the verdicts of the criteria, then the
+            verdict on the expected failure if the run does not meet it.
         lines: Line of each verdict in the scenario file, in the same order; 0 if unknown. Empty if all are unknown.
         metrics: Value of each metric; None if the metric is undefined for the run.
         undefined: Reason for each metric that is None.

@@ -27,7 +27,7 @@ class ClaimResult:
     Attributes:
         method: Statistical method that decides the claim.
         min_rate: Claimed minimum of the pass rate.
-        confidence: Minimum probability, for example 0.95, that a decision for the claim is right.
+        confidence: Minimum probability that a robot with a lower pass rate than `min_rate` is not accepted.
         max_runs: Maximum number of runs.
         status: Decision on the claim.
         passed: Number of runs that passed, out of `runs`.
@@ -57,7 +57,7 @@ class RateRow:
     """Pass rate of the runs in which a parameter has one value or lies in one range of values.
 
     `path` is the YAML path of the parameter. `value` is the value or range as text. `limits` is the 95 % confidence
-    interval; None if the values are not random.
+    interval; None if the values are not random, or if the outcomes determine the number of runs.
     """
 
     path: str

@@ -58,7 +58,10 @@ class LogLine(NamedTuple):
 
 
 class CostGrid(NamedTuple):
-    """Published costmap: `name` is "global" or "local", and `grid` contains the costs as 0 … 100, or -1 if unknown."""
+    """Published costmap: `name` is "global" or "local", and `grid` contains the costs as 0 … 100, or -1 if unknown.
+
+    `frame` is the frame of the grid: map or odom.
+    """
 
     name: str
     frame: str
@@ -106,7 +109,7 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Recording of a whole run. The tick of a sample is the beat at which it was received.
+    """Recording of one robot in a whole run. The tick of a sample is the beat at which it was recorded.
 
     Attributes:
         tick_rate: Ticks per second.
