@@ -38,7 +38,7 @@ class Criterion(ABC):
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound that was checked; an empty list means that nothing was checked."""
+        """Return one finding for each bound that was checked; at least one, because an empty list is an error."""
 
 
 class Measure(ABC):
@@ -57,7 +57,7 @@ class Measure(ABC):
 
     @abstractmethod
     def measure(self, trace: Trace, case: Case) -> float | str:
-        """Return the finite value in SI units, or as text the reason why the run has no value."""
+        """Return the value in SI units, which must be finite; or a text that states why the run has no value."""
 
 
 class AnyMeasure(Choice):

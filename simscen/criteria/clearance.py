@@ -78,7 +78,7 @@ class PersonalSpace(Spec, Criterion):
         the border of Hall's intimate space.
     Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, with the gap between surfaces.
 
-    Inconclusive if the run had no pedestrians.
+    Inconclusive if the run had no pedestrians, or with `while_driving`, none while the robot drove.
 
     Example: `personal_space: {min: 0.3 m, while_driving: true}`
     """

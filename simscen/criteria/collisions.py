@@ -111,7 +111,10 @@ def _impulse(hit: Event) -> float:
 
 
 def _is_caused_by_robot(trace: Trace, hit: Event, case: Case) -> bool:
-    """Return whether any point of the robot moved faster than MOVING_SPEED_M_S within LOOKBACK_S before the contact."""
+    """Return whether a point of the robot may have exceeded MOVING_SPEED_M_S within LOOKBACK_S before a contact.
+
+    Speed plus turn rate times radius is an upper bound on the speed of all points. Raises MissingEvidence.
+    """
     radius = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):

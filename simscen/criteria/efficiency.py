@@ -188,7 +188,7 @@ def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
 
 
 def _judge_length(trace: Trace, path: DrivenPath, what: str, limit: float, context: str = "") -> Finding:
-    """Return the finding for the length of a path. The tick is the first one at which the limit was exceeded."""
+    """Return the finding for the length of a path, at the first tick above the limit, or else at the last tick."""
     decisive = int(np.argmax(path.travelled > limit)) if path.length > limit else len(path.ticks) - 1
     at = (trace, int(path.ticks[decisive])) if len(path.ticks) else None
     return at_most(what, path.length, limit, "m", at=at, context=context)

@@ -98,12 +98,12 @@ def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = 
 def missed(
     what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
 ) -> Finding:
-    """Return a failed finding without numbers."""
+    """Return a failed finding with text alone: without margin and value."""
     return Finding(Status.FAIL, what, measured, limit, None, "", None, *_tick_and_place(at), detail=tuple(detail))
 
 
 def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
-    """Return a passed finding without numbers."""
+    """Return a passed finding with text alone: without margin and value."""
     return Finding(Status.PASS, what, measured, limit, None, "", None, *_tick_and_place(at))
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class GoalsReached(Spec, Criterion):
     """Every goal was reached: the robot reported the goal as reached, and its true pose was then at the goal.
 
-    A goal with `expect` must fail with the expected error code instead. With navigate_through_poses, the robot must
-    pass close to the poses, with any heading. At a goal with `on_reached: {wait: …}`, it must stay for this time.
+    A goal with `expect` must fail as expected instead. With navigate_through_poses, the robot must pass close to the
+    poses, with any heading. After a goal with `on_reached: {wait: …}`, it must wait this long before the next goal.
 
     Goals that events send must be reached as well. A preempted goal need not be reached. If `goals` names a preempted
     goal, the result is inconclusive.
@@ -49,8 +49,8 @@ class GoalsReached(Spec, Criterion):
     """
 
     goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
-    """Names of the goals to check; default: all goals, including those of events. `shelf` is checked in every loop,
-    `shelf#2` only in the second loop."""
+    """Names of the goals to check; default: all goals, including goals that events send. `shelf` is checked in every
+    loop, `shelf#2` only in the second loop."""
     tolerance: PositiveLength | None = None
     """Maximum distance of the true position; default: the goal's own tolerance plus `localization_margin`."""
     yaw_tolerance: PositiveAngle | None = None

@@ -43,7 +43,7 @@ class Keepout(Spec, Criterion):
     Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
 
-    Inconclusive if no cell of the mask is occupied, or with `while_on`, if the zone was never enabled.
+    Inconclusive if no cell of the mask is occupied. With `while_on`, also inconclusive if no event switched the zone.
 
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """

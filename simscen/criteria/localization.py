@@ -130,7 +130,7 @@ class RelocalizedWithin(Spec, Criterion):
     time: PositiveDuration
     """Maximum time in seconds."""
     after: DisturbanceName | None = None
-    """Name of the event or fault that makes the robot lost; default: the robot is lost from the start of the run."""
+    """Name of the event or fault that makes the robot lost; default: measure from the start of the run."""
     tolerance: PositiveLength = 0.25
     """Maximum position error."""
     yaw_tolerance: PositiveAngle = 0.25

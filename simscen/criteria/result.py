@@ -92,13 +92,13 @@ class ErrorCodeIs(Spec, Criterion):
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
-    """Return the last event of these kinds for the goal `name`, or for any goal; None if there is none."""
+    """Return the last event of these kinds for the goal `name` (None for any name); None if there is no such event."""
     events = [event for event in trace.of_kind(*kinds) if matches_goal_name(event.name, name)]
     return events[-1] if events else None
 
 
 def _compare(trace: Trace, end: Event, what: str, reported: str, expected: str) -> Finding:
-    """Return a finding that passes if the event `end` reports the expected text."""
+    """Return a finding that passes if `reported`, a text from the event `end`, is the expected text."""
     if reported == expected:
         return held(what, reported, expected, (trace, end.tick))
     message = end.data.get("message")
@@ -119,8 +119,9 @@ def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
 class NoFalseSuccess(Spec, Criterion):
     """The robot did not report a false success. A reported failure is allowed.
 
-    What is measured: the true distance to each goal when the robot reports it as reached. When the robot reports that
-        navigation SUCCEEDED, also whether every goal was reached, except preempted goals.
+    What is measured: the true distance to each goal when the robot reports the goal as reached. When the robot reports
+        that navigation SUCCEEDED, also whether every goal was reached, except goals that were preempted or are expected
+        to fail.
     When it fails: the robot was farther than `tolerance` from a goal that it reported as reached, or it reported
         SUCCEEDED although a goal was not reached.
     Why this: a failed delivery is repeated, but a false success remains unnoticed. Arena, for example, reports
@@ -139,7 +140,7 @@ class NoFalseSuccess(Spec, Criterion):
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each goal that was reported as reached, and one for each false report of SUCCEEDED."""
+        """Return findings for all goals that were reported as reached, and for all false reports of SUCCEEDED."""
         outcomes = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         unknown = [

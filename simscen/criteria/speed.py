@@ -35,7 +35,7 @@ class Speed(Spec, Criterion):
     Source: ScenarioRunner's MaxVelocityTest.
 
     Inconclusive if the robot was never in the region, or never in limited cells of the mask for longer than twice the
-    `grace`.
+    `grace`. With `while_on`, also inconclusive if no event switched the zone.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -59,7 +59,7 @@ class Speed(Spec, Criterion):
     """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
     """Time for slowing down after the robot enters cells of the mask with a lower limit, or after a zone is enabled. It
-    may also accelerate this long before it leaves such cells. There is no such time in the region `in`."""
+    may also accelerate this long before it leaves such cells. Entering the region `in` gives the robot no such time."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> Speed:

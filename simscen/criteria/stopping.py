@@ -83,7 +83,7 @@ class StoppedWithin(Spec, Criterion):
         return f"≤ {self.time:.2f} s after {self.after}"
 
     def _standing_samples(self, trace: Trace) -> Flags:
-        """Return a mask (n,) of the samples of the truth at which the robot is slow enough to stand."""
+        """Return a mask (n,) of the samples of the velocity at which the robot is slow enough to stand."""
         slow = speed(trace).values[:, 0] <= self.speed
         steady = turn_rate(trace).values[:, 0] <= self.turn_rate
         return slow & steady
@@ -120,7 +120,7 @@ class StoppedWithin(Spec, Criterion):
 
 
 def _stood_before(trace: Trace, is_standing: Flags, tick: int) -> bool:
-    """Return whether the robot stood at the last sample before `tick`."""
+    """Return whether the robot stood at the last sample before `tick`, or else at the first sample."""
     return bool(is_standing[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 

@@ -34,9 +34,9 @@ class Span:
 
 
 def spans(trace: Trace, label: str) -> list[Span]:
-    """Return the intervals in which the faults, events, or marks with this label were active, in order of start.
+    """Return the intervals in which faults, events, or marks (of the action `mark`) with this label were active.
 
-    An interval without an end, or with an end at its start, lasts to the end of the run.
+    They are sorted by start. An interval without an end, or with an end at its start, lasts to the end of the run.
     """
     starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
     ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
@@ -75,8 +75,8 @@ def has_ended(trace: Trace) -> bool:
 def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) -> list[tuple[int, int]]:
     """Return the intervals (first tick, last tick) in which a zone of the costmap filter `what` was enabled.
 
-    `region` is the region of the zone; None for the mask of the filter. Intervals begin `grace` seconds after the zone
-    was enabled. The list is empty if no event switched the zone.
+    `region` is the region of the zone; None for the mask of the filter. Intervals begin `grace` seconds after an
+    event enabled the zone, or at tick 0 if the first event disabled it. The list is empty if no event switched it.
     """
     switches = [e for e in trace.of_kind(EventKind.ZONE_SWITCHED) if (e.name, e.data["filter"]) == (region or "", what)]
     if not switches:
@@ -105,10 +105,10 @@ def clip_samples(samples: Samples, first: int, last: int) -> Samples:
 
 
 def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
-    """Return the first tick from which a state is true for at least `hold` ticks, and True.
+    """Return (tick, True) for the first tick from which a state is true for at least `hold` ticks.
 
     `is_true` contains the state at each of the `ticks`; the last state lasts until the tick `end`. If the state is
-    never true that long, return False, with the start of the period that lasts until `end`, or None without one.
+    never true that long, return (start, False) for a shorter period that lasts until `end`, or else (None, False).
     """
     begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
     breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))

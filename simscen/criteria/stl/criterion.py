@@ -119,7 +119,7 @@ def _detail_lines(trace: Trace, formula: str, witness: Witness) -> tuple[str, ..
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the common unit of the compared signals; "" if all have a `scale`, None if their units differ."""
+    """Return the unit of all compared numeric signals; "" if all have a `scale`, None without a common unit."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""

@@ -51,7 +51,7 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Return the distance (n, 1) in m from the robot to the nearest surface; inf if there is no surface.
+    """Return the distance (n, 1) in m from the robot to the nearest surface; inf if no surface is in range.
 
     Raises InvalidTrace if a value is nan or -inf.
     """

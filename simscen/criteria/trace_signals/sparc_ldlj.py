@@ -28,7 +28,7 @@ PADDING_LEVEL = 4
 def sparc(speeds: Array, rate: float) -> float | None:
     """Return the spectral arc length of `speeds` (n,) in m/s, sampled at `rate` Hz: 0 is smooth, lower is less smooth.
 
-    Return None for a robot that never moved.
+    Return None for a robot that never moved, or if there are too few samples.
     """
     if len(speeds) < 2 or not np.any(speeds):
         return None
