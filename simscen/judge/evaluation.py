@@ -28,9 +28,10 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    `coverage` states which evidence the log contains, and for which part of the run. A criterion that raises an
-    exception gets the verdict error. A verdict is inconclusive if the log lacks required evidence. A pass becomes
-    inconclusive if the log is truncated or empty, or if the evidence covers only a part of the run.
+    `coverage` states which evidence the log contains, and for which part of the run. A verdict is inconclusive
+    if the log lacks required evidence, or if the criterion raises MissingEvidence. Any other exception gives the
+    verdict error. A pass becomes inconclusive if the log is truncated or empty, or if the evidence covers only a part
+    of the run.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -39,7 +40,7 @@ def judge(
 
 
 def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
-    """Return the evidence (kinds of recorded information) that a criterion needs; all kinds if it declares none."""
+    """Return the evidence (kinds of recorded information) that a criterion needs; all kinds if its evidence is None."""
     own = getattr(entry.chosen, "evidence", None)
     return frozenset(Evidence) if own is None else frozenset(own)
 

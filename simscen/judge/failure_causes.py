@@ -1,7 +1,7 @@
 """Search for likely causes of failed findings in the trace of the run. Causes are added to findings as lines of text.
 
 Lines with "why" state a cause that follows from geometry or physics, such as an object that blocks the path. Lines with
-"meanwhile" list faults and events that were active at the time of the failure.
+"meanwhile" list faults and events at or shortly before the time of the failure.
 """
 
 import math
@@ -25,7 +25,7 @@ MAX_LINES = 6
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
-    """Return the verdicts, with lines about likely causes inserted before the other details of each failed finding."""
+    """Return the verdicts. Failed findings with a tick have lines about likely causes before their other details."""
     return tuple(
         replace(
             verdict, findings=tuple(_with_causes(verdict.criterion, each, trace, case) for each in verdict.findings)
@@ -121,7 +121,7 @@ def diagnose_collision(trace: Trace, tick: int) -> Diagnosis:
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
-    """Return a sentence on how an object came into contact with the robot; "" for an object that never moved."""
+    """Return a sentence on how an object came into contact with the robot; "" if it stands and no event changed it."""
     ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
     if touched.event:
@@ -155,7 +155,7 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
 """Kinds of faults that leave an error in the odometry after their end."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
-"""Kinds of targets of these faults."""
+"""Kinds of targets at which these faults falsify the odometry."""
 LOST_DISTANCE_M = 0.5
 """Localization error from which a robot counts as lost."""
 

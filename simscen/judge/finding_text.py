@@ -1,4 +1,4 @@
-"""Texts of findings and disturbances for reports, and relative margins (distances of values from their limits)."""
+"""Texts of findings and disturbances for reports, and relative margins (margins divided by limits)."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -69,14 +69,14 @@ def disturbance_line(outcome: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the findings of a verdict that did not pass, in order."""
+    """Return the failed, inconclusive, and invalid findings of a verdict, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
     """Return the smallest relative margin of a pass, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Values without a unit, the distance from a goal, and the waiting time at a goal are left out.
+    Values without a unit, and the distance, heading error, and waiting time at goals are left out.
     """
     # Robots always stop near the limit of the distance from a goal.
     tightest = _tightest_finding(verdicts)
@@ -90,7 +90,8 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 def run_margin(result: RunResult) -> float:
     """Return the smallest relative margin of a run: at least 0 for a passed run, otherwise negative and at least -1.
 
-    If no finding has a margin, return 1 for a passed run, otherwise -1.
+    If no finding has a margin, return 1 for a passed run, otherwise -1. For a passed run, the findings that
+    `tightest_margin` leaves out do not count.
     """
     if result.outcome is Outcome.PASSED:
         tightest = _tightest_finding(result.verdicts)
@@ -108,7 +109,7 @@ def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | 
 
 
 def _is_about_arrival(verdict: Verdict, finding: Finding) -> bool:
-    """Return whether the finding is on the distance from a goal or on the waiting time there."""
+    """Return whether the finding is on the distance or heading error at a goal, or on the waiting time there."""
     return verdict.criterion == GOALS_REACHED and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 

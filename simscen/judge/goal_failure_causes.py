@@ -17,7 +17,7 @@ from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 
 Diagnosis = tuple[list[str], set[str]]
-"""Sentences on causes, and names of the disturbances that they mention ("" for an object that no event moved)."""
+"""Sentences on causes, and names of the disturbances that they mention ("" for an object that no event changed)."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ NEAR_ROBOT_M = 0.3
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
-    """Return why the robot has not reached its current goal at `tick`. Without a current goal, nothing is returned."""
+    """Return why the robot has not reached its current goal at `tick`; an empty diagnosis without a current goal."""
     outcome = _current_goal(trace, case, tick)
     if outcome is None:
         return [], set()
@@ -154,7 +154,7 @@ def _unreachable_goal(case: Case, goal: Goal) -> list[str]:
 
 
 def _robot_hold(trace: Trace, tick: int) -> list[str]:
-    """Return a sentence with the reported reason if the stack holds the robot at `tick`."""
+    """Return a sentence with the reported reason if a part of the stack, such as a monitor, has stopped the robot."""
     last = [
         event
         for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)

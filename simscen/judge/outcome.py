@@ -32,9 +32,9 @@ def apply_expectation(
     If nothing is expected, if `outcome` is an error, or if the log is not complete, `outcome` remains unchanged and
     there is no verdict.
 
-    As with pytest's `xfail(strict=True)`, the run fails if no criterion fails. If the expectation lists criteria, the
-    run also fails if one of them passes or if another criterion does not pass. A missing disturbance is only expected
-    if its name is listed.
+    As with pytest's `xfail(strict=True)`, the outcome is FAILED_AS_EXPECTED if a criterion fails, otherwise FAILED. If
+    the expectation lists criteria, it is also FAILED if one of them passes or if another criterion does not pass. A
+    missing disturbance is only expected if its name is listed.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None

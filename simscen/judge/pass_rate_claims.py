@@ -13,7 +13,7 @@ from simscen.model.acceptance import PassRate
 
 
 def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult:
-    """Return the result of a claim after runs in the order of their seeds.
+    """Return the result of a claim. `results` are in the order of their seeds.
 
     A sequential test ends at the first run that decides the claim; later runs do not count. A crash or timeout of the
     stack under test counts as a failed run. Other errors block the claim.

@@ -43,8 +43,8 @@ def judge_run(
     """
     coverage = coverage.with_gaps(time_gaps(trace))
     verdicts = explain_failures(judge(criteria, trace, case, coverage), trace, case)
-    happened = disturbance_outcomes(trace, case)
-    missing = missing_disturbances(trace, happened, verdicts)
+    disturbances = disturbance_outcomes(trace, case)
+    missing = missing_disturbances(trace, disturbances, verdicts)
     lines = (*(line for _, line in missing), *lines) if lines else ()
     verdicts = (*(verdict for verdict, _ in missing), *verdicts)
     outcome, expectation = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), has_ended(trace))
@@ -67,7 +67,7 @@ def judge_run(
         metrics=computed.values,
         undefined=computed.undefined,
         events=dict(sorted(Counter(str(event.kind) for event in trace.events).items())),
-        disturbances=happened,
+        disturbances=disturbances,
         ended=end_reason(trace),
         simulated=trace.seconds(trace.end),
         tick_rate=trace.tick_rate,

@@ -197,7 +197,8 @@ def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, flo
     """Return the effect of a parameter on a margin, its p-value, and whether the values are numbers.
 
     For numbers, the effect is Spearman's rank correlation. For other values, it is epsilon squared of the
-    Kruskal-Wallis test. Returns None if there are too few runs, or if all values or all margins are equal.
+    Kruskal-Wallis test. Returns None if there are too few runs, if all values or all margins are equal, or if values
+    that are not numbers have at most two runs each on average.
     """
     texts = [value_text(value) for value in values]
     if len(margins) < MIN_RUNS_FOR_EFFECTS or len(set(texts)) < 2 or len(set(margins)) < 2:

@@ -47,7 +47,7 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
 def compare_sessions(
     sessions: Mapping[str, Sequence[RunResult]], folders: Mapping[str, str], significance: Significance
 ) -> Comparison:
-    """Compare the runs of two sessions with the same stack. The first session is the baseline.
+    """Compare runs of two sessions that have the same scenario, seed, and stack. The first session is the baseline.
 
     `sessions` are the results and `folders` the output folders, by name of the session.
     """
@@ -67,6 +67,7 @@ def labeled_key(key: RunKey, session: str) -> RunKey:
 
 
 def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significance: Significance) -> Comparison:
+    """Compare the first of the `stacks` with each other one. `stacks` are the given values or folders by stack name."""
     runs = {one.key: one for one in results if not one.key.is_repetition and one.outcome is not Outcome.SKIPPED}
     baseline, *others = stacks
     return Comparison(
@@ -105,7 +106,7 @@ def _compare_with_baseline(
         {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
         for name in (baseline, other)
     )
-    pairs = [(first[case], second[case]) for case in first if case in second]
+    pairs = [(first[test_and_seed], second[test_and_seed]) for test_and_seed in first if test_and_seed in second]
     completed = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
     same_arrival = [(one, two) for one, two in completed if _arrived(one) == _arrived(two)]
     flips = tuple(flip for pair in completed if (flip := _flip(pair)))
@@ -139,7 +140,7 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
     """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric by scenario.
 
-    `completed` are the pairs without errors, and `same_arrival` those in which the same robots reach their last goals.
+    `completed` are the pairs without errors. In the pairs `same_arrival`, the same robots reach their last goals.
     """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:

@@ -34,19 +34,19 @@ STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 BARN_OPTIMAL_SPEED_M_S = 2.0
 """Mean speed of a robot that needs the optimal time of the BARN score."""
 
-ZONES = {
+PERSON_SPACES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Hall's zones around a person: smallest and largest distance in m."""
+"""Hall's spaces around a person: smallest and largest distance in m."""
 
 _SHORTEST_PATH_METRICS = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION_METRICS = ("success", "path_length", "time_to_goal", *_SHORTEST_PATH_METRICS)
 _SMOOTHNESS_METRICS = ("sparc", "ldlj")
 _MOTION_METRICS = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS_METRICS)
 _CLEARANCE_METRICS = ("min_clearance", "mean_clearance")
-_PEOPLE_METRICS = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
+_PEOPLE_METRICS = ("min_person_distance", *(f"intrusion_{space}" for space in PERSON_SPACES))
 _EVENT_METRICS = ("collisions", "contact_time", "replans", "recoveries")
 """Names of metrics that are computed together."""
 
@@ -62,7 +62,8 @@ class MetricValues:
 def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
     """Return all metrics of the catalog.
 
-    A metric is undefined if the log lacks the evidence for a part of the run, or if one of its signals is not finite.
+    A metric is undefined if the log lacks the evidence for a part of the run, if one of its signals is not finite, or
+    if the metric does not apply to the run.
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
@@ -212,11 +213,11 @@ def _event_metrics(trace: Trace) -> Values:
 
 
 def person_metrics(trace: Trace, case: Case) -> Values:
-    """Return the smallest gap to a pedestrian in m, and the share of the run in each of the ZONES."""
+    """Return the smallest gap to a pedestrian in m, and the share of the run in each of the PERSON_SPACES."""
     gaps = pedestrian_gap(trace, case)
     durations = np.diff(np.append(trace.truth.ticks, trace.end))
     total = max(int(durations.sum()), 1)
-    shares = [float(durations[(low <= gaps) & (gaps < high)].sum()) / total for low, high in ZONES.values()]
+    shares = [float(durations[(low <= gaps) & (gaps < high)].sum()) / total for low, high in PERSON_SPACES.values()]
     nearest = float(gaps.min())
     least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was present at any sample of the truth"
     return dict(zip(_PEOPLE_METRICS, (least, *shares), strict=True))

@@ -94,7 +94,7 @@ def _resample(segment: Array) -> Array:
 
 
 RPE_DELTA_M = 1.0
-"""Driven distance between the two poses of a relative pose error (RPE)."""
+"""Minimum driven distance between the two poses of a relative pose error (RPE)."""
 
 _STATISTICS = ("rmse", "mean", "median", "max")
 NO_BELIEF = "the robot never reported an estimated pose"
@@ -127,7 +127,7 @@ def _error_statistics(name: str, errors: Array) -> Values:
 def _relative_errors(trace: Trace) -> Values:
     """Return the RPE metrics: statistics of (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with true poses Q and estimated poses P.
 
-    Between the samples i and j, the robot drove RPE_DELTA_M.
+    Between the samples i and j, the robot drove at least RPE_DELTA_M.
     """
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
@@ -146,7 +146,7 @@ def _relative_errors(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return the first and the second index of pairs of samples between which the robot drove RPE_DELTA_M.
+    """Return the first and the second index of pairs of samples between which the robot drove at least RPE_DELTA_M.
 
     `steps` are the distances in m between consecutive samples.
     """
