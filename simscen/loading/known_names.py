@@ -20,7 +20,7 @@ KIND_NAMES = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Kinds of named things, as in messages. Actions can move a "movable". A "mover" is a movable or another robot."""
+"""Texts for messages, by kind of named thing. Actions can move a "movable". A "mover" is a movable or another robot."""
 
 Names = Mapping[str, list[str] | None]
 """Valid names by kind of named thing; None for a kind if its names are not known.
@@ -62,7 +62,7 @@ def event_names(loaded: LoadedScenario) -> list[str]:
 
 
 def mark_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the marks (named moments of the run) that events set."""
+    """Return the names of the marks (named times of the run) that events set by the action `mark`."""
     return _distinct(_names_in_actions(loaded, "mark"))
 
 

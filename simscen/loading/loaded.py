@@ -45,6 +45,7 @@ class LoadedWorld:
     """Specification; None for a ROS map or SDF file alone."""
     map: LoadedMap | None = None
     sdf: Path | None = None
+    """SDF file, which is not parsed yet."""
     tree: MappingNode | None = field(default=None, repr=False, compare=False)
     """YAML tree of `spec`."""
 
@@ -58,7 +59,7 @@ class LoadedRobot:
     spec: RobotSpec | None = None
     """Specification; None for a URDF alone."""
     urdf: Path | None = None
-    """URDF or xacro file that the `*.robot.yaml` names."""
+    """URDF or xacro file: the one that the `*.robot.yaml` names, or `path` itself; None without one."""
     bundled: bool = False
     """Whether the robot ships with simscen."""
     tree: MappingNode | None = field(repr=False, default=None)
@@ -82,9 +83,9 @@ class LoadedScenario:
     file: Path
     """Absolute path."""
     root: Path
-    """Folder in which all files of the scenario must lie."""
+    """Folder in which all files of the scenario must lie, except files in `world_path`."""
     world_path: tuple[Path, ...]
-    """Folders of `--world-path`, in which worlds are searched."""
+    """Folders of `--world-path`, in which files are searched that the root does not contain."""
     text: str
     """Content of the file."""
     spec: ScenarioSpec
@@ -132,7 +133,7 @@ class LoadedScenario:
 
     @property
     def robot_views(self) -> Mapping[str, "LoadedScenario"]:
-        """The views by name of the robot; for a scenario of one robot, the scenario itself under `robot_name`."""
+        """The views by name of the robot; for a scenario of one robot, the scenario itself under ""."""
         return self.robots or {self.robot_name: self}
 
     def with_changes(self, **changes: Any) -> "LoadedScenario":

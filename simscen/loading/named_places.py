@@ -49,7 +49,7 @@ def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Plac
 
 def place_references(spec: BaseModel) -> Iterator[Reference]:
     """Yield the references to places in a specification."""
-    return (reference for reference in references(spec) if isinstance(reference.mark, PlaceAllowed))
+    return (reference for reference in references(spec) if isinstance(reference.annotation, PlaceAllowed))
 
 
 def unknown_places(
@@ -62,7 +62,7 @@ def unknown_places(
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:
-            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "keywords", ()))) or empty_hint
+            hint = suggestion(reference.name, (*names, *getattr(reference.annotation, "keywords", ()))) or empty_hint
             message = f"no place of the world is called {quoted(reference.name)}"
             yield Problem(*value_position(tree, reference.keys), code="SC030", message=message, hint=hint)
 
@@ -70,10 +70,10 @@ def unknown_places(
 def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
     """Yield the references to places, with the pose or point that replaces each of them."""
     for reference in place_references(spec):
-        assert isinstance(reference.mark, PlaceAllowed)
+        assert isinstance(reference.annotation, PlaceAllowed)
         yield (
             reference,
-            reference.mark.value_at(places.get(reference.name, PLACEHOLDER_POSE).with_place(reference.name)),
+            reference.annotation.value_at(places.get(reference.name, PLACEHOLDER_POSE).with_place(reference.name)),
         )
 
 

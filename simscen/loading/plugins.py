@@ -1,4 +1,4 @@
-"""Types of plug-ins that a scenario uses, and types of plug-ins that a log needs but that are not installed.
+"""Search for the plug-in types that a scenario uses, and for plug-in types of a log that are not installed.
 
 A plug-in is an installed package that adds types, such as criteria. A RegisteredType describes a type.
 """

@@ -76,7 +76,7 @@ def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> Mappin
 
 
 def find_roundings(tree: MappingNode, digits: int) -> list[Rounding]:
-    """Return the roundings of all numbers that have more than `digits` significant digits."""
+    """Return the roundings of all numbers with more than `digits` significant digits, except in fixed parts."""
     found = []
     for keys, node in nodes_with_keys(tree):
         if isinstance(node, ScalarNode) and keys[0] not in FIXED_KEYS and keys[:2] not in FIXED_WORLD_PARTS:

@@ -12,16 +12,16 @@ from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name in a specification that refers to a thing. `mark` is the annotation of its field, `keys` lead to it."""
+    """Name in a specification that refers to a thing, the keys that lead to it, and the annotation of its field."""
 
     keys: Keys
-    mark: ReferenceTo
+    annotation: ReferenceTo
     name: str
 
     @property
     def target(self) -> str:
         """The kind of thing that the name refers to, e.g. "door"."""
-        return self.mark.target
+        return self.annotation.target
 
 
 RobotFilter = Callable[[str], bool]
@@ -36,53 +36,58 @@ def references(spec: BaseModel, keys: Keys = (), includes_robot: RobotFilter | N
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
-    for name, key, mark in _fields_with_marks(type(spec)):
+    for name, key, annotation in _fields_with_annotations(type(spec)):
         below = keys if isinstance(spec, RootModel) else (*keys, key)
-        yield from _references_in(getattr(spec, name), mark, below, includes_robot)
+        yield from _references_in(getattr(spec, name), annotation, below, includes_robot)
 
 
 @cache
-def _fields_with_marks(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
+def _fields_with_annotations(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
     """Return the name, the YAML key, and the ReferenceTo annotation of each field; None for a field without one."""
     found = []
     for name, field in model.model_fields.items():
-        marks = [mark for mark in field.metadata if isinstance(mark, ReferenceTo)]
-        found.append((name, field.alias or name, marks[0] if marks else _mark(field.annotation)))
+        annotations = [annotation for annotation in field.metadata if isinstance(annotation, ReferenceTo)]
+        found.append(
+            (name, field.alias or name, annotations[0] if annotations else _reference_annotation(field.annotation))
+        )
     return found
 
 
 def _references_in(
-    value: Any, mark: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
+    value: Any, annotation: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
     """Yield the references in the value of a field with this annotation."""
     if isinstance(value, BaseModel):
         yield from references(value, keys, includes_robot)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _references_in(item, mark, (*keys, index), includes_robot)
+            yield from _references_in(item, annotation, (*keys, index), includes_robot)
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _references_in(item, mark, (*keys, key), includes_robot)
+            yield from _references_in(item, annotation, (*keys, key), includes_robot)
     elif (
-        isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.keywords)
+        isinstance(value, str)
+        and annotation is not None
+        and not (isinstance(annotation, PlaceAllowed) and value in annotation.keywords)
     ):
-        yield Reference(keys, mark, value)
+        yield Reference(keys, annotation, value)
 
 
-def _mark(kind: Any) -> ReferenceTo | None:
+def _reference_annotation(kind: Any) -> ReferenceTo | None:
     """Return the first ReferenceTo annotation in a type, its union members, or its list items; None without one."""
     if get_origin(kind) is Annotated:
-        marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, ReferenceTo)]
-        if marks:
-            return marks[0]
-        return _mark(get_args(kind)[0])
-    return next((found for member in get_args(kind) if (found := _mark(member))), None)
+        annotations = [annotation for annotation in get_args(kind)[1:] if isinstance(annotation, ReferenceTo)]
+        if annotations:
+            return annotations[0]
+        return _reference_annotation(get_args(kind)[0])
+    return next((found for member in get_args(kind) if (found := _reference_annotation(member))), None)
 
 
 def walk(spec: Any, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[tuple[Keys, BaseModel]]:
     """Yield a specification and all specifications in it with their keys. `keys` are the keys of `spec` itself.
 
-    Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.
+    A RootModel itself is not yielded. Parts that name a robot are left out if `includes_robot` is false for it; None
+    includes all parts.
     """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
@@ -115,17 +120,20 @@ def _quantity_fields(model: type[BaseModel], dimension: str) -> list[tuple[str, 
     return [
         (name, field.alias or name)
         for name, field in model.model_fields.items()
-        if any(_has_dimension(mark, dimension) for mark in field.metadata) or _is_quantity(field.annotation, dimension)
+        if any(_has_dimension(annotation, dimension) for annotation in field.metadata)
+        or _is_quantity(field.annotation, dimension)
     ]
 
 
 def _is_quantity(kind: Any, dimension: str) -> bool:
     """Return whether a type, or a member of a union, is a quantity of the dimension."""
     if get_origin(kind) is Annotated:
-        inner, *marks = get_args(kind)
-        return any(_has_dimension(mark, dimension) for mark in marks) or _is_quantity(inner, dimension)
+        inner, *annotations = get_args(kind)
+        return any(_has_dimension(annotation, dimension) for annotation in annotations) or _is_quantity(
+            inner, dimension
+        )
     return any(_is_quantity(member, dimension) for member in get_args(kind))
 
 
-def _has_dimension(mark: Any, dimension: str) -> bool:
-    return isinstance(mark, Quantity) and mark.dimension == dimension
+def _has_dimension(annotation: Any, dimension: str) -> bool:
+    return isinstance(annotation, Quantity) and annotation.dimension == dimension

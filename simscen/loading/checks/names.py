@@ -130,7 +130,7 @@ def reserved_goal_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC033")
 def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find pedestrians with the name of an object of the world or of another pedestrian."""
+    """Find pedestrians that have the same name as an object or another pedestrian."""
     loaded = scope.loaded
     used_names = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
     for step in loaded.spec.steps:

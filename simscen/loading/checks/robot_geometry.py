@@ -64,7 +64,7 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
 
 
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Build a robot, and return the errors and warnings about it."""
+    """Return the errors and warnings about the geometry of a robot, which is built if it has a URDF."""
     robot = file.robot
     try:
         if robot.urdf is not None:

@@ -30,9 +30,9 @@ def check_in_world(
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario in its built world.
 
-    `cache` keeps built worlds for further calls. For a scenario with problems, a picture of the world is written to the
-    folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError for a picture that
-    cannot be written.
+    `cache` keeps built worlds for further calls. If the stages WORLD or TIMING find problems, a picture of the world is
+    written to the folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError for a
+    picture that cannot be written.
     """
     cache = cache or WorldCache()
     world = with_stops_in_bounds(cache.world(loaded), loaded)
@@ -108,9 +108,9 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Check names again that are only known after the world and the robot have been built, and return the problems.
+    """Return the problems of `check_scenario` with names that are only known after world and robot have been built.
 
-    This applies to a world from a ROS map or SDF file, and to a robot from a URDF alone. Return [] in other cases.
+    These are names in a ROS map, an SDF file, or a URDF. Return [] if the scenario has none of these files.
     """
     is_urdf = loaded.robot.path == loaded.robot.urdf
     if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:

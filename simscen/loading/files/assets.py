@@ -53,9 +53,9 @@ class Assets:
             return self.complete_world(world, node, file)
         return self.world(node) if isinstance(node, ScalarNode) else None
 
-    def world(self, written: ScalarNode) -> LoadedWorld | None:
-        """Load the world in the file with the path `written`."""
-        path = self._find_file(str(written.value), written.position)
+    def world(self, node: ScalarNode) -> LoadedWorld | None:
+        """Load the world in the file whose path is the value of `node`."""
+        path = self._find_file(str(node.value), node.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
@@ -94,9 +94,9 @@ class Assets:
         mapping = tree if isinstance(tree, MappingNode) else None
         return LoadedWorld(name, path, spec, loaded_map, sdf, mapping) if len(self.problems) == before else None
 
-    def map(self, written: ScalarNode) -> LoadedMap | None:
-        """Load the ROS map in the YAML file with the path `written`."""
-        path = self._find_file(str(written.value), written.position)
+    def map(self, node: ScalarNode) -> LoadedMap | None:
+        """Load the ROS map in the YAML file whose path is the value of `node`."""
+        path = self._find_file(str(node.value), node.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
@@ -116,7 +116,10 @@ class Assets:
         return None
 
     def robot_file(self, path: Path, is_shipped: bool = False) -> LoadedRobot | None:
-        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file. `is_shipped`: whether it ships with simscen."""
+        """Load the robot in a `*.robot.yaml`, or in a `.urdf` or `.xacro` file, which is parsed later.
+
+        `is_shipped` is True for a robot that ships with simscen.
+        """
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
             text = read_text(path, self.library.sandbox.display_name(path))
@@ -205,7 +208,7 @@ class Assets:
 
 
 def is_ros_map(tree: Node | None) -> bool:
-    """Return whether a YAML file is a ROS map, a file of map_server."""
+    """Return whether a YAML tree is the content of a ROS map file, as map_server reads it."""
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
@@ -235,9 +238,9 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Load the filter masks of the criteria under `pass`. Return them by path as written. Add problems to `assets`.
+    """Return the filter masks of the criteria under `pass`, by path as written. Problems are added to `assets`.
 
-    A scenario that extends a file in another folder (`pass+`) can name two masks by the same path. This is a problem.
+    One of them is that a scenario and a file in another folder, which it extends, name two masks by the same path.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):

@@ -31,9 +31,9 @@ SCENARIOS_FOLDER = "scenarios"
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
     """Return the absolute paths of the files that `paths` select, sorted.
 
-    A file selects itself. A folder selects all files with one of `suffixes` in it and in its subfolders. Raises
-    InvalidInput for missing paths, and for scenarios with conflicting output folders. Raises NothingSelected if no file
-    is selected.
+    A file selects itself. A folder selects all files with one of `suffixes` in it and in its subfolders that are not
+    hidden. Raises InvalidInput for missing paths, and for scenarios with conflicting output folders. Raises
+    NothingSelected if no file is selected.
     """
     problems = [problem for path in paths if (problem := _missing_path_problem(path))]
     found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))

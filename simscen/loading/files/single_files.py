@@ -92,7 +92,7 @@ def _in_order(value: Any) -> Any:
 
 
 class CompactDumper(Dumper):
-    """YAML dumper that writes innermost lists in brackets, and mappings that contain a scalar in braces."""
+    """YAML dumper that writes lists without mappings in brackets, and inner mappings with a scalar in braces."""
 
 
 def _represent_list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:

@@ -95,8 +95,8 @@ def _absolute_search_path(env: Mapping[str, str], folder: Path) -> str:
 def _digest(argv: Sequence[str], own_variables: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
     """Return the SHA-256 digest of a stack.
 
-    It covers the arguments, `own_variables`, the program, all files in the arguments, and the Python files next to
-    Python scripts and modules in the arguments.
+    It covers the arguments, `own_variables`, the program, all files in the arguments, and the Python files in the
+    folders of Python scripts and modules in the arguments, including subfolders.
     """
     sha = hashlib.sha256(json.dumps([list(argv), sorted(own_variables.items())]).encode())
     found = shutil.which(argv[0], path=_absolute_search_path(env, folder)) if "/" not in argv[0] else None

@@ -264,7 +264,7 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
-    """Translate the first enabled polygon with the action `approach`. Other polygons get a note."""
+    """Translate the first enabled polygon with the action `approach`. Others get a note, unless they are disabled."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)

@@ -78,19 +78,19 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
 
 
 def is_nav2_parameter_file(text: str, display_name: str) -> bool:
-    """Return whether the text of a file contains ROS 2 parameters of nodes, and no key `simscen`."""
+    """Return whether the text of a file contains ROS 2 parameters of nodes, and no top-level key `simscen`."""
     if PARAMETERS_KEY not in text:
         return False
     tree, _ = parse_yaml(text, display_name, allow_duplicates=True)
     return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_ros_nodes(tree, ""))
 
 
-def _ros_nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
+def _ros_nodes(tree: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
     """Yield the name (without namespace) and the parameters of each ROS node in a YAML tree.
 
-    `node` is the tree, and `name` is the last part of its key.
+    `name` is the last part of the key of the tree; "" for the tree of a file.
     """
-    for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+    for key, entry in tree.entries.items() if isinstance(tree, MappingNode) else ():
         if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
             yield name, entry.value
         else:

@@ -175,8 +175,8 @@ class VariationSpace:
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
     """Return the variations of a scenario that meet the conditions; or the problems of its `variations`.
 
-    `numbers` selects variations; None selects all. Unknown numbers are ignored. A scenario without `variations` is
-    returned as one variation with the name "".
+    `numbers` selects variations, which get names such as `variation-7`; None selects all. Unknown numbers are ignored.
+    A scenario without `variations` is returned as one variation with the name "".
     """
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):

@@ -150,7 +150,7 @@ def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
 def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
     """Return a mapping with the keys of both. For a key in both, the value in `own` replaces the value in `base`.
 
-    If both values are mappings, they are merged, unless they have different types, or only one is an external stack.
+    If both values are mappings, they are merged, unless they describe things of different types.
     """
     entries = dict(own.entries)
     for key, base_entry in base.entries.items():
@@ -167,7 +167,11 @@ def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
 
 
 def _are_mergeable(key: str, own: Entry, base: Entry) -> bool:
-    """Return whether two mappings under the same key describe a thing of the same type."""
+    """Return whether two mappings under the same key describe a thing of the same type, by their keys `type`.
+
+    A `type` that is missing in one of them matches all types. An external stack does not match a `stack` with a `type`,
+    and does not extend another stack.
+    """
     if key == "stack" and (
         (_has_key(own, "external") and not _has_key(base, "external"))
         or (_has_key(own, "type") and _has_key(base, "external"))

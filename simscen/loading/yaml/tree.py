@@ -12,7 +12,10 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in a file. `path` is usually relative to the root, as in messages. `line` and `col` count from 1."""
+    """Position in a file. `path` is usually relative to the root, as in messages.
+
+    `line` and `col` count from 1; both are 0 for the whole file.
+    """
 
     path: str
     line: int
