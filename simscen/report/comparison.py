@@ -14,9 +14,9 @@ from simscen.judge.significance import PASS_RATE
 from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_FLIPS = 10
-"""Maximum number of listed flips: pairs of runs with the same scenario and seed in which only one run passed."""
+"""Maximum number of listed flips (pairs of runs with the same scenario and seed in which only one run passed)."""
 MAX_CHANGES = 10
-"""Maximum number of listed scenarios with a significant change of a metric or of the pass rate."""
+"""Maximum number of listed significant changes of a metric or pass rate in a scenario."""
 MIN_NAME_COLUMNS = 24
 """Minimum width of the column of scenario names, in characters."""
 MAX_STACK_NAME_COLUMNS = 16
@@ -29,7 +29,7 @@ NO_LINKS: Links = {}
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
-    """Yield a table of outcomes by scenario and stack, then the comparison of each stack with the first one.
+    """Yield a table of outcomes by scenario and stack, then the comparison of each further stack with the first one.
 
     `prefix` is removed from scenario IDs. Long scenario IDs are shortened so that a line has at most `columns`
     characters; None: no limit.
@@ -43,7 +43,7 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 
 
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
-    """Yield the comparison of one session with the baseline, a table of changed outcomes, and a verdict.
+    """Yield the comparison of one session with the baseline, a table of changed outcomes, and a conclusion.
 
     `is_worse` states whether the session is significantly worse than the baseline.
     """
@@ -52,7 +52,9 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
     yield from _outcome_table(comparison, "", None, changed_only=True)
     yield (StyledText(""),)
     newly_fails = any(flip.failed == against.stack for flip in against.flips)
-    yield (StyledText(session_verdict(against, is_worse), "bad" if is_worse else "warning" if newly_fails else "good"),)
+    yield (
+        StyledText(session_conclusion(against, is_worse), "bad" if is_worse else "warning" if newly_fails else "good"),
+    )
 
 
 def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
@@ -63,8 +65,8 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
     )
 
 
-def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
-    """Return a sentence: whether a session is significantly worse than the baseline, and how many runs newly fail."""
+def session_conclusion(against: BaselineComparison, is_worse: bool) -> str:
+    """Return whether a session is significantly worse than the baseline, and otherwise how many runs newly fail."""
     newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
@@ -80,7 +82,7 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
 
 
 def excluded_text(against: BaselineComparison) -> str:
-    """Return the numbers of runs without a comparison, with the reasons; "" if all runs are compared."""
+    """Return how many pairs have an error, and how many runs have no partner; "" if all runs are compared."""
     parts = []
     if against.error_pairs:
         parts.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
@@ -123,7 +125,7 @@ def change_text(change: ScenarioChange, prefix: str = "") -> str:
     return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {pairs})"
 
 
-def change_verdict(change: ScenarioChange) -> str:
+def change_direction(change: ScenarioChange) -> str:
     """Return "worse" or "better", or "other" if no direction of the metric is better."""
     return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
 
@@ -136,14 +138,14 @@ def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str]:
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
-    """Return the outcomes by scenario ID and stack; with `changed_only`, only if they differ between the stacks."""
+    """Return the outcomes by scenario ID and stack; with `changed_only`, only scenarios in which stacks differ."""
     return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
 
 
 def _outcome_table(
     comparison: Comparison, prefix: str, columns: int | None, changed_only: bool = False
 ) -> Iterator[StyledLine]:
-    """Yield a heading, a row for each scenario, and a row with the totals."""
+    """Yield a heading, a row for each listed scenario, and the totals if there are several scenarios."""
     rows = [
         (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
         for scenario, row in listed_outcomes(comparison, changed_only).items()
@@ -196,10 +198,10 @@ def _change_lines(against: BaselineComparison, prefix: str) -> Iterator[StyledLi
     yield (StyledText("    significant changes", "quiet"),)
     roles: dict[str, Role] = {"worse": "bad", "better": "good", "other": "plain"}
     for change in against.changes[:MAX_CHANGES]:
-        verdict = change_verdict(change)
+        direction = change_direction(change)
         yield (
             StyledText("    "),
-            StyledText(f"{verdict:6}", roles[verdict]),
+            StyledText(f"{direction:6}", roles[direction]),
             StyledText(f" {one_line(change_text(change, prefix))}"),
         )
     if len(against.changes) > MAX_CHANGES:

@@ -11,14 +11,14 @@ from simscen.report.comparison import (
     MAX_FLIPS,
     NO_LINKS,
     Links,
+    change_direction,
     change_text,
-    change_verdict,
     comparison_headline,
     difference_cells,
     excluded_text,
     listed_outcomes,
     outcome_text,
-    session_verdict,
+    session_conclusion,
     unequal_progress_text,
     with_changed_metrics,
 )
@@ -61,7 +61,7 @@ def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: 
     (against,) = comparison.against
     reduced = replace(comparison, against=(with_changed_metrics(against),))
     return [
-        f"### simscen: {session_verdict(against, is_worse)}",
+        f"### simscen: {session_conclusion(against, is_worse)}",
         *comparison_markdown(reduced, links, changed_only=True),
     ]
 
@@ -93,7 +93,7 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
         lines += [f"| {' | '.join(_metric_cells(difference))} |" for difference in against.differences]
         lines += ["", "Significant changes:", ""] if against.changes else []
         lines += [
-            f"- {change_verdict(change)}: {cell(change_text(change))}" for change in against.changes[:MAX_CHANGES]
+            f"- {change_direction(change)}: {cell(change_text(change))}" for change in against.changes[:MAX_CHANGES]
         ]
         more = len(against.changes) - MAX_CHANGES
         lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
@@ -134,7 +134,7 @@ def _comparison_section_html(baseline: str, against: BaselineComparison) -> str:
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
     rows = "".join(_metric_row_html(difference) for difference in against.differences)
     changes = "".join(
-        f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_verdict(change)}</td>'
+        f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_direction(change)}</td>'
         f"<td>{html_text(change_text(change))}</td></tr>"
         for change in against.changes
     )

@@ -29,7 +29,7 @@ def relative_path(path: str, folder: str) -> str:
 def escape_control(text: str) -> str:
     """Replace control characters, bidirectional marks, and lone surrogates by escapes. Keep tabs and newlines.
 
-    The result is valid in XML 1.0.
+    The result contains only characters that XML 1.0 allows.
     """
     return _CONTROL_CHARACTERS.sub(lambda match: _escaped(match[0]), text)
 
@@ -156,8 +156,8 @@ def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
 def _continuation_indent(line: StyledLine) -> int:
     """Return the indentation of the second and further lines of a wrapped line.
 
-    If the first part is a label that ends with a space, such as "      again ", it is the width of the label. Otherwise
-    it is two columns more than the indentation of the first line.
+    If the first part is a label that ends with a space, such as "      again ", this is the width of the label.
+    Otherwise, it is two columns more than the indentation of the first line.
     """
     first = line[0].text
     if first.strip() and first.endswith(" "):

@@ -28,7 +28,7 @@ MAX_ROWS = 1000
 
 
 class GitHubReporter:
-    """Prints plain lines and annotations to `out`, and at the end of the session the job summary to `summary`.
+    """Prints console lines and annotations to `out`, and at the end of the session the job summary to `summary`.
 
     `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `pictures_url` is the URL of
     the uploaded output folder; without it, the summary has no pictures.
@@ -38,21 +38,21 @@ class GitHubReporter:
         self, out: TextIO, summary: TextIO | None = None, slow: int | None = None, pictures_url: str = ""
     ) -> None:
         self._out, self._summary, self._pictures_url = out, summary, pictures_url
-        self._plain = text_reporter(out, live=False, slow=slow)
+        self._console = text_reporter(out, live=False, slow=slow)
         self._runs = RunStore()
 
     def __enter__(self) -> "GitHubReporter":
-        self._plain.__enter__()
+        self._console.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._plain.__exit__(kind, error, traceback)
+        self._console.__exit__(kind, error, traceback)
 
     def __call__(self, event: SessionEvent) -> None:
         """Print the event, with annotations for a finished run, and write the summary at the end."""
-        self._plain(event)
+        self._console(event)
         if isinstance(event, RunFinished):
             self._runs.append(event)
             for line in annotations(event):
@@ -84,9 +84,10 @@ def annotations(run: RunFinished) -> list[str]:
 
 
 def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures_url: str = "") -> str:
-    """Return the job summary: counts, a table of at most MAX_ROWS runs with failures first, and a stack comparison.
+    """Return the job summary: counts, a table of at most MAX_ROWS runs, and the comparison of several stacks.
 
-    If the URL of the output folder is given (`pictures_url`), the summary also contains pictures of failures.
+    The table begins with errors and failures. With `pictures_url`, the URL of the output folder, the summary also
+    contains pictures of these runs.
     """
     symbols = {
         Outcome.ERROR: "⚠️",

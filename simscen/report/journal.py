@@ -1,7 +1,7 @@
 """Writer of events.jsonl, the journal of a session, from which all other reports can be generated.
 
-The first line of a session lists all its runs. Each further line records an event: a run started or finished, runs were
-added to a study, or the session ended.
+The first line of a session lists its planned runs. Each further line records an event: a run started or finished, runs
+were added to a study, or the session ended.
 """
 
 import fcntl
@@ -34,7 +34,7 @@ class Journal:
     """Writes the events of a session to events.jsonl in `folder`, and locks this folder until `close`.
 
     With `resume`, lines are appended to an existing journal. With `sync`, each line is flushed to the disk, so that it
-    is not lost if simscen is killed. If a line cannot be written, for example because the disk is full, `error` is set.
+    survives a crash of the machine. If a line cannot be written, for example because the disk is full, `error` is set.
 
     Raises UsageError if another process has locked the folder, or if a journal exists and `resume` is false. Raises
     OSError if the file cannot be opened.

@@ -16,7 +16,7 @@ from simscen.report.violations import error_summary, first_violation, reason_wit
 
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
-    """Yield a line with the outcome and the length in s of a log, then the lines of all violations."""
+    """Yield a line with the outcome of a log, its length in s, and a note, then the lines of `violation_lines`."""
     tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     note = f"tightest: {one_line(tightest)}" if tightest else reason_without_failure(run)
     yield (*_outcome_and_length(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
@@ -24,7 +24,7 @@ def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
 
 
 def short_log_line(run: RunFinished, name: str) -> StyledLine:
-    """Return a line with the outcome, the length in s, and the tightest margin or the first violation of a log."""
+    """Return a line with the outcome of a log, its length in s, and its error, first violation, or tightest margin."""
     if run.outcome is Outcome.ERROR:
         return (*_outcome_and_length(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
     if excuse := reason_without_failure(run):

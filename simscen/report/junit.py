@@ -34,7 +34,7 @@ MAX_CLAIM_FAILURES = 100
 def xml_parts(
     runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
 ) -> Iterator[bytes]:
-    """Yield the document in UTF-8 in consecutive parts, to save memory. Runs are sorted by file, scenario, and seed.
+    """Yield the document in UTF-8 in consecutive parts, to save memory. Runs are sorted by file and key.
 
     `name` is the name of `testsuites`. For a `study` with a claim (a minimum pass rate to show), the document has one
     testcase for the claim, and one for each run that could not be completed.
@@ -73,7 +73,10 @@ def xml_parts(
 
 @dataclass
 class SuiteCounts:
-    """Attributes of a testsuite: numbers of runs by outcome, and sum of the wall times in s."""
+    """Attributes of a testsuite: numbers of runs by outcome, and sum of the wall times in s.
+
+    `skipped` also counts runs that failed as expected.
+    """
 
     tests: int = 0
     failures: int = 0
@@ -126,7 +129,7 @@ def _indented_document(root: Element) -> bytes:
 def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[RunFinished], family: Family) -> bytes:
     """Return the document of a study with a claim. The testcase of the claim lists the failed runs.
 
-    An undecided claim is an error of the type `simscen.undecided`.
+    A claim that is undecided, or blocked by runs that were not completed, is an error.
     """
     incomplete = [run for run in runs if run.outcome is Outcome.ERROR]
     suite = SubElement(root, "testsuite", {"name": escape_control(scenario_file(runs[0]))})

@@ -26,7 +26,7 @@ FORMAT = 1
 def json_parts(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> Iterator[str]:
-    """Yield the document in consecutive parts, to save memory. Runs are sorted by file, scenario, and seed.
+    """Yield the document in consecutive parts, to save memory. Runs are sorted by file and key.
 
     Paths of artifacts are relative to the output `folder` of the session. `comparison` compares several stacks; None
     for one stack. `study` is the result of `simscen study`; None for other sessions.

@@ -42,7 +42,7 @@ class PastSession:
 def past_sessions(folder: Path) -> list[PastSession]:
     """Return the sessions in the parent folder of `folder` that are older than the session in `folder`, newest first.
 
-    At most MAX_SHOWN_SESSIONS are returned.
+    At most MAX_SHOWN_SESSIONS are returned. Sessions without a readable results.json are omitted.
     """
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
@@ -51,7 +51,7 @@ def past_sessions(folder: Path) -> list[PastSession]:
 
 
 def _read_session(folder: Path) -> PastSession | None:
-    """Read results.json of a session. Return None if the file is missing, too large, or from another version."""
+    """Read results.json of a session. Return None if the file is missing, too large, or invalid."""
     try:
         file = folder / "results.json"
         if file.stat().st_size > MAX_RESULTS_BYTES:
@@ -101,7 +101,10 @@ def sessions_in(folder: Path) -> list[Path]:
 
 
 def last_failed(folder: Path) -> frozenset[RunKey] | None:
-    """Return the runs whose latest outcome is bad, from the sessions in `folder`; None if there are no sessions."""
+    """Return the runs whose latest outcome is bad, from the sessions in `folder`; None if there are no sessions.
+
+    Only the newest MAX_SEARCHED_SESSIONS are read. A run and its repetition count as one run.
+    """
     sessions = sessions_in(folder)
     if not sessions:
         return None

@@ -47,7 +47,7 @@ class RunNaming:
 
     @classmethod
     def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Return the rule for a session. Names contain seeds only if there are several.
+        """Return the rule for a session. Names contain seeds if there are several, or if each run is repeated.
 
         `columns` is the width of the terminal; None for no limit.
         """
@@ -69,7 +69,7 @@ class RunNaming:
 
 
 def _common_folder(ids: Sequence[str]) -> str:
-    """Return the common folder of all scenario IDs with a slash, such as "scenarios/"; "" for fewer than two IDs."""
+    """Return the common folder of all scenario IDs with its slash, such as "scenarios/"; "" for fewer than two IDs."""
     if len(ids) < 2:
         return ""
     shortest, longest = min(ids), max(ids)
@@ -166,7 +166,10 @@ def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
 
 
 def _times_and_reason(run: RunFinished) -> tuple[StyledText, ...]:
-    """Return the simulated and wall time, and the tightest margin of a passed run or the reason of another outcome."""
+    """Return the times of a run, with the tightest margin if it passed, or the reason if it failed as expected.
+
+    A skipped run has only a reason. An error before the simulation has its kind and the wall time.
+    """
     if run.outcome is Outcome.SKIPPED:
         return (StyledText(reason_without_failure(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
@@ -198,7 +201,7 @@ def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the paths of replay and picture (of the log if there is no picture), and the command to repeat the run."""
+    """Yield the paths of replay and picture (without a picture, only of the log), and the command to repeat the run."""
     files = run.artifacts
     paths = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
     for name, path in paths:
@@ -219,7 +222,7 @@ def _label(name: str) -> StyledText:
 
 
 MAX_DETAILED_FAILURES = 20
-"""Maximum number of failures that are listed with paths. Further failures are listed with their cause only."""
+"""Maximum number of failures that are listed with paths. Further failures are listed only with their cause."""
 NONDETERMINISTIC = "nondeterministic"
 """Error kind of a run whose log differs from the log of its repetition."""
 
@@ -228,7 +231,7 @@ NameOfRun = Callable[[RunKey], str]
 
 
 def failure_lines(runs: Sequence[RunFinished], name: NameOfRun) -> Iterator[StyledLine]:
-    """Yield each failed run with its first violation or error, artifacts, and repeat command.
+    """Yield each run that did not pass, with its first violation or error, artifacts, and repeat command.
 
     Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
     """

@@ -107,5 +107,5 @@ def _violation(run: RunFinished, verdict: Verdict, line: int, finding: Finding) 
 
 
 def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return an error finding if the criterion of a verdict checked nothing and has no findings; otherwise ()."""
+    """Return an error finding if a verdict has no findings because its criterion checked nothing; otherwise ()."""
     return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)

@@ -25,7 +25,7 @@ Fill = tuple[int, ...]
 SUPERSAMPLING = 2
 """Scale of the image in which shapes are drawn. `finish` reduces it to the final size (anti-aliasing)."""
 LABEL_CELL_PX = 4
-"""Side of a label cell. The canvas tracks in a grid of these cells which areas labels should not cover."""
+"""Side of a label cell. In a grid of these cells, the canvas tracks which areas labels should not cover."""
 
 MAX_ELLIPSE_RADIUS_PX, _SIDES_OF_LARGE_DISC = 4000.0, 2000
 """Maximum radius of a disc that is drawn as an ellipse, and number of sides of the polygon for a larger disc."""
@@ -64,7 +64,7 @@ class DrawnPart(NamedTuple):
 class Canvas:
     """Image of the rectangle `bounds` of the world, with `scale` pixels per meter; y points up.
 
-    Points of shapes are in m, widths and radii in pixels. Labels avoid shapes with `blocks_labels`.
+    Points of shapes are in m, widths and radii in pixels. Labels avoid symbols, and shapes with `blocks_labels`.
     """
 
     def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
@@ -89,8 +89,8 @@ class Canvas:
         return self.width * SUPERSAMPLING, self.height * SUPERSAMPLING
 
     @property
-    def blocked_fractions(self) -> Array:
-        """Share (0 to 1) of each label cell that labels should not cover, as an array with the top row first."""
+    def blocked_cells(self) -> Array:
+        """1.0 for each label cell that labels should not cover, and 0.0 for the others. The top row is first."""
         return np.asarray(self._blocked, dtype=np.float64) / 255
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
@@ -207,7 +207,7 @@ class Canvas:
         self._block_pen.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
 
     def leader(self, start: tuple[float, float], end: tuple[float, float], color: Color) -> None:
-        """Draw a thin line that connects a label with its object. `start` and `end` are pixels."""
+        """Draw a thin line that connects a label with the part that it names. `start` and `end` are pixels."""
         self._draw.line(
             [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (start, end)], fill=color, width=_line_width(0.8)
         )

@@ -18,6 +18,7 @@ DrivePaths = tuple[str, Sequence[Pose2], Sequence[Pose2], Sequence[Pose2]]
 PANEL_SIZE_PX, PANEL_MARGIN_M = 420, 0.25
 """Width and height of a panel, and minimum distance of paths from its edges."""
 GRID_SPACING_M = 0.5
+"""Distance of the grid lines in a panel."""
 
 
 def draw_drives(title: str, drives: Sequence[DrivePaths], footprint: Polygon) -> Image.Image:
@@ -67,6 +68,7 @@ def write_localization_picture(grid: OccupancyGrid, belief: Array, reference: Ar
     """Draw two paths on a map, and save the picture as PNG at `path`.
 
     `reference` (n, 2) is drawn as a wide line, `belief` (m, 2) as a dashed line. Positions are in m in the map frame.
+    `reference` can be empty.
     """
     bounds = map_layer.map_extent(grid, np.vstack((belief, reference)))
     canvas = Canvas(bounds, map_layer.map_scale(bounds), palette.UNKNOWN)

@@ -155,7 +155,7 @@ def _faults(scene: Scene) -> list[tuple[int, int, str]]:
 
 
 def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a diamond where the robot was when an event of the scenario started or a new goal arrived."""
+    """Draw a diamond where the robot was when a named event of the scenario started or a new goal arrived."""
     trace = scene.trace
     events = [(event.tick, event.name) for event in trace.of_kind(EventKind.EVENT_STARTED) if event.name]
     sent = {goal.name for goal in scene.case.sent}

@@ -1,4 +1,4 @@
-"""Placement of labels next to their objects without covering paths, robots, goals, or other labels."""
+"""Placement of labels next to the drawn parts that they name, so that they cover no paths, goals, or other labels."""
 
 import math
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, text_
 from simscen.report.picture.palette import Color
 
 _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
-"""Distances between the rim of an object and its label, in the order in which they are tried."""
+"""Distances between the rim of a part and its label, in the order in which they are tried."""
 _ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
-"""Directions from an object to its label, in the order in which they are tried."""
+"""Directions from a part to its label, in the order in which they are tried."""
 _LEADER_DISTANCE_PX = 16.0
-"""Distance between label and object above which a line connects them."""
+"""Distance between a label and the rim of its part above which a line connects them."""
 _WALL_COST, _LABEL_COST, _COST_PER_PX = 0.25, 3.0, 0.0015
-"""Costs of a label on walls, on another label, and per pixel of distance. On a shape that blocks labels, it is 1."""
+"""Costs of a label on walls, on another label, and per pixel of distance. The cost on a blocked label cell is 1."""
 _MAX_OPTIONAL_COST = 0.2
 """Cost above which an optional label is omitted."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text with the font `size` in pixels for an object at (x, y) in m with a radius of `rim` pixels.
+    """Text with the font `size` in pixels that names a part at (x, y) in m with a radius of `rim` pixels.
 
     Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for no box. An optional
     label is omitted if there is no free space.
@@ -42,11 +42,11 @@ class Label:
 
 
 def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
-    """Choose a position for each label, and draw the label. Labels of objects outside of the canvas are omitted.
+    """Choose a position for each label, and draw the label. Labels of parts outside of the canvas are omitted.
 
-    `walls` is the share (0 to 1) of walls in each label cell of the canvas.
+    `walls` is 1.0 for each label cell of the canvas in a wall, and 0.0 for the others.
     """
-    occupied = canvas.blocked_fractions + _WALL_COST * walls
+    occupied = canvas.blocked_cells + _WALL_COST * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
@@ -75,7 +75,7 @@ Box = tuple[float, float, float, float]
 
 
 def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
-    """Return the lowest possible cost of a label, and its box. `occupied` is the cost of each label cell."""
+    """Return the lowest cost of the tried boxes of a label, and this box. `occupied` is the cost of each label cell."""
     sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
     sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
     width, height = text_size(label.text, label.size)
@@ -100,7 +100,7 @@ def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: fl
     """
     c, s = math.cos(angle), -math.sin(angle)
     middle = center[0] + c * (distance + abs(c) * size[0] / 2), center[1] + s * (distance + abs(s) * size[1] / 2)
-    if abs(c) > 0.1 and abs(s) > 0.1:  # diagonal: next to the object, not above it
+    if abs(c) > 0.1 and abs(s) > 0.1:  # diagonal: next to the part, not above it
         middle = center[0] + math.copysign(distance * abs(c) + size[0] / 2, c), middle[1]
     left = min(max(middle[0] - size[0] / 2, 2.0), max(2.0, canvas.width - size[0] - 2.0))
     top = min(max(middle[1] - size[1] / 2, 2.0), max(2.0, canvas.height - size[1] - 2.0))

@@ -93,13 +93,13 @@ def draw_map_canvas(scene: Scene) -> Canvas:
     labels += [label for draw in _OBJECT_LAYERS for label in draw(canvas, scene)]
     labels += [label for draw in _LAYERS_ABOVE_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
     labels += event_layer.draw_violations(canvas, scene)
-    place_labels(canvas, labels, _wall_fractions(canvas, scene))
+    place_labels(canvas, labels, _wall_cells(canvas, scene))
     return canvas
 
 
-def _wall_fractions(canvas: Canvas, scene: Scene) -> Array:
+def _wall_cells(canvas: Canvas, scene: Scene) -> Array:
     """Return 1.0 for each label cell whose center is occupied on the map, and 0.0 for the others."""
-    rows, columns = canvas.blocked_fractions.shape
+    rows, columns = canvas.blocked_cells.shape
     v, u = np.mgrid[:rows, :columns] * LABEL_CELL_PX + LABEL_CELL_PX / 2
     x, y = canvas.bounds[0] + u / canvas.scale, canvas.bounds[3] - v / canvas.scale
     values = scene.map.values_at(np.column_stack((x.ravel(), y.ravel())))
@@ -137,7 +137,7 @@ def _facts_text(scene: Scene) -> str:
 
 
 def end_reason(scene: Scene) -> str:
-    """Return the error of the run, or why the run ended and the results of robots whose navigation failed."""
+    """Return the error of the run, or why the run ended and the results of robots whose navigation did not succeed."""
     if scene.result.outcome is Outcome.ERROR and scene.result.error is not None:
         return f"{scene.result.error.kind}: {scene.result.error.message}"
     reasons = [scene.result.ended]

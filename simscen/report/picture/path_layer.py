@@ -62,7 +62,7 @@ def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw the true path, colored by time, with dots at round times and gaps where the robot was kidnapped."""
+    """Draw the true path, colored by time, with dots at round times and gaps at jumps."""
     trace, pieces = scene.trace, driven_segments(scene)
     edges = np.linspace(0, trace.end, _TIME_COLOR_COUNT + 1)
     for piece in pieces:

@@ -23,7 +23,7 @@ class Scene:
 
     Attributes:
         trace: Recorded run of the robot.
-        case: Goals, regions, and masks of the scenario.
+        case: Goals, footprint, and other parts of the scenario that criteria need.
         map: Map of the world, which can differ from the robot's map.
         result: Result of the run with the verdicts.
         scenery: Objects, zones, ramps and places of the world.

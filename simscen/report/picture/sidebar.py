@@ -66,7 +66,7 @@ def _reasons(scene: Scene) -> list[str]:
 
 
 def _criteria(scene: Scene) -> list[CriterionRow]:
-    """Return a row for each criterion, failures first."""
+    """Return a row for each criterion, in the order of _STATUS_ORDER."""
     rows: list[CriterionRow] = []
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
         finding = verdict.tightest
@@ -128,7 +128,7 @@ def _draw_cross(draw: Pen, x: float, y: float, color: Color) -> None:
 
 
 def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
-    """Return the entries of the legend: name of the drawn part ("" for any), text, and symbol.
+    """Return the entries of the legend: word for `_is_drawn` ("": always shown), text, and symbol.
 
     `step` is the time between two dots on the true path in s.
     """

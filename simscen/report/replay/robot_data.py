@@ -30,7 +30,7 @@ MAX_BEAMS, MAX_RANGES = 360, 300_000
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
 """Maximum number of particles per cloud, and of clouds per robot."""
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
-"""Maximum number of points per plan, and in all plans together. Each plan keeps at least 8 points."""
+"""Maximum number of points per plan, and in all plans together. Plans are not reduced to fewer than 8 points."""
 MAX_LOCAL_PLANS = 1500
 """Maximum number of local plans per robot."""
 MAX_GRID_CELLS = 2_000_000
@@ -45,7 +45,7 @@ def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str
 
 
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
-    """Return the scans of one lidar. Scans with another number of beams than the first scan are omitted."""
+    """Return the scans of one lidar. Scans whose number of beams differs from the first scan are omitted."""
     first = sensors.decode_scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
@@ -71,7 +71,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
 
 
 def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the particle clouds with at most MAX_PARTICLES particles; None if the log has none."""
+    """Return at most MAX_CLOUDS particle clouds with at most MAX_PARTICLES particles; None if the log has none."""
     if not sensors.particles:
         return None
     indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()

@@ -12,7 +12,10 @@ from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 
 MAX_TREE_CHANGES = 20_000
-"""Maximum number of changes of a behavior tree. If there are more, conditions and the first changes are omitted."""
+"""Maximum number of changes of a behavior tree.
+
+If there are more, nodes that are never RUNNING (conditions) are omitted, and, if necessary, the first changes.
+"""
 _RUNNING = "RUNNING"
 MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
 """Maximum number of log lines, and maximum length of a line."""
@@ -98,7 +101,7 @@ def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the parameters of each node; [] if the stack reported none.
 
     For each parameter, `values` has the name, the value as text, and whether it is a main parameter. `total` is the
-    number of parameters before the reduction to MAX_PARAMETERS.
+    number of parameters of the node before the reduction to MAX_PARAMETERS.
     """
     nodes = _reported_parameters(log)
     total = sum(map(len, nodes.values()))
@@ -114,7 +117,7 @@ def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
 
 
 def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
-    """Return the reported parameter values by node and name, without malformed ones."""
+    """Return the reported parameter values by node and name, without malformed and empty nodes."""
     try:
         about = json.loads(log.stack.get("about", "{}"))
     except ValueError:
@@ -137,10 +140,11 @@ def _node_rank(node: str) -> tuple[int, str]:
 
 
 def _value_text(value: object) -> str:
-    """Return a parameter value as text, at most MAX_VALUE_CHARACTERS long. Only empty strings have quotes."""
+    """Return a parameter value as text: strings without quotes, blank strings and other values as JSON."""
     text = value if isinstance(value, str) and value.strip() else json.dumps(value, ensure_ascii=False)
     return _shortened(escape_control(text), MAX_VALUE_CHARACTERS)
 
 
 def _shortened(text: str, max_characters: int) -> str:
+    """Return the first `max_characters` of a text, followed by its length if it is longer."""
     return text if len(text) <= max_characters else f"{text[:max_characters]} … ({len(text)} characters)"

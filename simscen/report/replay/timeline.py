@@ -57,7 +57,7 @@ class TimelineEntry:
         kind: Kind of the event, as in EventKind.
         lane: Name of the lane in which the entry is drawn.
         until: Last tick of an interval; None for a single event.
-        ended: Kind of the event that ended the interval; "" if the run ended first.
+        ended: Kind of the event that ended the interval; "" for a single event, or if the run ended first.
         is_failure: Whether the event is a failure, such as a collision.
         line: Line in the scenario file; 0 if unknown.
         name: Name of the goal, fault, object, or event.
@@ -138,7 +138,7 @@ def _details(event: Event) -> Iterator[str]:
 
 
 def _short(value: object) -> str:
-    """Return a value as text, with at most four digits of a number."""
+    """Return a value as text, with at most four significant digits of a float."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -233,7 +233,7 @@ class SourceLines:
 def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
     """Return the line numbers for a robot ("" for a single robot) and the specification of a scenario, from its text.
 
-    Return no line numbers and None if the scenario is invalid.
+    Return no line numbers and None if the scenario is missing or invalid.
     """
     if not text:
         return SourceLines(), None

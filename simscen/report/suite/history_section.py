@@ -16,7 +16,7 @@ _GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.is_good)
 
 
 def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return the section; "" without earlier sessions. `past` are these sessions, newest first."""
+    """Return the section; "" if `past`, the earlier sessions (newest first), is empty. `runs` are of this session."""
     if not past:
         return ""
     rows = "".join(_session_row(session) for session in past)

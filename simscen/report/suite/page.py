@@ -1,4 +1,4 @@
-"""HTML report of a session, report.html: headline, filters, and entries of all runs in a single file."""
+"""HTML report of a session, report.html: headline, filters, and entries of the runs in a single file."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -24,9 +24,9 @@ from simscen.report.suite.study_section import study_html
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 """Outcomes in the order in which the page lists the runs."""
 MAX_SYMBOLS = 200
-"""Maximum number of runs of a scenario whose outcomes the heading shows as symbols."""
+"""Number of runs of a scenario above which its heading does not show their outcomes as symbols."""
 MAX_LISTED_RUNS = 2000
-"""Maximum number of runs on the page."""
+"""Maximum number of runs that the page lists."""
 _LINKED_FILES = ("junit.xml", "results.json", "run.json", "console.txt")
 """Files in the output folder to which the headline links."""
 
@@ -65,7 +65,7 @@ class SessionReport:
 
 
 def to_html(report: SessionReport) -> str:
-    """Return the page, with failures first and expanded. The pictures of the runs are read from their files."""
+    """Return the page, with errors and failures first and expanded. The pictures are read from their files."""
     totals = Totals(report.runs)
     listed = listed_runs(report.runs)
     ordered = sorted(listed, key=lambda run: run.key)

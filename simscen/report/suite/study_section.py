@@ -21,8 +21,8 @@ from simscen.spec.quantities import si_number
 MAX_PLOTS = 8
 """Maximum number of parameters with a plot. Parameters with the strongest effects come first."""
 MAX_POINTS = 2000
-"""Maximum number of runs in a plot. Runs that did not pass have priority."""
-WIDTH, HEIGHT, MARGIN = 420, 220, 44
+"""Maximum number of runs in a plot. Errors and failures have priority."""
+WIDTH, HEIGHT, LABEL_SPACE = 420, 220, 44
 """Size of a plot, and space for the axis labels to the left and below, in SVG units."""
 
 
@@ -72,7 +72,7 @@ def _effect_table(study: Study) -> str:
 
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return one plot per parameter: the margin that depends most on the parameter."""
+    """Return a plot for each of at most MAX_PLOTS numeric parameters: the margin that depends most on the parameter."""
     criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
     order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
     plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
@@ -96,22 +96,22 @@ def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], 
     if not points:
         return ""
     x_range, y_range = _range([x for x, _, _ in points]), _range([0.0, *(y for _, y, _ in points)])
-    zero = _scale(0.0, y_range, HEIGHT - MARGIN, 12)
+    zero = _scale(0.0, y_range, HEIGHT - LABEL_SPACE, 12)
     dots = "".join(
-        _dot(_scale(x, x_range, MARGIN, WIDTH - 12), _scale(y, y_range, HEIGHT - MARGIN, 12), run, folder)
+        _dot(_scale(x, x_range, LABEL_SPACE, WIDTH - 12), _scale(y, y_range, HEIGHT - LABEL_SPACE, 12), run, folder)
         for x, y, run in reversed(points)
     )
     labels = (
-        f'<text x="{MARGIN}" y="{HEIGHT - 26}">{x_range[0]:.4g}</text>'
+        f'<text x="{LABEL_SPACE}" y="{HEIGHT - 26}">{x_range[0]:.4g}</text>'
         f'<text x="{WIDTH - 12}" y="{HEIGHT - 26}" text-anchor="end">{x_range[1]:.4g}</text>'
-        f'<text x="{MARGIN}" y="{HEIGHT - 8}">{html_text(path)} (SI units)</text>'
-        f'<text x="{MARGIN - 4}" y="16" text-anchor="end">{y_range[1]:.3g}</text>'
-        f'<text x="{MARGIN - 4}" y="{HEIGHT - MARGIN}" text-anchor="end">{y_range[0]:.3g}</text>'
+        f'<text x="{LABEL_SPACE}" y="{HEIGHT - 8}">{html_text(path)} (SI units)</text>'
+        f'<text x="{LABEL_SPACE - 4}" y="16" text-anchor="end">{y_range[1]:.3g}</text>'
+        f'<text x="{LABEL_SPACE - 4}" y="{HEIGHT - LABEL_SPACE}" text-anchor="end">{y_range[0]:.3g}</text>'
     )
     title = f"margin of {criterion} against {path}"
     return (
         f'<figure><figcaption>{html_text(title)}</figcaption><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
-        f'aria-label="{html_text(title)}"><line class="zero" x1="{MARGIN}" x2="{WIDTH - 12}" y1="{zero:.1f}" '
+        f'aria-label="{html_text(title)}"><line class="zero" x1="{LABEL_SPACE}" x2="{WIDTH - 12}" y1="{zero:.1f}" '
         f'y2="{zero:.1f}"/>{labels}{dots}</svg></figure>'
     )
 

@@ -152,7 +152,7 @@ def test_failure_has_the_error_code_and_name_of_nav2():
 
 def test_labels_do_not_overlap_paths_robots_goals_or_each_other():
     canvas = map_picture.draw_map_canvas(everything())
-    busy, boxes = canvas.blocked_fractions, []
+    busy, boxes = canvas.blocked_cells, []
     for note in canvas.texts:
         wide = map_picture.font(note.size).getlength(note.text)
         left, right = (note.x - wide / 2) / LABEL_CELL_PX, (note.x + wide / 2) / LABEL_CELL_PX
