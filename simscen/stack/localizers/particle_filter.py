@@ -26,7 +26,7 @@ from simscen.stack.localizers.resampling import PROBE_COUNT, AugmentedMcl, KldBo
 from simscen.stack.localizers.sensor_models import SensorModel
 
 CONVERGENCE_DISTANCE_M = 0.5
-"""The filter has converged if no particle is farther than this from their mean (nav2_amcl's pf.dist_threshold)."""
+"""The filter has converged if no particle is farther from the mean along x or y (nav2_amcl's pf.dist_threshold)."""
 _DESCENDANT, _RANDOM = 1.0, 2.0
 """Marks in the fourth column of drawn particles: descendant of a random particle, and new random particle."""
 
@@ -70,8 +70,8 @@ class ParticleFilter:
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
         """Weight the particles by a scan and resample. Return the estimated pose and its covariance (3, 3).
 
-        Return None if the scan fits all particles equally well, or none at all. If it fits none, all particles get the
-        same weight. The estimate is computed before resampling, which only adds noise.
+        Return None if the scan fits all particles equally well, or none at all, or is not trusted. If it fits none, all
+        particles get the same weight. The estimate is computed before resampling, which only adds noise.
         """
         spec, poses = self._spec, self.particles.poses
         exponent, beams = self._trusted_beams(self.beams(scan))
@@ -94,7 +94,7 @@ class ParticleFilter:
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return an exponent (0 … 1) for the likelihood of a scan, and the beams to use; here 1 and all beams."""
+        """Return an exponent for the likelihood of a scan (0 ignores it), and the beams to use; here 1 and all."""
         return 1.0, beams
 
     def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:

@@ -144,10 +144,10 @@ class LikelihoodFieldProb:
         """Return the exponent that turns the product into a geometric mean over the beams that hit something."""
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self.exponent
 
-    def _beam_exponents(self, beams: int) -> Float32:
-        """Return an array (beams,) filled with `exponent`."""
-        if beams != len(self._exponents):
-            self._exponents = np.full(beams, self.exponent, dtype=np.float32)
+    def _beam_exponents(self, count: int) -> Float32:
+        """Return an array (count,) filled with `exponent`."""
+        if count != len(self._exponents):
+            self._exponents = np.full(count, self.exponent, dtype=np.float32)
         return self._exponents
 
     def _logarithms(self, range_max: float) -> Float32:
