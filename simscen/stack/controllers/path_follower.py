@@ -100,7 +100,7 @@ class GoalRotation:
     def is_position_reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
         """Return whether the position of the goal is reached. `remaining` is the remaining path length in m.
 
-        The result stays True until the robot leaves the position tolerance.
+        Except for a car, the result stays True until the robot leaves the position tolerance.
         """
         distance = goal.pose.distance(pose)
         if not self._can_turn:

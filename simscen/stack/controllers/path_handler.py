@@ -88,9 +88,9 @@ class PathTracker:
         self.index = nearest
 
     def ahead(self, length: float) -> tuple[Array, Array]:
-        """Return the points (n, 3) of the segment within the next `length` m, and the path length (n,) in m to each.
+        """Return the next points (n, 3) of the segment, and the path length (n,) in m from the first one to each.
 
-        There are at least two points, unless the segment has only one.
+        They end with the first point beyond `length` m. At the end of the path, the point before the last is included.
         """
         end = bisect_right(self._along, self._along[self.index] + length)
         end = min(end + 1, self._segment_ends[0] + 1)
@@ -104,7 +104,7 @@ class PathTracker:
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
         """Yield (path length in m, x + iy, curvature in 1/m) of points of the segment, about `spacing` m apart.
 
-        The first point is `spacing` m ahead, the last one at most `reach` m.
+        The first point is about `spacing` m ahead, the last one about `reach` m at most.
         """
         along, start = self._along, self._along[self.index]
         length = spacing
@@ -116,7 +116,7 @@ class PathTracker:
             length = along[index] - start + spacing
 
     def _curvature(self, index: int) -> float:
-        """Return the approximate curvature at a point in 1/m; 0 near the ends of the segment."""
+        """Return the approximate absolute curvature at a point in 1/m; 0 near the ends of the segment."""
         along, points = self._along, self._complex_points
         before = bisect_right(along, along[index] - CURVATURE_SPAN_M) - 1
         after = bisect_left(along, along[index] + CURVATURE_SPAN_M)

@@ -42,8 +42,8 @@ class Carrot(NamedTuple):
         return math.atan2(sign * self.y, sign * self.x)
 
 
-class Arc(NamedTuple):
-    """A command, and two times in s: for how long it is free of collisions, and how long it must be (`horizon`)."""
+class CheckedArc(NamedTuple):
+    """A command, the time in s for which it is free of collisions, and the time for which it must be (`horizon`)."""
 
     command: Twist
     free_time: float
@@ -79,7 +79,7 @@ class RegulatedPurePursuit(PathFollower):
         return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL if all arcs are blocked and no rotation helps."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if no arc, rotation, or backing up is possible."""
         tracker = self._locate(pose)
         is_reached = self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining())
         if is_reached and self._is_car:
@@ -94,7 +94,7 @@ class RegulatedPurePursuit(PathFollower):
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command for the farthest carrot whose arc is free; if no arc is free, slow down or rotate."""
         spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
-        arcs: list[Arc] = []
+        arcs: list[CheckedArc] = []
         rotation: float | None = None
         escape_rotation: float | None = None
         for ratio in LOOKAHEAD_RATIOS:
@@ -143,7 +143,7 @@ class RegulatedPurePursuit(PathFollower):
         return arc.free_time >= arc.horizon
 
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
-        """Return the distance in m that must be free: to the carrot, or to the next cusp if a car reaches it before."""
+        """Return the distance in m that must be free: to the carrot, or for a car at most to the end of the segment."""
         if not self._is_car:
             return carrot.distance
         return min(carrot.distance, max(CUSP_REACHED_M, tracker.remaining_in_segment()))
@@ -198,7 +198,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(speed, self._approach_speed(tracker, regulated, pose))
 
     def _approach_speed(self, tracker: PathTracker, speed: float, pose: Pose2) -> float:
-        """Return `speed`, near the end of the segment reduced: scaled as in Nav2, and low enough to stop in time."""
+        """Return `speed`, reduced near the end of the segment: scaled as in Nav2, and low enough to stop in time."""
         remaining, spec = tracker.remaining_in_segment(), self._spec
         if remaining < spec.approach_velocity_scaling_dist:
             distance = _to_robot_frame(pose, *tracker.segment_end).distance
@@ -208,13 +208,13 @@ class RegulatedPurePursuit(PathFollower):
         braking = math.sqrt(BRAKING_FACTOR * self._robot.linear_deceleration * remaining)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
-    def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> Arc:
-        """Return the command as an Arc. Its horizon is the time to drive `distance` m, limited as in Nav2."""
+    def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> CheckedArc:
+        """Return the command as a CheckedArc. Its horizon is the time to drive `distance` m, limited as in Nav2."""
         max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:
-            return Arc(command, max_time, max_time)
+            return CheckedArc(command, max_time, max_time)
         horizon = min(max_time, distance / abs(command.vx)) if command.vx != 0.0 else max_time
-        return Arc(command, self._collision_checker.free_time(costmap, pose, command, horizon), horizon)
+        return CheckedArc(command, self._collision_checker.free_time(costmap, pose, command, horizon), horizon)
 
     def _slow_down_for_moving(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
         if not self._spec.use_collision_detection:
@@ -223,7 +223,7 @@ class RegulatedPurePursuit(PathFollower):
 
 
 def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
-    """Return the carrot at `distance` m in the base frame; with `beyond`, also beyond the end of the path."""
+    """Return the carrot at `distance` m in the base frame; with `beyond`, also beyond the end of the segment."""
     return _to_robot_frame(pose, *tracker.carrot(pose, distance, beyond=beyond))
 
 

@@ -57,7 +57,7 @@ class DynamicWindowController(PathFollower):
         return None if self._best is None else Path(self._best)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL if critics reject all trajectories."""
+        """Return the velocity command. Raises NO_VALID_CONTROL if no sampled trajectory is legal."""
         tracker = self._locate(pose)
         is_reached = self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining())
         if is_reached and self._robot.turning_radius > 0.0:

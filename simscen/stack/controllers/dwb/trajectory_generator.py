@@ -15,14 +15,14 @@ from simscen.stack.protocols import RobotModel
 SAME_VELOCITY_M_S = 1e-5
 """Width of a velocity range below which only one velocity is sampled (EPSILON in Nav2)."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
-"""Rounding error allowed for squared speeds."""
+"""Rounding error allowed for squared speeds and for turn rates."""
 
 
 @dataclass(frozen=True)
 class KinematicParameters(VelocityLimits):
     """Velocity limits of each axis, limits of the speed in the plane in m/s, and minimum turn rate in rad/s.
 
-    Velocities are invalid only if both speed and turn rate are below their minimum.
+    A velocity is too low only if both speed and turn rate are below their minimum.
     """
 
     min_speed_xy: float
@@ -30,7 +30,7 @@ class KinematicParameters(VelocityLimits):
     min_speed_theta: float
 
     def scaled(self, ratio: float) -> "KinematicParameters":
-        """Return limits with maximum velocities multiplied by `ratio`; unchanged if `ratio` is at least 1."""
+        """Return limits with `low`, `high`, and `max_speed_xy` multiplied by `ratio`, which counts as at most 1."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
@@ -78,7 +78,10 @@ def project_velocity(now: float, acceleration: float, deceleration: float, secon
 def velocity_samples(
     now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """Return `count` evenly spaced velocities of one axis that can be reached within `seconds`, and 0 if in between."""
+    """Return velocities of one axis that can be reached within `seconds`: `count` (at least 2) at equal distances.
+
+    0 is added if it lies between two of them. If the range is narrower than SAME_VELOCITY_M_S, only one is returned.
+    """
     now = min(max(now, low), high)
     highest = project_velocity(now, acceleration, deceleration, seconds, high)
     lowest = project_velocity(now, acceleration, deceleration, seconds, low)

@@ -1,7 +1,8 @@
 """Model predictive path integral control (Williams et al. 2017), as in nav2_mppi_controller.
 
-A control sequence is an array (axes, steps) of velocities. Each axis is vx, wz, or vy. Noisy copies (samples) of the
-previous sequence are simulated and scored. The new sequence is their average, weighted by exp(-cost / temperature).
+A control sequence is an array (axes, steps) of velocities. The axes are vx, wz, and for a holonomic base vy. Noisy
+copies (samples) of the previous sequence are simulated and scored. The new sequence is their average, weighted by
+exp(-cost / temperature).
 """
 
 import math
@@ -179,11 +180,14 @@ class MppiController(PathFollower):
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory of the optimized control sequence; None before the first command."""
+        """Trajectory of the optimized control sequence; None before the first one and while turning at the goal."""
         return None if self._optimal is None else Path(self._poses(self._optimal))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity command. Raises NO_VALID_CONTROL if all samples, or their average, collide."""
+        """Return the velocity command, slowed down if a collision is near.
+
+        Raises NO_VALID_CONTROL if all samples, or their average, collide, or if the slowed-down command is too slow.
+        """
         tracker, self._pose = self._locate(pose), pose
         if self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining()):
             self._reset()

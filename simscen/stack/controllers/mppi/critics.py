@@ -1,7 +1,7 @@
 """Critics of MPPI, which compute costs of rollouts (nav2_mppi_controller), and the manager that adds up the costs.
 
 A critic is a function of its parameters and the critic data. It returns the cost of each rollout (n,): the value that
-its docstring describes, times `cost_weight`.
+its docstring describes, times `cost_weight` (ObstaclesCritic has two other weights).
 """
 
 from typing import get_args
@@ -98,7 +98,11 @@ def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Flo
 
 
 def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, Mask]:
-    """Return the mean costmap cost along each rollout, and which rollouts collide."""
+    """Return the mean costmap cost along each rollout, relative to MAX_COST, and which rollouts collide.
+
+    `critical_cost` and `collision_cost` replace high costs. Near the goal, lower costs count as 0. Moving obstacles add
+    costs.
+    """
     steps = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = data.rollouts.x[steps], data.rollouts.y[steps], data.rollouts.yaw[steps]
     points, consider_footprint = data.lookup(x, y), spec.consider_footprint is not False
@@ -207,7 +211,7 @@ def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floa
 
 
 def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Floats:
-    """Return the distance in m from the end of each rollout to a free point of the plan, beyond all rollouts."""
+    """Return the distance in m from the end of each rollout to a free point of the plan beyond all rollouts."""
     x, y, _ = data.path
     last = len(x) - 1
     index = min(data.furthest_point + spec.offset_from_furthest, last)
