@@ -23,8 +23,8 @@ ZONE_TOLERANCE_M = 0.02
 class Costmaps:
     """Global and local costmap of one robot, each updated at its own rate.
 
-    The global costmap is in the map frame and contains the map. The local costmap rolls with the robot in the odom
-    frame and contains no map. Its obstacles do not move when the localizer corrects the pose; only keepout zones do.
+    The global costmap is in the map frame and contains the map, if any. The local costmap rolls with the robot in the
+    odom frame, without map. Its obstacles do not move when the localizer corrects the pose; only keepout zones do.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Costmaps:
         return self._global_schedule.is_due(tick)
 
     def set_zones(self, zones: Zones) -> None:
-        """Replace all keepout zones."""
+        """Replace all keepout zones and the keepout mask."""
         self._zones, self._odom_from_map = zones, None
         self.global_costmap.set_zones(zones)
 
@@ -77,7 +77,10 @@ class Costmaps:
         self.next = min(self._global_schedule.next, self._local_schedule.next)
 
     def clear(self) -> None:
-        """Clear all obstacles of both costmaps except those in the newest readings (Nav2's ClearEntireCostmap)."""
+        """Clear both costmaps (Nav2's ClearEntireCostmap).
+
+        Obstacles in the newest readings remain, and nearby obstacles outside the field of view of all lidars.
+        """
         self.global_costmap.clear()
         self.clear_local()
 
@@ -136,7 +139,7 @@ class _UpdateSchedule:
         return tick - self._updated_at >= self._period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
-        """Start an update if it is due and there are readings. Return the updates that are complete by this tick.
+        """Start an update if it is due and there are readings. Return the updates that are complete at this tick.
 
         `base` is the current pose of the robot in the frame of the costmap.
         """

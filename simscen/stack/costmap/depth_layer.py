@@ -34,7 +34,7 @@ class DepthObservation(NamedTuple):
 def project_depth_image(
     image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known_ground: Mask
 ) -> DepthObservation:
-    """Return the obstacles and the ground that an image shows, taken by a robot at `base`.
+    """Return the obstacles and the ground in an image that a robot at `base` has taken.
 
     `known_ground` (rows, columns) are the cells that earlier images showed as ground.
     """

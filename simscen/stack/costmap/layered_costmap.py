@@ -140,7 +140,7 @@ class LayeredCostmap:
 
     @property
     def obstacle_cell_count(self) -> int:
-        """Number of cells with live obstacles, plus the keepout cells added since the start."""
+        """Number of cells with live obstacles, plus the increase of lethal static cells by new keepout zones."""
         return self._live.count + self._keepout_change
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
@@ -160,8 +160,8 @@ class LayeredCostmap:
     def clear(self, clear_within: float = math.inf, unseen_margin: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
 
-        Obstacles outside the field of view of all lidars are kept up to `unseen_margin` m beyond the circumscribed
-        radius, because the robot may back up into them.
+        Obstacles that a lidar has marked, but that no lidar sees now, are kept up to `unseen_margin` m beyond the
+        circumscribed radius, because the robot may back up into them.
         """
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]

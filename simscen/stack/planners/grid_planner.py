@@ -72,7 +72,7 @@ class GridPlanner:
         return Path(with_headings(densify(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
     def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
-        """Return the path (n, 2) between start and goal, smoothed if requested, without cut corners of blocked cells.
+        """Return a path (n, 2) from start to goal that cuts no corners of blocked cells, smoothed if requested.
 
         `cells` (n, 2) are the centers of the cells on the path.
         """

@@ -15,7 +15,7 @@ SMOOTHING_PASSES, MAX_COST_RATIO = 8, 1.003
 
 
 def densify(points: Array, spacing: float) -> Array:
-    """Return the polyline (n, 2) with additional points, so that all points are at most `spacing` m apart."""
+    """Return the polyline (n, 2) with points at most `spacing` m apart, and without repeated points."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     counts = np.maximum(1, np.ceil(lengths / spacing - 1e-9)).astype(np.int64)

@@ -20,7 +20,7 @@ NO_ROTATION_COST_FACTOR = 4.0
 EXEMPT_HALF_SIDE_M = 0.5
 """Half the side length of the square around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
-"""Distance in cells between two samples of the costs along a path; the minimum along a motion of a search."""
+"""Distance in cells between two samples of the costs along a path, and minimum distance along a motion of a search."""
 SAMPLE_SPACING_RATIO = 0.4
 """Distance between two samples of the costs along a motion of a search, relative to the inscribed radius."""
 
@@ -28,8 +28,9 @@ SAMPLE_SPACING_RATIO = 0.4
 class TraversalCosts:
     """Traversal costs per meter on a costmap, `rates` (height, width): 1 in free space, inf in blocked cells.
 
-    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner. A cell is blocked if the inscribed circle of the
-    robot does not fit there, or if the cell is unknown and `allow_unknown` is False.
+    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner, times NO_ROTATION_COST_FACTOR where the robot
+    cannot turn in place. A cell is blocked if the inscribed circle of the robot does not fit there, or if the cell is
+    unknown and `allow_unknown` is False.
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
