@@ -133,7 +133,7 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 MIN_PROGRESS_M = 1.0
-"""Progress toward the goal since all earlier recoveries that restores the retries, with `retries_since_progress`."""
+"""With `retries_since_progress`, retries are restored if the robot is nearer to the goal than ever by this value."""
 
 
 class BehaviorSequence:
@@ -147,7 +147,7 @@ class BehaviorSequence:
         self._next, self._used, self._nearest = 0, 0, math.inf
 
     def can_help(self, failure: NavigationFailure) -> bool:
-        """Return whether to try a recovery: False for errors of planners that are not in `planner_codes`."""
+        """Return whether to try a recovery: False for a planner error whose code is not in `planner_codes`."""
         return getattr(failure.code, "name", "") not in self._final_codes
 
     def reset(self) -> None:
@@ -155,7 +155,7 @@ class BehaviorSequence:
         self._used, self._nearest = 0, math.inf
 
     def next(self, goal_distance: float) -> Behavior | None:
-        """Return the next behavior and count a retry; None if no retry is left. `goal_distance` is in m."""
+        """Return the next behavior and count a retry; None if no retry or behavior is left. `goal_distance` is in m."""
         if self._resets_on_progress and goal_distance <= self._nearest - MIN_PROGRESS_M and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, goal_distance)

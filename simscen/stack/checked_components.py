@@ -1,4 +1,4 @@
-"""Wrappers that check the return values of planners, controllers, and other stack components of other packages."""
+"""Wrappers that check the return values of planners, controllers, and other components of a stack."""
 
 import math
 import traceback
@@ -73,7 +73,10 @@ class CheckedPlugin:
             self.raise_as_run_error(error)
 
     def raise_as_run_error(self, error: Exception) -> NoReturn:
-        """Raise the exception itself if this role may raise it, otherwise a RunError that names the component."""
+        """Raise a RunError that names the component.
+
+        RunError, MemoryError, and, if `may_fail`, NavigationFailure are raised unchanged.
+        """
         if isinstance(error, RunError | MemoryError):
             raise error
         if isinstance(error, NavigationFailure) and self.may_fail:
@@ -296,7 +299,7 @@ class CheckedLocalizer(CheckedPlugin):
 def checked_belief(plugin: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
     """Return the belief if it is finite and has the right shapes; otherwise raise RunError, which names the plugin.
 
-    `before` is the previous valid belief: arrays and transforms that both share are not checked again.
+    `before` is the previous valid belief: shared `map_from_odom` and read-only particles are not checked again.
     """
     if not isinstance(belief, Belief):
         plugin.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")

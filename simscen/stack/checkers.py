@@ -18,8 +18,8 @@ STANDSTILL_CHECKS = 10
 class SimpleGoalChecker:
     """Decides whether the goal is reached, like nav2_controller::SimpleGoalChecker.
 
-    With `stateful`, the position stays reached until the robot leaves the position tolerance. While the robot moves,
-    the tolerances are multiplied by `well_inside`, so that the robot does not stop at their edge.
+    With `stateful`, the position stays reached until the robot leaves the position tolerance. Until the robot has stood
+    still for a while, the tolerances are multiplied by `well_inside`, so that it does not stop at their edge.
     """
 
     def __init__(self, spec: GoalSpec, setting: Setting) -> None:

@@ -1,6 +1,6 @@
 """Collision monitor (nav2_collision_monitor): slows the robot down before obstacles in the latest scans.
 
-It uses neither map nor costmap. If the stack predicts moving obstacles, it checks their predicted positions.
+It uses neither map nor costmap. If the stack predicts moving obstacles, the monitor checks these predictions, too.
 """
 
 import math
@@ -72,7 +72,7 @@ class CollisionMonitor:
         self._start_tick = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
-        """Store a scan that arrived at `tick`. A scan without returns is not usable.
+        """Store a scan that arrived at `tick`. It is not usable if all ranges are invalid or too short.
 
         `odometry` is the pose of the robot in the odom frame when the scan was taken.
         """
@@ -89,7 +89,7 @@ class CollisionMonitor:
         self._moving, self._has_moving = moving, len(moving) > 0
 
     def is_silent(self, tick: int) -> bool:
-        """Return whether any lidar has sent no usable scan within the last `source_timeout` s."""
+        """Return whether the last usable scan of any lidar is older than `source_timeout` s; False if disabled."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence_reason(self, tick: int) -> str:
@@ -188,7 +188,7 @@ class CollisionMonitor:
         )
 
     def _footprint_gaps(self, points: Array, poses: Array) -> Array:
-        """Return distances (m, n) in m from the footprint at poses (m, 3) to points (m or 1, n, 2); negative inside.
+        """Return distances (k, n) in m from the footprint at poses (k, 3) to points (k or 1, n, 2); negative inside.
 
         For a polygon, the result is a lower bound: the largest signed distance from its edge lines.
         """
@@ -203,7 +203,7 @@ class CollisionMonitor:
 
 
 def _time_steps(spec: MonitorSpec) -> int:
-    """Return the number of time steps until `time_before_collision`, none longer than `simulation_time_step`."""
+    """Return the number of steps, at most MAX_STEPS, of `simulation_time_step` that cover `time_before_collision`."""
     if spec.simulation_time_step is None:
         return DEFAULT_STEPS
     return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE))
@@ -219,7 +219,7 @@ def _miter_factor(normals: Array) -> float:
 
 
 def _shortest_range(scan: Scan) -> float | None:
-    """Return the shortest valid range in m; None if the scan has no returns."""
+    """Return the shortest valid range in m, inf if no beam hits; None if all ranges are invalid or too short."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest
@@ -228,7 +228,7 @@ def _shortest_range(scan: Scan) -> float | None:
 
 
 def _points_within(scan: Scan, reach: float) -> Array:
-    """Return the hits (n, 2) on static obstacles within `reach` m of the base, in the base frame."""
+    """Return the static hits (n, 2) in the base frame: all within `reach` m of the base, and some farther away."""
     max_range = reach + math.hypot(scan.mount.x, scan.mount.y)
     hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(max_range, scan.range_max))
     beams = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanWithMovingHits) else hits)

@@ -78,7 +78,7 @@ class CommandPipeline:
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """Take the components, the controller `period`, and the `latency` of (controller, monitor), all in ticks."""
+        """Take the components and, in ticks, the controller `period` and the `latency` of (controller, monitor)."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._requested, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
         self._immediate: tuple[Twist, int] | None = None

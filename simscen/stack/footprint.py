@@ -46,7 +46,7 @@ def lethal_near(costmap: CostmapView, x: float, y: float, half_side: float) -> A
 
 
 class Footprint:
-    """Collision checker for many poses at once. A footprint is in collision if it contains the center of a lethal cell.
+    """Collision checker for many poses at once. A footprint is in collision if a lethal cell is inside.
 
     `inscribed` and `circumscribed` are radii in m. `rotation_radius` is the largest distance in m by which a point of
     the footprint moves per rad of rotation; 0 if round. `discs` cover the footprint, for faster checks.
@@ -103,10 +103,11 @@ class Footprint:
         return np.asarray(np.minimum(edge, center))
 
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
-        """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles; negative in collision.
+        """Return distances (…,) in m from the footprint at poses (…, 3) to the nearest moving obstacle.
 
-        The obstacles are at their predicted positions at `times` in s, one for each pose (or broadcast). They are
-        inflated by `sigmas` standard deviations. If the footprint is not round, the result is a few cm too small.
+        Distances are negative in collision, and a few cm too small if the footprint is not round. Obstacles are at the
+        positions predicted for `times` (s), which broadcast with the poses, and inflated by `sigmas` standard
+        deviations of their position.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)

@@ -4,7 +4,8 @@ After a planning failure, the global costmap is cleared and planning is retried 
 costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs. Then planning
 and control can each be retried again. After `number_of_retries` behaviors, the goal fails with the last error code.
 
-A goal inside a mapped wall fails after the first retry, because no recovery can help.
+A planner error that is not in `planner_codes` fails the goal at once. A goal in or too close to a mapped wall fails
+after the first retry. In both cases, no recovery can help.
 """
 
 from typing import NamedTuple, Protocol
@@ -198,7 +199,7 @@ class Navigator:
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
     def _is_unreachable(self, goal: Goal, failure: NavigationFailure) -> bool:
-        """Return whether the failure is caused by a goal inside a mapped obstacle."""
+        """Return whether the failure is caused by a goal at which the robot does not fit on the map."""
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
             self._costmaps.global_costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )

@@ -1,4 +1,4 @@
-"""What a stack publishes: plans, local plans, beliefs, costmaps, and events if a component keeps the robot waiting."""
+"""Output of a stack: plans, local plans, beliefs, costmaps, and events if a component keeps the robot waiting."""
 
 import math
 from collections.abc import Callable

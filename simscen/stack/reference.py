@@ -32,7 +32,7 @@ MOTION_READINGS = frozenset((Odometry, Imu, Bump))
 class ReferenceStack:
     """Localizer, costmaps, navigator, controller, velocity smoother, and collision monitor of one robot.
 
-    It computes a command in each controller period, and repeats the command in between. The methods `_on_…` and
+    The stack computes a command in each controller period, and repeats the command in between. The methods `_on_…` and
     `_adjust_…` are extension points for subclasses. In this class, most of them do nothing or return their argument.
     """
 
@@ -85,7 +85,7 @@ class ReferenceStack:
         self._task.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal by this one."""
+        """Replace the current goal, and the rest of its action, by this goal."""
         self._events += self._task.preempt(tick, goal)
         self._navigator.stop()
 
@@ -179,7 +179,7 @@ class ReferenceStack:
     # Readings ---------------------------------------------------------------------------------------------------------
 
     def _can_wait(self, tick: int, readings: Readings) -> bool:
-        """Return whether these readings can be processed later, together with the next scan."""
+        """Return whether these readings can be processed later, at the next scan or controller period."""
         if self._events or self._commands.has_latency or self._fuses_odometry:
             return False
         if tick >= self._publishing.belief_due or tick >= self._localizer_scans.due:

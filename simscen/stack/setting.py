@@ -1,4 +1,4 @@
-"""What a stack component gets besides its specification: robot, map, random generator, and functions of the stack."""
+"""Input of a stack component besides its specification: robot, map, random generator, and functions of the stack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -25,14 +25,14 @@ class Setting:
     Units are SI and rad. The base frame has x forward and y to the left (REP 103).
 
     surroundings:     robot model, map, keepout and speed zones, names of the lidars, tick rate
-    name:             name of the random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
+    name:             name of the random stream: "planner", "controller", "localizer", "behavior#1", …, "stack"
     streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
     estimate:         initial pose estimate; `reset` or `start` passes it again
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
-    clear_costmap:    clears both costmaps, except for obstacles in the newest readings (for a behavior)
+    clear_costmap:    clears both costmaps, as described in `Costmaps.clear` (for a behavior)
     clear_around:     like `clear_costmap`, but only the area of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
     limit_command:    returns the command after the collision monitor, given command and pose in the odom frame
