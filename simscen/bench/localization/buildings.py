@@ -57,11 +57,11 @@ def box_distances(rows: Array, point: Sequence[float]) -> Array:
 FLOOR_LENGTH_RANGE_M, FLOOR_DEPTH_RANGE_M, CORRIDOR_WIDTH_RANGE_M = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
 ROOM_WIDTH_RANGE_M, DOOR_WIDTH_RANGE_M, WALL_THICKNESS_RANGE_M = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
 GLASS_WALL_FRACTION = 0.15
-"""Fraction of the rooms with a glass wall to the corridor."""
+"""Fraction of the rooms that have a glass wall to the corridor."""
 CONNECTING_DOOR_FRACTION = 0.3
-"""Fraction of the walls between neighboring rooms with a door."""
+"""Fraction of the walls between neighboring rooms that have a door."""
 DOOR_CLEARANCE_M = 0.8
-"""Minimum distance of random furniture to doors."""
+"""Minimum distance of random furniture to the centers of doors."""
 MOVED_FRACTION, REMOVED_FRACTION, ADDED_FRACTION = 0.25, 0.1, 0.15
 """Fractions of the furniture that `rearranged_furniture` moves, removes, and adds."""
 
@@ -189,7 +189,7 @@ def _corridor_furniture(
 
 
 def _is_clear_of_doors(doors: Array, box: tuple[float, float, float, float]) -> bool:
-    """Return whether a box is at least DOOR_CLEARANCE_M away from all doors."""
+    """Return whether a box is more than DOOR_CLEARANCE_M away from the centers `doors` (n, 2)."""
     return all(box_distances(box_array([box]), door)[0] > DOOR_CLEARANCE_M for door in doors.tolist())
 
 

@@ -60,7 +60,7 @@ class Trial:
     median:       median position error in m
     largest:      largest position error in m
     found:        seconds from start or kidnapping until the robot was found and not lost again; None if never
-    nees:         NEES at each of CHECK_TIMES_S
+    nees:         NEES of the first belief at or after each of CHECK_TIMES_S
     ms:           CPU time per scan in ms
     slowest_ms:   CPU time of the slowest message in ms
     """
@@ -268,7 +268,7 @@ def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
     """Return 95 % bounds of the mean of `groups` if the covariances are right on average.
 
     `groups` has the ANEES of each building. NEES values of one building may be correlated. The bounds are Student's t
-    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, and if the
+    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, or if the
     mean is infinite or not positive.
     """
     count, mean = len(groups), float(np.mean(groups))

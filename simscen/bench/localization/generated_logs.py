@@ -171,8 +171,8 @@ def _drive_in_furniture(
 ) -> tuple[Array, Array]:
     """Return the true poses (k, 3) of a drive, and boxes (n, 4) of the furniture.
 
-    Without `furniture`, the furniture is chosen for the circumstance. The choice is repeated as long as it blocks the
-    door of the robot's room.
+    Without `furniture`, the furniture is chosen for the circumstance. If the furniture encloses the robot, furniture
+    and drive are chosen again.
     """
     while True:
         current = furniture

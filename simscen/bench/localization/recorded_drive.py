@@ -20,7 +20,7 @@ from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
 MAX_GAP_S = 1.0
-"""Time between two consecutive reference poses up to which poses are interpolated."""
+"""Time between two consecutive reference poses up to which all beliefs between them are compared."""
 MAX_TIME_DIFFERENCE_S = 0.05
 """Maximum time between a belief and the nearest reference pose in a gap longer than MAX_GAP_S."""
 
@@ -47,7 +47,7 @@ class LocalizationResult:
 
 @dataclass(frozen=True)
 class LostInterval:
-    """Interval in s in which the robot was lost. `until` is None if the robot was lost at the end."""
+    """Interval from `since` to `until` in s in which the robot was lost. `until` is None for an interval to the end."""
 
     since: float
     until: float | None

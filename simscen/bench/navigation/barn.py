@@ -258,7 +258,7 @@ DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14
 class Mover:
     """Cylinder that moves back and forth along `points` (n, 2), which it passes at `times` (n,) in s.
 
-    At the start of a run, the cylinder is where it is `phase` seconds after the beginning of this motion.
+    At the start of a run, `phase` seconds of this motion have already passed.
     """
 
     times: Array

@@ -21,9 +21,10 @@ from simscen.core.random_streams import Streams
 
 @dataclass(frozen=True)
 class Drive:
-    """Scenario file with the seeds of its runs. All drives in the same world have the same `world` name.
+    """Scenario file with the seeds of its runs.
 
-    `reference_length` is the length in m of the reference path for the BARN score; None without a score.
+    `reference_length` is the length in m of the reference path for the BARN score; None without a score. `world` is the
+    name of the world, by which runs are grouped; a drive with the name "" is a group of its own.
     """
 
     file: Path
@@ -221,7 +222,7 @@ def write_text(file: Path, text: str) -> Path:
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
     """Write a copy of an experiment with a new name. `stack` is the value of the key `stack` in its scenarios.
 
-    The scenarios in `folder` extend the original scenarios. The key `localizer` is ignored for mapless drives.
+    The new scenarios, in `folder`, extend the original scenarios. The key `localizer` is ignored for mapless drives.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.is_mapless and key == "localizer")}

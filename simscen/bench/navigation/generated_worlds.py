@@ -172,8 +172,8 @@ pass:
 def _ramp_scenario(number: int) -> str:
     rng = Streams(number).generator("ramp")
     slope, height = float(rng.uniform(*RAMP_SLOPE_RANGE_DEG)), float(rng.uniform(*RAMP_HEIGHT_RANGE_M))
-    run, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
-    top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
+    ramp_length, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
+    top, below = (3.0 + ramp_length, 3.0 + ramp_length + flat), 3.0 + 2 * ramp_length + flat
     end, y = below + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))
     hall = HALL_WIDTH_M
     middle, size = hall / 2, f"width: {hall - 0.1:g}, height: {height:.4f}"

@@ -16,7 +16,7 @@ from simscen.worlds.routes.shortest_paths import ShortestPaths
 WALL_MARGIN_M = 0.12
 """Minimum distance between the robot's outline and walls on the shortest path."""
 MOVABLE_MARGIN_M = 1.5
-"""Minimum distance of start and goal to doors and movable objects."""
+"""Minimum distance of start and goal to the origins of doors and movable objects."""
 MAX_ATTEMPTS = 2000
 """Maximum number of random pairs of start and goal for one drive."""
 
@@ -36,7 +36,8 @@ def random_drives(
 ) -> Iterator[RandomDrive]:
     """Yield a random drive of a disc-shaped robot for each number, with a path of at least `min_length` in m.
 
-    A drive depends only on its number, the world, `radius` in m, and `min_length`. A number without a drive is skipped.
+    A drive depends only on its number, the world, `radius` in m, and `min_length`. A number is skipped if no
+    drive is found.
     """
     paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
@@ -54,7 +55,7 @@ def random_drives(
 
 
 def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
-    """Return whether a door or movable object is within MOVABLE_MARGIN_M."""
+    """Return whether the origin of a door or movable object is within MOVABLE_MARGIN_M."""
     return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE_MARGIN_M for body in built.world.bodies)
 
 

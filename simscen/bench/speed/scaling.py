@@ -31,7 +31,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import save_map
 
 DURATION_S = 15
-"""Simulated time of each run of PATROL."""
+"""Simulated time of each run of `measure_growth`."""
 QUANTITIES = {
     "obstacles": (0, 100, 1000),
     "objects": (20, 100),
@@ -46,6 +46,7 @@ ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
 OBJECTS_PER_ROW = 25
 """Number of crates in a row. All rows are outside of the hall of PATROL."""
 UNIT = "ms per simulated second"
+"""Unit of the CPU times of `measure_growth`."""
 
 
 def measure_growth(rounds: int, report_progress: ProgressCallback = no_progress) -> Measurements:
